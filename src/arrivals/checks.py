@@ -1,0 +1,168 @@
+"""What every constructor asks of its arguments; each check says what was given and what is wanted."""
+
+import operator
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from arrivals.typing import Float
+
+T = TypeVar("T")
+
+
+def number(name: str, value: Any) -> float:
+    """Return a real number as a float.
+
+    Examples
+    --------
+    >>> number("kappa", "many")
+    Traceback (most recent call last):
+    TypeError: kappa must be a number; got 'many'
+    """
+    if isinstance(value, bool) or not np.isscalar(value) or not np.isrealobj(value):
+        raise TypeError(f"{name} must be a number; got {value!r}")
+    try:
+        return float(value)  # type: ignore[arg-type]  # anything scalar that float() understands
+    except (TypeError, ValueError):
+        raise TypeError(f"{name} must be a number; got {value!r}") from None
+
+
+def positive(name: str, value: Any) -> float:
+    """Return a finite number above zero.
+
+    Examples
+    --------
+    >>> positive("kappa", -1)
+    Traceback (most recent call last):
+    ValueError: kappa must be finite and positive; got -1
+    """
+    if not 0 < number(name, value) < np.inf:
+        raise ValueError(f"{name} must be finite and positive; got {value}")
+    return float(value)
+
+
+def not_negative(name: str, value: Any) -> float:
+    """Return a finite number that is zero or above.
+
+    Examples
+    --------
+    >>> not_negative("q", -0.5)
+    Traceback (most recent call last):
+    ValueError: q must be finite and not negative; got -0.5
+    """
+    if not 0 <= number(name, value) < np.inf:
+        raise ValueError(f"{name} must be finite and not negative; got {value}")
+    return float(value)
+
+
+def probability(name: str, value: Any) -> float:
+    """Return a number in [0, 1].
+
+    Examples
+    --------
+    >>> probability("p_activate", 1.5)
+    Traceback (most recent call last):
+    ValueError: p_activate must lie in [0, 1]; got 1.5
+    """
+    if not 0 <= number(name, value) <= 1:
+        raise ValueError(f"{name} must lie in [0, 1]; got {value}")
+    return float(value)
+
+
+def count(name: str, value: Any, least: int = 1) -> int:
+    """Return a whole number that is at least `least`.
+
+    Examples
+    --------
+    >>> count("n_sensors", 2.5)
+    Traceback (most recent call last):
+    TypeError: n_sensors must be a whole number; got 2.5
+    """
+    try:
+        whole = operator.index(value)
+    except TypeError:
+        raise TypeError(f"{name} must be a whole number; got {value!r}") from None
+    if isinstance(value, bool):
+        raise TypeError(f"{name} must be a whole number; got {value!r}")
+    if whole < least:
+        raise ValueError(f"{name} must be at least {least}; got {value}")
+    return whole
+
+
+def one_of(name: str, value: T, choices: tuple[T, ...]) -> T:
+    """Return a value that is among `choices`.
+
+    Examples
+    --------
+    >>> one_of("reference", "last", ("first", "middle"))
+    Traceback (most recent call last):
+    ValueError: reference must be one of 'first', 'middle'; got 'last'
+    """
+    if value not in choices:
+        raise ValueError(f"{name} must be one of {', '.join(map(repr, choices))}; got {value!r}")
+    return value
+
+
+def instance(name: str, value: Any, kind: type[T]) -> T:
+    """Return a part that is of the wanted kind.
+
+    Examples
+    --------
+    >>> instance("motion", 3, str)
+    Traceback (most recent call last):
+    TypeError: motion must be a str; got 3, an int
+    """
+    if not isinstance(value, kind):
+        article = "an" if type(value).__name__[0].lower() in "aeiou" else "a"
+        raise TypeError(
+            f"{name} must be a {kind.__name__}; got {value!r}, {article} {type(value).__name__}"
+        )
+    return value
+
+
+def shaped(name: str, value: ArrayLike, *shape: int) -> Float:
+    """Return real numbers as an array of the given shape.
+
+    Examples
+    --------
+    >>> shaped("z", [1, 2, 3], 2)
+    Traceback (most recent call last):
+    ValueError: z must have shape (2,); got (3,)
+    """
+    array = real(name, value)
+    if array.shape != shape:
+        raise ValueError(f"{name} must have shape {shape}; got {array.shape}")
+    return array
+
+
+def real(name: str, value: ArrayLike) -> Float:
+    """Return real numbers as an array of floats.
+
+    Examples
+    --------
+    >>> real("x", [1 + 2j])
+    Traceback (most recent call last):
+    TypeError: x must hold real numbers; got complex128
+    """
+    array = np.asarray(value)
+    if array.dtype.kind not in "biuf":
+        raise TypeError(f"{name} must hold real numbers; got {array.dtype}")
+    return array.astype(np.float64, copy=False)
+
+
+def state(x: ArrayLike, dim_x: int) -> Float:
+    """Return states (..., dim_x) as floats.
+
+    Examples
+    --------
+    >>> state([[1.0], [2.0]], 2)
+    Traceback (most recent call last):
+    ValueError: states must have shape (..., 2); got the column (2, 1): pass x.ravel()
+    """
+    array = real("x", x)
+    if array.ndim == 0 or array.shape[-1] != dim_x:
+        column = array.shape == (dim_x, 1)
+        got = f"the column {array.shape}: pass x.ravel()" if column else f"{array.shape}"
+        raise ValueError(f"states must have shape (..., {dim_x}); got {got}")
+    return array

@@ -1,0 +1,147 @@
+"""What a tracker believes after a step, as frozen records that know their rows in a tracks file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar
+
+import numpy as np
+
+from arrivals.typing import Complex, Float, Int
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """What was found in one step; the first axis of every array counts what was found.
+
+    A kind of estimate is a frozen dataclass: `per_source` maps the name of each array field to
+    what fills it up in the rectangular arrays of a `Run`; all other fields are one number a step.
+    """
+
+    per_source: ClassVar[dict[str, Any]] = {}
+    columns: ClassVar[tuple[str, ...]] = ()
+
+    @property
+    def n_found(self) -> int:
+        """Number of sources in this estimate."""
+        return len(getattr(self, next(iter(self.per_source))))
+
+    def rows(self) -> list[tuple[Any, ...]]:
+        """Return one row for each source, in the order of `columns`."""
+        raise NotImplementedError
+
+    def per_step(self) -> tuple[str, ...]:
+        """Return the names of the fields that are one number a step."""
+        return tuple(f.name for f in fields(self) if f.name not in self.per_source)
+
+
+@dataclass(frozen=True, eq=False)
+class DirectionEstimate(Estimate):
+    """Directions of arrival found in one step.
+
+    Parameters
+    ----------
+    doa : ndarray, shape (n_found,)
+        Directions of arrival, rad.
+    std : ndarray, shape (n_found,)
+        Their standard deviations, rad; NaN where the method gives none.
+    existence : ndarray, shape (n_found,)
+        Probability that the source is there; NaN where the method gives none.
+    amplitude : ndarray, shape (n_found,)
+        Complex amplitude at the origin of the array's coordinates; NaN where there is none.
+    label : ndarray of int, shape (n_found,)
+        Stays with a source while it is tracked; -1 from methods that do not track.
+    converged : bool
+        False if an iterative method stopped before it met its tolerance.
+    iterations : int
+        Iterations that this step took; 0 for a method without.
+    noise : float
+        Estimated variance of the noise at one sensor; NaN where the method gives none.
+    """
+
+    doa: Float
+    std: Float
+    existence: Float
+    amplitude: Complex
+    label: Int
+    converged: bool = True
+    iterations: int = 0
+    noise: float = np.nan
+
+    per_source: ClassVar[dict[str, Any]] = {
+        "doa": np.nan,
+        "std": np.nan,
+        "existence": np.nan,
+        "amplitude": complex(np.nan, np.nan),
+        "label": -1,
+    }
+    columns: ClassVar[tuple[str, ...]] = ("label", "doa_deg", "std_deg", "existence", "level_db")
+
+    @classmethod
+    def nothing(cls, **per_step: Any) -> DirectionEstimate:
+        """Return the estimate in which no source was found.
+
+        Examples
+        --------
+        >>> DirectionEstimate.nothing().n_found
+        0
+        """
+        none = np.zeros(0)
+        return cls(none, none, none, none.astype(complex), none.astype(np.int64), **per_step)
+
+    def rows(self) -> list[tuple[Any, ...]]:
+        """Return label, direction and its standard deviation in degrees, existence, level in dB."""
+        with np.errstate(divide="ignore"):
+            level_db = 20 * np.log10(np.abs(self.amplitude))
+        degrees = np.rad2deg([self.doa, self.std])
+        return list(zip(self.label, *degrees, self.existence, level_db, strict=True))
+
+
+@dataclass(frozen=True, eq=False)
+class PositionEstimate(Estimate):
+    """Positions found in one step.
+
+    Parameters
+    ----------
+    position : ndarray, shape (n_found, 2)
+        Positions, m.
+    covariance : ndarray, shape (n_found, 2, 2)
+        Their covariances, m².
+    log_amplitude : ndarray, shape (n_found,)
+        Logarithm of the source's amplitude, neper.
+    existence : ndarray, shape (n_found,)
+        Probability that the source is there; NaN where the method gives none.
+    label : ndarray of int, shape (n_found,)
+        Stays with a source while it is tracked; -1 from methods that do not track.
+    converged : bool
+        False if an iterative method stopped before it met its tolerance.
+    """
+
+    position: Float
+    covariance: Float
+    log_amplitude: Float
+    existence: Float
+    label: Int
+    converged: bool = True
+
+    per_source: ClassVar[dict[str, Any]] = {
+        "position": np.nan,
+        "covariance": np.nan,
+        "log_amplitude": np.nan,
+        "existence": np.nan,
+        "label": -1,
+    }
+    columns: ClassVar[tuple[str, ...]] = (
+        "label", "x_m", "y_m", "std_x_m", "std_y_m", "corr", "existence", "level_db",
+    )  # fmt: skip
+
+    def rows(self) -> list[tuple[Any, ...]]:
+        """Return label, position, standard deviations and correlation, existence, level in dB."""
+        x, y = self.position.T
+        variance = np.diagonal(self.covariance, axis1=-2, axis2=-1)
+        std_x, std_y = np.sqrt(variance).T
+        corr = self.covariance[:, 0, 1] / (std_x * std_y)
+        level_db = 20 / np.log(10) * self.log_amplitude
+        return list(
+            zip(self.label, x, y, std_x, std_y, corr, self.existence, level_db, strict=True)
+        )
