@@ -1,4 +1,4 @@
-"""What every constructor asks of its arguments; each check says what was given and what is wanted."""
+"""Checks of arguments; each says what was given and what is wanted."""
 
 import operator
 from typing import Any, TypeVar

@@ -1,0 +1,181 @@
+"""The conventional beamformer: peaks of the beam power, frame by frame."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from arrivals.checks import count, instance, positive
+from arrivals.measurement_models.arrays import SensorArray
+from arrivals.measurement_models.snapshots import ArraySnapshot
+from arrivals.trackers.base import Tracker, missed
+from arrivals.trackers.estimates import DirectionEstimate
+from arrivals.trackers.registry import register
+from arrivals.trackers.slots import padded
+from arrivals.typing import Complex, Float, Int
+
+
+def look_directions(array: SensorArray, n: int) -> Float:
+    """Return n directions, rad: -π/2 to π/2 for a line, the full circle otherwise.
+
+    Examples
+    --------
+    >>> np.rad2deg(look_directions(SensorArray.ula(4, 0.5), 5))
+    array([-90., -45.,   0.,  45.,  90.])
+    """
+    if array.dim == 1:
+        return np.linspace(-np.pi / 2, np.pi / 2, n)
+    return np.linspace(-np.pi, np.pi, n, endpoint=False)
+
+
+def beam_power(A: Complex, z: ArrayLike) -> Float:
+    """Return |aᴴz|² of unit-norm steering vectors: the Bartlett spectrum.
+
+    Parameters
+    ----------
+    A : ndarray, shape (n_directions, n_sensors)
+        Rows a(β), of entries with unit modulus.
+    z : array_like, shape (..., n_sensors)
+        Snapshots; sensors that are NaN or infinite are left out.
+
+    Returns
+    -------
+    ndarray, shape (..., n_directions)
+        A plane wave of amplitude w gives M|w|² in its direction, M the sensors left.
+
+    Examples
+    --------
+    >>> beam_power(np.ones((1, 3)), [1.0, np.nan, 1.0]).round(6)
+    array([2.])
+    """
+    z = np.asarray(z)
+    heard = np.isfinite(z)
+    beam = np.where(heard, z, 0) @ A.conj().T
+    n_heard = np.maximum(heard.sum(axis=-1, keepdims=True), 1)
+    return np.asarray((beam.real**2 + beam.imag**2) / n_heard)
+
+
+def peaks(power: Float, *, circular: bool) -> Int:
+    """Return the indices of the local maxima of a spectrum, the highest first.
+
+    The ends of a line's spectrum are never peaks.
+
+    Examples
+    --------
+    >>> peaks(np.array([9.0, 1.0, 3.0, 2.0, 4.0, 0.0]), circular=False)
+    array([4, 2])
+    """
+    top = (power > np.roll(power, 1)) & (power >= np.roll(power, -1))
+    if not circular:
+        top[[0, -1]] = False
+    found = np.flatnonzero(top)
+    return found[np.argsort(-power[found], kind="stable")]
+
+
+@register("cbf")
+class CBF(Tracker):
+    """Peaks of the conventional beamformer, within some dB of the highest.
+
+    Parameters
+    ----------
+    measurement : ArraySnapshot
+        Any array; its noise is not used.
+    n_directions : int
+        Look directions: over ±90° for a line (361: every half degree), else over the circle.
+    threshold_db : float
+        Peaks lower than this below the highest are not reported.
+    max_sources : int, optional
+        Peaks at most; as many as there are sensors if None.
+
+    Attributes
+    ----------
+    doa_grid, power : ndarray, shape (n_directions,)
+        Look directions, rad, and the beam power of the last snapshot; NaN before there was one.
+
+    Notes
+    -----
+    It looks at one frame at a time: labels are -1, `std` and `existence` NaN. A peak is refined
+    by a parabola through three points of the spectrum in dB.
+
+    References
+    ----------
+    Park, Meyer and Gerstoft, JASA 153(1), 2023, section VI (the comparator CBF).
+
+    Examples
+    --------
+    >>> model = ArraySnapshot(SensorArray.ula(15, spacing=0.5), wavelength=1.0)
+    >>> tracker = CBF(model, threshold_db=3.0)
+    >>> tracker.update(model.array.steering_vector(0.5, 1.0))
+    >>> tracker.estimate.doa.round(3), abs(tracker.estimate.amplitude).round(3)
+    (array([0.5]), array([1.]))
+    """
+
+    def __init__(
+        self,
+        measurement: ArraySnapshot,
+        *,
+        n_directions: int = 361,
+        threshold_db: float = 10.0,
+        max_sources: int | None = None,
+    ) -> None:
+        self.measurement = instance("measurement", measurement, ArraySnapshot)
+        self.n_directions = count("n_directions", n_directions, least=3)
+        self.threshold_db = positive("threshold_db", threshold_db)
+        self.max_sources = max_sources
+        if max_sources is not None:
+            count("max_sources", max_sources)
+        self.doa_grid = look_directions(measurement.array, n_directions)
+        self.predict()
+
+    @property
+    def n_slots(self) -> int:
+        """Number of peaks that may be reported at once."""
+        return self.max_sources or self.measurement.array.n_sensors
+
+    def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
+        """Forget: nothing is carried from snapshot to snapshot."""
+        self.power = np.full(self.n_directions, np.nan)
+        self._show(DirectionEstimate.nothing())
+
+    def update(self, z: ArrayLike | None) -> None:
+        """Scan one snapshot, (n_sensors,); sensors that are NaN or infinite are left out."""
+        if missed(z):
+            return
+        z = self.measurement.snapshot(np.asarray(z))
+        array, wavelength = self.measurement.array, self.measurement.wavelength
+        self.doa_grid = look_directions(array, self.n_directions)
+        self.power = beam_power(array.steering_vector(self.doa_grid, wavelength), z)
+        top = peaks(self.power, circular=array.dim > 1)
+        high = self.power[top] > self.power.max() * 10 ** (-self.threshold_db / 10)
+        doa = self._refined(top[high][: self.n_slots])
+        heard = ~np.isnan(z)
+        a = array.steering_vector(doa, wavelength)[:, heard]
+        self._show(
+            DirectionEstimate(
+                doa=doa,
+                std=np.full(len(doa), np.nan),
+                existence=np.full(len(doa), np.nan),
+                amplitude=a.conj() @ z[heard] / heard.sum(),
+                label=np.full(len(doa), -1),
+            )
+        )
+
+    def _refined(self, top: Int) -> Float:
+        """Return the vertices of the parabolas through peaks and neighbours, in dB."""
+        n = self.n_directions
+        level = np.log(np.maximum(self.power, np.finfo(float).tiny))
+        left, middle, right = level[top - 1], level[top], level[(top + 1) % n]
+        bend = 2 * middle - left - right
+        shift = (right - left) / (2 * np.where(bend > 0, bend, np.inf))
+        step = self.doa_grid[1] - self.doa_grid[0]
+        return np.asarray(self.doa_grid[top] + step * np.clip(shift, -0.5, 0.5))
+
+    def _show(self, estimate: DirectionEstimate) -> None:
+        self._estimate = estimate
+        self.x = padded(estimate.doa, self.n_slots, np.nan)
+        self.P = np.zeros((self.n_slots, self.n_slots))
+
+    @property
+    def estimate(self) -> DirectionEstimate:
+        """The peaks of the last snapshot, the highest first."""
+        return self._estimate

@@ -1,0 +1,72 @@
+"""What goes into an engine of VALSE and SVALSE, and what comes out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from arrivals.measurement_models.manifolds import Manifold
+from arrivals.typing import Bool, Complex, Float
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """What is known of the components before the snapshot, (65).
+
+    Parameters
+    ----------
+    mu, kappa : ndarray, shape (n_carried,)
+        Von Mises densities of the angles of the components carried over; rad.
+    existence : ndarray, shape (n_carried,)
+        Probability that each is active.
+    birth : float
+        Probability that a component that was not carried is active.
+    """
+
+    mu: Float
+    kappa: Float
+    existence: Float
+    birth: float
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """The components after the snapshot, those carried over first.
+
+    Parameters
+    ----------
+    theta : ndarray, shape (n_components,)
+        Mean angles, rad.
+    resultant : ndarray, shape (n_components,)
+        Lengths of the mean of exp(jθ): 1 for an angle that is known, 0 for one that is not.
+    active : ndarray of bool, shape (n_components,)
+        Components in use at the end.
+    was_active : ndarray of bool, shape (n_components,)
+        Components in use at the end of any iteration.
+    amplitude : ndarray, shape (n_components,)
+        Posterior means, zero where not active.
+    evidence : ndarray, shape (n_components,)
+        By how much the ELBO would fall if an active component were removed, nats.
+    noise, power : float
+        Variances of the noise of a sensor (58) and of an amplitude (59).
+    iterations : int
+    converged : bool
+    """
+
+    theta: Float
+    resultant: Float
+    active: Bool
+    was_active: Bool
+    amplitude: Complex
+    evidence: Float
+    noise: float
+    power: float
+    iterations: int
+    converged: bool
+
+
+class Engine(Protocol):
+    """Maximises the ELBO of one step."""
+
+    def fit(self, Y: Complex, manifold: Manifold, prediction: Prediction | None) -> Fit:
+        """Fit data of shape (n_bins, n_sensors, n_snapshots); no prediction: nothing is known."""

@@ -1,0 +1,174 @@
+"""Directions tracked from snapshot to snapshot, gridless, their number unknown and changing."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from arrivals.checks import instance, not_negative, positive
+from arrivals.measurement_models.manifolds import Reference
+from arrivals.measurement_models.snapshots import ArraySnapshot
+from arrivals.motion_models.bernoulli_von_mises import BernoulliVonMises
+from arrivals.motion_models.von_mises import bessel_ratio, inverse_bessel_ratio
+from arrivals.trackers.base import missed
+from arrivals.trackers.coordinate_ascent import CoordinateAscent, PosteriorName
+from arrivals.trackers.estimates import DirectionEstimate
+from arrivals.trackers.line_spectrum import Engine, Prediction
+from arrivals.trackers.registry import register
+from arrivals.trackers.slots import padded
+from arrivals.trackers.valse import VALSE, circular_std, described, reported
+from arrivals.typing import Bool, Float, Int
+
+
+@register("svalse")
+class SVALSE(VALSE):
+    """Sequential VALSE: what was found in one step is the prior of the next.
+
+    The components in use at the end of a step are carried to the next one, and so, for one step,
+    are those that were in use at the end of one of its iterations. Each keeps its von Mises
+    density, widened by the motion model, and its label.
+
+    Parameters
+    ----------
+    measurement : ArraySnapshot
+        Its array must be a line on a uniform grid, gaps allowed. Its noise is not used: the
+        method estimates it.
+    motion : BernoulliVonMises
+        Steps, births and deaths; the paper's values are the default. Its angle is the electrical
+        one, 2π d/λ sin β.
+    reference, posterior, tolerance, max_iterations, max_components
+        As in `VALSE`. The paper's choices are "first", "mixture" and 1e-6.
+    merge : float
+        Of two active components nearer than this, rad of direction, the later is switched off;
+        0 for never. (Only in the paper's program, not in its text.)
+    snr_db : float
+        Signal-to-noise ratio from which the noise estimate of each step starts.
+
+    Attributes
+    ----------
+    mu, kappa, existence, label : ndarray, shape (L,)
+        The carried components: mean angle, concentration, probability of being active, and
+        label; NaN, 0, 0 and -1 in unused places. These are the belief, and may be assigned.
+    x, P, noise
+        As in `VALSE`.
+
+    Notes
+    -----
+    See `VALSE` for what `existence` and `std` of an estimate mean and do not mean. A label is
+    given when a component is first reported and stays while the component is carried; two
+    sources nearer than `merge` become one, and sources that cross may exchange their labels.
+    Between measurements, and after a missed one, the components whose predicted existence is
+    at least one half are reported.
+
+    References
+    ----------
+    Park, Meyer and Gerstoft, JASA 153(1), 2023. Direct quadrature, and the phase reference in
+    mid array: ours.
+
+    Examples
+    --------
+    >>> from arrivals.measurement_models import SensorArray
+    >>> model = ArraySnapshot(SensorArray.ula(15, spacing=0.5), wavelength=1.0, noise=1e-3)
+    >>> z = model.simulate([[0.50], [0.51], [0.52]], 1.0, np.random.default_rng(0))
+    >>> run = SVALSE(model).run(z)
+    >>> run.doa[:, 0].round(2), run.label[:, 0]
+    (array([0.5 , 0.51, 0.51]), array([0, 0, 0]))
+    """
+
+    def __init__(
+        self,
+        measurement: ArraySnapshot,
+        motion: BernoulliVonMises = BernoulliVonMises(),  # noqa: B008  (models are immutable)
+        *,
+        reference: Reference = "middle",
+        posterior: PosteriorName = "quadrature",
+        tolerance: float = 1e-4,
+        max_iterations: int = 500,
+        max_components: int | None = None,
+        merge: float = np.deg2rad(1.5),
+        snr_db: float = 20.0,
+    ) -> None:
+        super().__init__(
+            measurement,
+            reference=reference,
+            posterior=posterior,
+            tolerance=tolerance,
+            max_iterations=max_iterations,
+            max_components=max_components,
+        )
+        self.motion = instance("motion", motion, BernoulliVonMises)
+        self.merge = not_negative("merge", merge)
+        self.snr_db = positive("snr_db", snr_db)
+        self.n_labels = 0
+        self.birth = motion.p_activate
+        self._carry(np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0, dtype=np.int64))
+
+    @property
+    def engine(self) -> Engine:
+        """What maximises the ELBO, with this tracker's settings."""
+        return CoordinateAscent(
+            self.posterior,
+            self.tolerance,
+            self.max_iterations,
+            self.merge,
+            self.snr_db,
+            self.max_components,
+        )
+
+    def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
+        """Widen the angles' densities, and let sources be born and die, (62)-(65)."""
+        self.kappa, self.existence, self.birth = (
+            self.motion.blur(self.kappa, dt),
+            np.where(self.carried, self.motion.predict_existence(self.existence, dt), 0.0),
+            float(self.motion.predict_existence(0.0, dt)),
+        )
+        self._show(self._expected())
+
+    def update(self, z: ArrayLike | None) -> None:
+        """Fit one snapshot, (n_sensors,), given what is carried; leave out sensors that are NaN."""
+        if missed(z):
+            return
+        manifold, fit = self._fit(z, self._prediction())
+        label = np.full(len(fit.theta), -1)
+        label[: self.carried.sum()] = self.label[self.carried][: len(label)]
+        found = reported(manifold, fit)
+        fresh = found & (label < 0)
+        label[fresh] = self.n_labels + np.arange(fresh.sum())
+        self.n_labels += int(fresh.sum())
+        self._show(described(manifold, fit, found, label[found]))
+        # the active first, then those that were active in some iteration
+        history = fit.was_active & ~fit.active
+        order = np.concatenate([np.flatnonzero(fit.active), np.flatnonzero(history)])
+        kappa = inverse_bessel_ratio(fit.resultant[order])
+        self._carry(fit.theta[order], kappa, fit.active[order], label[order])
+
+    @property
+    def carried(self) -> Bool:
+        """Which places hold a carried component, (L,)."""
+        return ~np.isnan(self.mu)
+
+    def _prediction(self) -> Prediction | None:
+        on = self.carried
+        if not on.any():
+            return None
+        return Prediction(self.mu[on], self.kappa[on], self.existence[on], self.birth)
+
+    def _carry(self, mu: Float, kappa: Float, existence: Float | Bool, label: Int) -> None:
+        n = self.n_slots
+        self.mu = padded(mu, n, np.nan)
+        self.kappa = padded(kappa, n, 0.0)
+        self.existence = padded(existence, n, 0.0)
+        self.label = padded(label, n, -1).astype(np.int64)
+
+    def _expected(self) -> DirectionEstimate:
+        """Return what is likely to be there, before it is measured."""
+        manifold = self.measurement.manifold(self.reference)
+        likely = self.carried & (self.existence >= 0.5) & (self.label >= 0)
+        theta, std = self.mu[likely], circular_std(bessel_ratio(self.kappa[likely]))
+        return DirectionEstimate(
+            doa=manifold.to_doa(theta, slack=np.inf),
+            std=manifold.doa_std(theta, std),
+            existence=self.existence[likely],
+            amplitude=np.full(len(theta), complex(np.nan, np.nan)),
+            label=self.label[likely],
+        )
