@@ -1,0 +1,39 @@
+"""How states move."""
+
+from arrivals.motion_models.base import MotionModel
+from arrivals.motion_models.bernoulli_von_mises import BernoulliVonMises
+from arrivals.motion_models.linear import ConstantVelocity, LinearMotion, RandomWalk
+from arrivals.motion_models.turn import CoordinatedTurn
+from arrivals.motion_models.von_mises import (
+    VonMisesWalk,
+    bessel_ratio,
+    bessel_ratios,
+    inverse_bessel_ratio,
+    log_bessel_ratio,
+    log_density,
+    log_i0,
+    mfold_concentration,
+    mfold_modes,
+    product,
+    wrap,
+)
+
+__all__ = [
+    "BernoulliVonMises",
+    "ConstantVelocity",
+    "CoordinatedTurn",
+    "LinearMotion",
+    "MotionModel",
+    "RandomWalk",
+    "VonMisesWalk",
+    "bessel_ratio",
+    "bessel_ratios",
+    "inverse_bessel_ratio",
+    "log_bessel_ratio",
+    "log_density",
+    "log_i0",
+    "mfold_concentration",
+    "mfold_modes",
+    "product",
+    "wrap",
+]

@@ -1,0 +1,158 @@
+"""A direction that walks on the circle, of a source that comes and goes."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from arrivals.checks import not_negative, positive, probability, real
+from arrivals.motion_models.base import MotionModel
+from arrivals.motion_models.von_mises import VonMisesWalk
+from arrivals.typing import Bool, Float
+
+
+@dataclass(frozen=True)
+class BernoulliVonMises(MotionModel):
+    """A von Mises walk of the angle, beside birth and death of its source.
+
+    Parameters
+    ----------
+    kappa : float
+        Concentration of the angle's step per unit of time.
+    p_activate, p_deactivate : float
+        Probabilities that a silent source starts, and that an active one stops, per unit of time.
+
+    Raises
+    ------
+    ValueError
+        If `kappa` is not finite and positive, or a probability lies outside [0, 1].
+
+    Notes
+    -----
+    Shapes: states (..., 1), the angle alone. Units: rad. The Gaussian face is that of `walk`.
+
+    References
+    ----------
+    Park, Meyer, Gerstoft, JASA 153(1), 2023, (11) and (61); the defaults are the paper's.
+
+    Examples
+    --------
+    >>> model = BernoulliVonMises()
+    >>> model.predict_existence([0.0, 0.5, 1.0])
+    array([0.1  , 0.425, 0.75 ])
+    >>> model.walk
+    VonMisesWalk(kappa=148.0)
+    """
+
+    kappa: float = 148.0
+    p_activate: float = 0.10
+    p_deactivate: float = 0.25
+
+    def __post_init__(self) -> None:
+        positive("kappa", self.kappa)
+        probability("p_activate", self.p_activate)
+        probability("p_deactivate", self.p_deactivate)
+
+    @property
+    def walk(self) -> VonMisesWalk:
+        """How the angle moves."""
+        return VonMisesWalk(self.kappa)
+
+    @property
+    def dim_x(self) -> int:
+        """One angle."""
+        return 1
+
+    def f(self, x: ArrayLike, dt: float = 1.0) -> Float:
+        """Return the angles wrapped: without noise they stay where they are."""
+        return self.walk.f(x, dt)
+
+    def F(self, x: ArrayLike, dt: float = 1.0) -> Float:
+        """Return the slope of `f`, [[1]]."""
+        return self.walk.F(x, dt)
+
+    def Q(self, dt: float = 1.0) -> Float:
+        """Return the variance of the angle's step, in rad²."""
+        return self.walk.Q(dt)
+
+    def blur(self, kappa: ArrayLike, dt: float = 1.0) -> Float:
+        """Return the concentration after a step; see `VonMisesWalk.blur`."""
+        return self.walk.blur(kappa, dt)
+
+    def sample(self, x: ArrayLike, rng: np.random.Generator, dt: float = 1.0) -> Float:
+        """Draw angles after a step, as if their sources stayed active."""
+        return self.walk.sample(x, rng, dt)
+
+    def predict_existence(self, existence: ArrayLike, dt: float = 1.0) -> Float:
+        """Return the probability that each source is active after `dt`.
+
+        ρ' = (1 - p_d) ρ + p_a (1 - ρ) for one unit of time, (11); for others the same chain, run
+        for that long.
+
+        Parameters
+        ----------
+        existence : array_like, shape (...)
+            Probabilities before the step.
+        dt : float
+            Not negative.
+
+        Returns
+        -------
+        ndarray, shape (...)
+
+        Raises
+        ------
+        ValueError
+            If a probability lies outside [0, 1], if `dt` is negative, or if it is not whole while
+            the chain alternates (p_activate + p_deactivate > 1) and has no roots.
+        """
+        existence = real("existence", existence)
+        if not ((existence >= 0) & (existence <= 1)).all():
+            raise ValueError(f"existence must lie in [0, 1]; got {existence}")
+        p_activate, p_deactivate = self._switching(dt)
+        return np.asarray((1 - p_deactivate) * existence + p_activate * (1 - existence))
+
+    def sample_active(self, active: ArrayLike, rng: np.random.Generator, dt: float = 1.0) -> Bool:
+        """Draw which sources are active after `dt`, given which are now.
+
+        Parameters
+        ----------
+        active : array_like of bool, shape (...)
+            Which are active now.
+        rng : numpy.random.Generator
+            Source of chance.
+        dt : float
+            As in `predict_existence`.
+
+        Returns
+        -------
+        ndarray of bool, shape (...)
+
+        Raises
+        ------
+        ValueError
+            As in `predict_existence`.
+
+        Examples
+        --------
+        >>> sure = BernoulliVonMises(p_activate=1.0, p_deactivate=0.0)
+        >>> sure.sample_active([True, False], np.random.default_rng(0))
+        array([ True,  True])
+        """
+        active = np.asarray(active, dtype=bool)
+        p_activate, p_deactivate = self._switching(dt)
+        return rng.random(active.shape) < np.where(active, 1 - p_deactivate, p_activate)
+
+    def _switching(self, dt: float) -> tuple[float, float]:
+        """Return p_activate and p_deactivate over `dt`: the transition matrix to that power."""
+        dt = not_negative("dt", dt)
+        switching = self.p_activate + self.p_deactivate
+        if dt == 1.0 or switching == 0.0:
+            return self.p_activate, self.p_deactivate
+        eigenvalue = 1 - switching
+        if eigenvalue < 0 and not dt.is_integer():
+            raise ValueError(
+                f"dt must be whole where p_activate + p_deactivate exceeds 1; got dt={dt}"
+            )
+        forgotten = (1 - eigenvalue**dt) / switching
+        return self.p_activate * forgotten, self.p_deactivate * forgotten

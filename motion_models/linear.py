@@ -1,0 +1,237 @@
+"""States that move by a matrix."""
+
+from abc import abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from arrivals.checks import count, not_negative, real, shaped, state
+from arrivals.motion_models.base import MotionModel
+from arrivals.typing import Float
+
+
+class _Linear(MotionModel):
+    """A model whose `F` is the same at every state."""
+
+    @abstractmethod
+    def F(self, x: ArrayLike | None = None, dt: float = 1.0) -> Float:
+        """Return the transition matrix, (dim_x, dim_x), whatever the state."""
+
+    def f(self, x: ArrayLike, dt: float = 1.0) -> Float:
+        """Return the states after `dt`, without noise: F x, (..., dim_x) -> (..., dim_x)."""
+        return np.asarray(state(x, self.dim_x) @ self.F(x, dt).T)
+
+
+@dataclass(frozen=True)
+class RandomWalk(_Linear):
+    """A position that drifts by white noise.
+
+    Parameters
+    ----------
+    q : float
+        Variance gained by each coordinate per unit of time.
+    n_dims : int
+        Number of coordinates.
+
+    Raises
+    ------
+    ValueError
+        If `q` is negative or not finite, or `n_dims` below 1.
+
+    Notes
+    -----
+    Shapes: states (..., n_dims). Units: those of the state; `q` in their square per unit of time.
+
+    Examples
+    --------
+    >>> RandomWalk(q=0.5).Q(dt=4.0)
+    array([[2., 0.],
+           [0., 2.]])
+    """
+
+    q: float
+    n_dims: int = 2
+
+    def __post_init__(self) -> None:
+        not_negative("q", self.q)
+        count("n_dims", self.n_dims)
+
+    @property
+    def dim_x(self) -> int:
+        """One entry per coordinate."""
+        return self.n_dims
+
+    def F(self, x: ArrayLike | None = None, dt: float = 1.0) -> Float:
+        """Return the identity, (dim_x, dim_x)."""
+        return np.eye(self.n_dims)
+
+    def Q(self, dt: float = 1.0) -> Float:
+        """Return q dt on the diagonal."""
+        return self.q * not_negative("dt", dt) * np.eye(self.n_dims)
+
+
+@dataclass(frozen=True)
+class ConstantVelocity(_Linear):
+    """A position whose velocity is disturbed by white noise in the acceleration.
+
+    Parameters
+    ----------
+    q : float
+        Spectral density of the acceleration.
+    n_dims : int
+        Number of coordinates.
+
+    Raises
+    ------
+    ValueError
+        If `q` is negative or not finite, or `n_dims` below 1.
+
+    Notes
+    -----
+    Shapes: states (..., 2 n_dims), in filterpy's order [x, vx, y, vy, ...]. Units: with lengths in
+    m and time in s, `q` is in m²/s³.
+
+    References
+    ----------
+    Bar-Shalom, Li, Kirubarajan, *Estimation with Applications to Tracking and Navigation*, 2001,
+    sec. 6.2.2.
+
+    Examples
+    --------
+    >>> ConstantVelocity(q=6.0).f([30.0, 1.0, 40.0, 0.5], dt=2.0)
+    array([32. ,  1. , 41. ,  0.5])
+    >>> ConstantVelocity(q=6.0, n_dims=1).Q()
+    array([[2., 3.],
+           [3., 6.]])
+    """
+
+    q: float
+    n_dims: int = 2
+
+    def __post_init__(self) -> None:
+        not_negative("q", self.q)
+        count("n_dims", self.n_dims)
+
+    @property
+    def dim_x(self) -> int:
+        """Position and velocity per coordinate."""
+        return 2 * self.n_dims
+
+    def F(self, x: ArrayLike | None = None, dt: float = 1.0) -> Float:
+        """Return the transition matrix: each position gains its velocity times `dt`."""
+        return _on_diagonal([[1.0, dt], [0.0, 1.0]], self.n_dims)
+
+    def Q(self, dt: float = 1.0) -> Float:
+        """Return the covariance that white acceleration leaves behind after `dt`."""
+        dt = not_negative("dt", dt)
+        return self.q * _on_diagonal([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]], self.n_dims)
+
+
+@dataclass(frozen=True, eq=False, init=False)
+class LinearMotion(_Linear):
+    """A state that moves by matrices of one's own: x' = F x + B u + w, w ~ (0, Q).
+
+    Parameters
+    ----------
+    transition : array_like, shape (dim_x, dim_x)
+        F, for a step of one unit of time.
+    noise : array_like, shape (dim_x, dim_x)
+        Q, symmetric and without negative eigenvalues.
+    control : array_like, shape (dim_x, dim_u), optional
+        B, for trackers that are given a control input.
+
+    Raises
+    ------
+    ValueError
+        If a matrix has the wrong shape, is not finite, or `noise` is no covariance; later, if a
+        step of any other length than 1 is asked for.
+
+    Notes
+    -----
+    Shapes: states (..., dim_x). The model keeps copies of its matrices, which cannot be written to.
+
+    Examples
+    --------
+    >>> fading = LinearMotion(transition=[[0.5]], noise=[[0.75]])
+    >>> fading.f([[8.0], [4.0]])
+    array([[4.],
+           [2.]])
+    """
+
+    transition: Float
+    noise: Float
+    control: Float | None
+
+    def __init__(
+        self, transition: ArrayLike, noise: ArrayLike, control: ArrayLike | None = None
+    ) -> None:
+        transition = _constant("transition", transition)
+        n = len(transition)
+        shaped("transition", transition, n, n)
+        noise = _constant("noise", shaped("noise", noise, n, n))
+        size = np.abs(noise).max()
+        if np.abs(noise - noise.T).max() > 1e-9 * size:
+            raise ValueError(f"noise must be symmetric; got {noise.tolist()}")
+        if np.linalg.eigvalsh(noise).min() < -1e-9 * size:
+            raise ValueError(f"noise must have no negative eigenvalue; got {noise.tolist()}")
+        if control is not None:
+            control = _constant("control", control)
+            shaped("control", control, n, control.shape[1])
+        for name, value in (("transition", transition), ("noise", noise), ("control", control)):
+            object.__setattr__(self, name, value)
+
+    @property
+    def dim_x(self) -> int:
+        """Number of rows of `transition`."""
+        return len(self.transition)
+
+    def F(self, x: ArrayLike | None = None, dt: float = 1.0) -> Float:
+        """Return a copy of `transition`."""
+        _one_step(dt)
+        return self.transition.copy()
+
+    def Q(self, dt: float = 1.0) -> Float:
+        """Return a copy of `noise`."""
+        _one_step(dt)
+        return self.noise.copy()
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, LinearMotion):
+            return NotImplemented
+        return self._content() == other._content()
+
+    def __hash__(self) -> int:
+        return hash(self._content())
+
+    def _content(self) -> tuple[object, ...]:
+        matrices = (self.transition, self.noise, self.control)
+        return tuple(None if A is None else (A.shape, tuple(A.ravel().tolist())) for A in matrices)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        # Through the constructor: plain pickling would make the arrays writeable again.
+        return type(self), (self.transition, self.noise, self.control)
+
+
+def _on_diagonal(block: ArrayLike, n: int) -> Float:
+    """Return a matrix with `block` n times on its diagonal; np.kron is several times slower."""
+    block = np.asarray(block, dtype=np.float64)
+    blocks = np.zeros((n, len(block), n, len(block)))
+    each = np.arange(n)
+    blocks[each, :, each, :] = block
+    return blocks.reshape(n * len(block), n * len(block))
+
+
+def _constant(name: str, value: ArrayLike) -> Float:
+    matrix = np.array(real(name, value))
+    if matrix.ndim != 2 or matrix.size == 0:
+        raise ValueError(f"{name} must be a matrix; got shape {matrix.shape}")
+    if not np.isfinite(matrix).all():
+        raise ValueError(f"{name} must be finite; got {matrix.tolist()}")
+    matrix.setflags(write=False)
+    return matrix
+
+
+def _one_step(dt: float) -> None:
+    if dt != 1:
+        raise ValueError(f"the matrices of LinearMotion hold for dt=1 only; got dt={dt}")
