@@ -68,7 +68,7 @@ def from_description(description: dict[str, Any]) -> SensorArray:
     kind = keys.pop("kind", None)
     if kind is None:
         raise ValueError(f"the key 'kind' is missing; it is one of {', '.join(KEYS)}")
-    if kind not in KEYS:
+    if not isinstance(kind, str) or kind not in KEYS:
         raise ValueError(f"kind must be one of {', '.join(KEYS)}; got {kind!r}")
     common = {name: keys.pop(name, None) for name in ("speed", "missing", "channels")}
     for name in KEYS[kind]:
@@ -100,10 +100,14 @@ def _wired(array: SensorArray, missing: Any, channels: Any) -> SensorArray:
         if value is not None and not isinstance(value, list):
             raise ValueError(f"{name} must be a list of numbers; got {value!r}")
     gone = [count("missing", element) - 1 for element in missing or []]
+    if max(gone, default=0) >= array.n_sensors:
+        raise ValueError(f"missing names element {max(gone) + 1} of {array.n_sensors}")
     whole = array.without(gone)
     if channels is None:
         return whole
     wires = tuple(count("channels", channel) - 1 for channel in channels)
+    if len(set(wires)) != len(wires):
+        raise ValueError(f"channels must differ from each other; got {channels}")
     if len(wires) == array.n_sensors:
         return SensorArray(array.positions, array.speed, wires).without(gone)
     return SensorArray(whole.positions, whole.speed, wires)
@@ -120,7 +124,7 @@ def from_csv(path: str | Path, *, speed: float | None = None) -> SensorArray:
         If a row has no number where one is wanted, or rows differ in length.
     """
     try:
-        with open(path, newline="") as file:
+        with open(path, newline="", encoding="utf-8-sig") as file:
             rows = [row for row in csv.reader(file) if any(cell.strip() for cell in row)]
     except (UnicodeDecodeError, csv.Error):
         raise ValueError(f"{path}: not a table of numbers") from None

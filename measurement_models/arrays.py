@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import reduce
 from pathlib import Path
 from typing import Any
 
@@ -69,7 +68,8 @@ def steering_vector(positions: ArrayLike, doa: ArrayLike, wavelength: ArrayLike)
 def grid_spacing(coordinates: ArrayLike, tolerance: float = 1e-3) -> float | None:
     """Return the largest spacing of a uniform grid that holds all coordinates, or None.
 
-    A coordinate may lie off the grid by `tolerance` of its spacing; grids of more than 4096
+    A coordinate may lie off the grid by `tolerance` of its spacing, or the nth part of that if
+    the smallest gap has n spacings: a fine enough grid fits anything. Grids of more than 4096
     points are not looked for.
 
     Examples
@@ -77,24 +77,20 @@ def grid_spacing(coordinates: ArrayLike, tolerance: float = 1e-3) -> float | Non
     >>> grid_spacing([0.0, 1.5, 3.5]), grid_spacing([0.0, 1.0, 2.7183]), grid_spacing([0.0])
     (0.5, None, None)
     """
-    places = np.sort(np.asarray(coordinates, dtype=np.float64))
-    if len(places) < 2:
-        return None
-    gaps = np.diff(places)
-    smallest = (places[-1] - places[0]) / 4096
-
-    def common_divisor(a: float, b: float) -> float:
-        while b > max(smallest / 2, tolerance * a):
-            a, b = b, abs(a - b * round(a / b))
-        return a
-
-    divisor = reduce(common_divisor, gaps.tolist())
-    if divisor < smallest:
-        return None
-    steps = np.rint((places - places[0]) / divisor)
-    spacing = float((places[-1] - places[0]) / steps[-1])
-    off = np.abs(places - places[0] - steps * spacing).max()
-    return spacing if off <= tolerance * spacing else None
+    places = np.unique(np.asarray(coordinates, dtype=np.float64))
+    places = places - places[0]
+    gaps = sorted(np.diff(places).tolist())
+    finest = int(4096 * gaps[0] / places[-1]) if gaps else 0
+    for parts in range(1, finest + 1):
+        spacing, span, n_points = gaps[0] / parts, 0.0, 0
+        for gap in gaps:  # larger gaps count more points and make the spacing more exact
+            n_points += round(gap / spacing)
+            span += gap
+            spacing = span / n_points
+        off = np.abs(places - spacing * np.rint(places / spacing)).max()
+        if off <= tolerance / parts * spacing:
+            return float(spacing)
+    return None
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +131,8 @@ class SensorArray(Model):
 
     def __post_init__(self) -> None:
         positions = real("positions", self.positions)
-        positions = np.array(positions[:, None] if positions.ndim == 1 else positions)
+        positions = positions[:, None] if positions.ndim == 1 else positions
+        positions = positions + 0.0  # a copy, without the sign of -0.0, which a hash would see
         if positions.ndim != 2 or not 1 <= positions.shape[1] <= 3 or len(positions) == 0:
             raise ValueError(
                 "positions must have shape (n_sensors, dim), dim 1, 2 or 3; "
@@ -159,6 +156,9 @@ class SensorArray(Model):
             if len(set(channels)) != len(channels):
                 raise ValueError(f"channels must differ from each other; got {channels}")
             object.__setattr__(self, "channels", channels)
+        if self.n_channels is not None:
+            last = max(self.channels or range(len(positions)))
+            count("n_channels", self.n_channels, least=last + 1)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, SensorArray):
@@ -231,7 +231,7 @@ class SensorArray(Model):
         """Make a line with a sensor in the centre and one at each distance, m, on either side."""
         d = np.sort(real("distances", distances)).astype(np.float64)
         if d.ndim != 1 or len(d) == 0 or not (d > 0).all():
-            raise ValueError(f"distances must be a list of positive numbers; got {distances}")
+            raise ValueError(f"distances must be a list of positive numbers; got {distances!r}")
         return cls(np.concatenate([-d[::-1], [0.0], d]), speed).without(missing)
 
     @classmethod

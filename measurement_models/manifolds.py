@@ -65,7 +65,7 @@ class Manifold(Protocol):
     def to_amplitude(self, w: ArrayLike, theta: ArrayLike) -> Complex:
         """Return amplitudes at the origin of the array's coordinates."""
 
-    def without(self, sensors: Sequence[int]) -> Manifold:
+    def without(self, sensors: Sequence[int] | Int) -> Manifold:
         """Return the manifold of the array less some sensors."""
 
 
@@ -177,7 +177,7 @@ class GridLine:
         shift = self.origin - self.reference_place
         return np.asarray(np.asarray(w) * np.exp(1j * shift * np.asarray(theta)))
 
-    def without(self, sensors: Sequence[int]) -> GridLine:
+    def without(self, sensors: Sequence[int] | Int) -> GridLine:
         """Return the manifold of the line less some sensors."""
         if len(sensors) == 0:
             return self

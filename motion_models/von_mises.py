@@ -273,7 +273,7 @@ def product(
     return wrap(np.angle(eta)), np.asarray(np.abs(eta))
 
 
-def mfold_concentration(kappa: ArrayLike, m: int) -> Float:
+def mfold_concentration(kappa: ArrayLike, m: ArrayLike) -> Float:
     """Return the concentration of each mode of f(mθ; κ), an m-fold wrapped density.
 
     κ̃ = A⁻¹(A(κ)^(1/m²)), which approaches m²κ as κ grows.
@@ -282,7 +282,7 @@ def mfold_concentration(kappa: ArrayLike, m: int) -> Float:
     ----------
     kappa : array_like, shape (...)
         Concentrations, not negative.
-    m : int
+    m : array_like of int, broadcasting with `kappa`
         Number of modes.
 
     Returns
@@ -304,7 +304,12 @@ def mfold_concentration(kappa: ArrayLike, m: int) -> Float:
     >>> mfold_concentration([0.0, 2.0, 1e6], 3).round(2)
     array([0.000000e+00, 1.302000e+01, 8.999996e+06])
     """
-    return _from_log_ratio(log_bessel_ratio(kappa) / count("m", m) ** 2)
+    modes = np.asarray(m)
+    if modes.ndim == 0:
+        count("m", m)
+    elif (modes < 1).any():
+        raise ValueError(f"m must be at least 1; got {modes.min()}")
+    return _from_log_ratio(log_bessel_ratio(kappa) / modes**2)
 
 
 def mfold_modes(eta: ArrayLike, m: int) -> Complex:

@@ -8,6 +8,7 @@ exp(jθ) of the one von Mises density that stands for q in the next time step: a
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
@@ -19,14 +20,15 @@ from arrivals.motion_models.von_mises import (
     log_i0,
     mfold_concentration,
 )
-from arrivals.typing import Complex, Float
+from arrivals.typing import Complex, Float, Int
 
+AnglePosterior = Callable[[Complex], tuple[Complex, complex]]
 LARGEST_GRID = 2048  # beyond it, windows about the modes are cheaper
 FINEST_GRID = 1 << 16  # points where windows do not serve
 NATS = 30.0  # what lies further below the top than this does not count
 
 
-def fold(eta: Complex, harmonics: np.ndarray, degree: int) -> Complex:
+def fold(eta: Complex, harmonics: Int, degree: int) -> Complex:
     """Return the one-sided coefficients of Re(ηᴴ a(θ)), a_k = exp(jkθ), k in `harmonics`.
 
     Re(η*ₖ exp(jkθ)) of a negative k is that of ηₖ exp(j|k|θ).
@@ -43,7 +45,7 @@ def fold(eta: Complex, harmonics: np.ndarray, degree: int) -> Complex:
     return c
 
 
-def unfold(moments: Complex, harmonics: np.ndarray) -> Complex:
+def unfold(moments: Complex, harmonics: Int) -> Complex:
     """Return ⟨exp(jkθ)⟩ for k in `harmonics`, of either sign, from those of 0, 1, 2...
 
     Examples
@@ -52,7 +54,7 @@ def unfold(moments: Complex, harmonics: np.ndarray) -> Complex:
     array([0.-0.5j, 1.+0.j , 0.+0.5j])
     """
     either = moments[np.abs(harmonics)]
-    return np.where(harmonics < 0, either.conj(), either)
+    return np.asarray(np.where(harmonics < 0, either.conj(), either))
 
 
 def quadrature(c: Complex) -> tuple[Complex, complex]:
@@ -104,7 +106,7 @@ def _in_windows(c: Complex) -> Complex:
     if overlap or log_q[:, [0, -1]].max() > -22:
         return _on_grid(c, FINEST_GRID)
     weight = std[:, None] * np.exp(log_q)
-    return np.einsum("wp,wpi->i", weight / weight.sum(), d)
+    return np.asarray(np.einsum("wp,wpi->i", weight / weight.sum(), d))
 
 
 def _modes(c: Complex) -> tuple[Float, Float, Float]:
@@ -116,8 +118,8 @@ def _modes(c: Complex) -> tuple[Float, Float, Float]:
     # a peak between grid points may stand above both by an eighth of their neighbours' drop
     headroom = np.maximum(2 * log_q - left - right, 0)
     top = (log_q >= left) & (log_q > right) & (log_q + headroom >= log_q.max() - NATS)
-    theta = 2 * np.pi / n_points * np.flatnonzero(top)
     step = 2 * np.pi / n_points
+    theta = np.asarray(np.flatnonzero(top) * step, dtype=np.float64)
     start = theta
     for _ in range(4):
         terms = np.exp(1j * np.multiply.outer(theta, i)) * c
@@ -125,7 +127,7 @@ def _modes(c: Complex) -> tuple[Float, Float, Float]:
         newton = slope / np.where(curvature > 0, curvature, np.inf)
         theta = np.clip(theta + newton, start - step, start + step)
     terms = np.exp(1j * np.multiply.outer(theta, i)) * c
-    curvature = np.maximum(terms.real @ i**2, 1.0)
+    curvature = np.maximum(terms.real @ i**2, 1e-9)
     return theta, terms.real[:, 1:].sum(axis=-1), curvature
 
 
@@ -200,7 +202,7 @@ def _factors(c: Complex) -> tuple[Complex, Float]:
     """Parameters ηₘ, m = 1..D, of the wrapped factors, and concentrations κ̃ₘ of their modes."""
     eta = c[1:].conj()
     m = np.arange(1, len(c))
-    return eta, np.array([mfold_concentration(abs(e), int(i)) for e, i in zip(eta, m)])
+    return eta, mfold_concentration(np.abs(eta), m)
 
 
 def nearest_modes(c: Complex) -> tuple[Complex, complex]:

@@ -102,12 +102,6 @@ class Tracker(Configurable, ABC):
 
         return _trackers.name_of(cls) or super()._type_name()
 
-    @classmethod
-    def _find_type(cls, name: str) -> Any:
-        from arrivals.trackers.registry import find
-
-        return super()._find_type(name) if ":" in name else find(name)
-
 
 def missed(z: ArrayLike | None) -> bool:
     """Tell whether a measurement is missing: None, or nothing but NaN.

@@ -6,7 +6,6 @@ are those of Park, Meyer and Gerstoft, JASA 153(1), 2023.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Literal
@@ -16,6 +15,7 @@ import numpy as np
 from arrivals.measurement_models.manifolds import Manifold
 from arrivals.motion_models.von_mises import wrap
 from arrivals.trackers.angle_posteriors import (
+    AnglePosterior,
     fold,
     mixture,
     nearest_modes,
@@ -27,7 +27,6 @@ from arrivals.trackers.line_spectrum import Fit, Prediction
 from arrivals.typing import Complex, Float, Int
 
 PosteriorName = Literal["quadrature", "mixture"]
-AnglePosterior = Callable[[Complex], tuple[Complex, complex]]
 NOISE_FLOOR = 1e-9  # of the power: keeps a snapshot without noise from a division by zero
 CYCLE = 0.2  # of the iterations allowed: a component merged away so often is in a limit cycle
 
@@ -72,8 +71,9 @@ class CoordinateAscent:
             None in a first step and in VALSE: nothing is known.
         """
         step = self.step(Y[0, :, 0], manifold, prediction)
-        x = step.start()
-        for iteration in range(1, self.max_iterations + 1):
+        x, converged = step.start(), False
+        while not converged and step.iterations < self.max_iterations and not step.cycles():
+            step.iterations += 1
             step.choose_support()
             step.learn_variances()
             step.refine_angles()
@@ -81,9 +81,7 @@ class CoordinateAscent:
             x_old, x = x, step.reconstruction()
             rests = np.linalg.norm(x - x_old) < self.tolerance * np.linalg.norm(x_old)
             converged = bool(rests or not (x.any() or x_old.any()))
-            if converged or step.merged.max() > CYCLE * self.max_iterations:
-                break
-        return step.result(iteration, converged)
+        return step.result(converged)
 
     def step(self, y: Complex, manifold: Manifold, prediction: Prediction | None) -> Ascent:
         """Return the working state for one snapshot."""
@@ -144,7 +142,8 @@ class Ascent:
         self.mean = np.zeros(L, dtype=np.complex128)  # ⟨exp(jθ)⟩, its length the resultant
         self.active = np.zeros(L, dtype=np.bool_)
         self.was_active = np.zeros(L, dtype=np.bool_)
-        self.merged = np.zeros(L, dtype=np.int64)
+        self.merged = np.zeros(L, dtype=np.int64)  # how often each was merged away
+        self.iterations = 0
 
     # -- start of a step -------------------------------------------------------------------
 
@@ -231,6 +230,7 @@ class Ascent:
         self.w += gamma * e
         self.z -= self.nu * gamma * r.conj()
         self.g -= alpha * self.nu * (r.real**2 + r.imag**2)
+        np.maximum(self.g, self.nu / self.tau, out=self.g)  # its bound, whatever the rounding
         if self.active[k]:
             self.C[k], self.C[:, k], self.w[k] = 0, 0, 0
         self.active[k] = not self.active[k]
@@ -242,7 +242,7 @@ class Ascent:
             explained = 2 * np.vdot(self.h, self.w) - np.vdot(self.w, self.J @ self.w)
             spread = np.vdot(self.C, self.J).real  # tr(J C)
             floor = NOISE_FLOOR * self.power / M
-            self.nu = max((self.power - float(explained.real) + spread) / M, floor)
+            self.nu = max(float(self.power - explained.real + spread) / M, floor)
             self.tau = float((np.vdot(self.w, self.w) + self.C.trace()).real) / K
         if self.learn_rho:
             self.rho[:] = min(max(K, 1), max(L - 1, 1)) / L if L > 1 else 0.5
@@ -297,6 +297,10 @@ class Ascent:
             self.solve()
         self.was_active |= self.active
 
+    def cycles(self) -> bool:
+        """Tell whether the search keeps reviving what merging removes."""
+        return bool(self.merged.max() > CYCLE * self.settings.max_iterations)
+
     def solve(self) -> None:
         """Compute C (52) and w (53) for the support as it is."""
         on = np.flatnonzero(self.active)
@@ -321,7 +325,7 @@ class Ascent:
         rest = -len(self.y) * np.log(np.pi * self.nu) - self.power / self.nu
         return float(rest + fit + prior)
 
-    def result(self, iterations: int, converged: bool) -> Fit:
+    def result(self, converged: bool) -> Fit:
         """Return the fit; the evidence of a component is minus the Δ of removing it."""
         self.gains_from_empty()
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -335,7 +339,7 @@ class Ascent:
             evidence=evidence,
             noise=self.nu,
             power=self.tau,
-            iterations=iterations,
+            iterations=self.iterations,
             converged=converged,
         )
 

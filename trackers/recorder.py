@@ -6,7 +6,7 @@ import csv
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import IO, Any
 
@@ -185,6 +185,11 @@ class Recorder:
     def run(self, dt: float, elapsed: float) -> Run:
         """Return what was recorded."""
         columns = {name: np.full((0, 0), filler) for name, filler in self._kind.per_source.items()}
+        columns |= {
+            field.name: np.array([field.default])[:0]
+            for field in fields(self._kind)
+            if field.name not in self._kind.per_source
+        }
         columns |= {name: column[: self._n].copy() for name, column in self._columns.items()}
         x = columns.pop("x", np.zeros((0, 0)))
         n_found = columns.pop("n_found", np.zeros(0, dtype=np.int64))

@@ -78,9 +78,11 @@ class Registry(Generic[Base]):
             If there is none, with the names that come near; or if two packages claim the name.
         """
         points = self._entry_points().get(name, [])
-        claims = [point.value for point in points]
         ours = self._classes.get(name)
-        if ours is not None and f"{ours.__module__}:{ours.__qualname__}" not in claims:
+        if ours is not None:  # a package may name its class by another path than the class does
+            points = [point for point in points if point.load() is not ours]
+        claims = [point.value for point in points]
+        if ours is not None:
             claims.append(f"{ours.__module__}:{ours.__qualname__}")
         if len(claims) > 1:
             raise ValueError(f"the {self.noun} name {name!r} is taken twice: {', '.join(claims)}")

@@ -75,6 +75,11 @@ class SVALSE(VALSE):
     (array([0.5 , 0.51, 0.51]), array([0, 0, 0]))
     """
 
+    mu: Float
+    kappa: Float
+    existence: Float
+    label: Int
+
     def __init__(
         self,
         measurement: ArraySnapshot,

@@ -158,8 +158,8 @@ SILENCE = Fit(
 
 
 def reported(manifold: Manifold, fit: Fit) -> Bool:
-    """Tell which components are active and belong to a real direction."""
-    doa = manifold.to_doa(fit.theta, slack=circular_std(fit.resultant))
+    """Tell which components are active and belong, within three std, to a real direction."""
+    doa = manifold.to_doa(fit.theta, slack=3 * circular_std(fit.resultant))
     return np.asarray(fit.active & ~np.isnan(doa))
 
 
@@ -167,9 +167,9 @@ def described(manifold: Manifold, fit: Fit, found: Bool, label: Int) -> Directio
     """Return the found components of a fit as directions."""
     theta, std = fit.theta[found], circular_std(fit.resultant[found])
     return DirectionEstimate(
-        doa=manifold.to_doa(theta, slack=std),
+        doa=manifold.to_doa(theta, slack=np.inf),
         std=manifold.doa_std(theta, std),
-        existence=1 / (1 + np.exp(-fit.evidence[found])),
+        existence=1 / (1 + np.exp(-np.maximum(fit.evidence[found], -700))),
         amplitude=manifold.to_amplitude(fit.amplitude[found], theta),
         label=label.astype(np.int64),
         converged=fit.converged,
@@ -186,4 +186,4 @@ def circular_std(resultant: ArrayLike) -> Float:
     >>> circular_std([1.0, 0.5]).round(4) + 0
     array([0.    , 1.1774])
     """
-    return np.sqrt(-2 * np.log(np.maximum(resultant, 1e-300)))
+    return np.asarray(np.sqrt(-2 * np.log(np.maximum(resultant, 1e-300))))

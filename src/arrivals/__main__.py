@@ -1,1 +1,75 @@
 """Run the command line: python -m arrivals."""
+
+import os
+import sys
+from collections.abc import Sequence
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit status.
+
+    Parameters
+    ----------
+    argv : sequence of str, optional
+        The arguments; those of the process if None.
+
+    Returns
+    -------
+    int
+        0; 2 for bad input, told in one line on standard error; 130 when interrupted. A reader
+        that closes our standard output ends the program quietly, with status 0.
+
+    Examples
+    --------
+    >>> main(["list"])  # doctest: +ELLIPSIS
+    trackers
+      cbf ...
+    0
+    """
+    try:
+        from arrivals.scenarios.cli import run
+
+        run(argv)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        _drop_output()
+    except KeyboardInterrupt:
+        _flush_output()
+        return 130
+    except (ValueError, TypeError, OSError) as error:
+        _flush_output()
+        print(f"arrivals: {message(error)}", file=sys.stderr)
+        return 2
+    return 0
+
+
+def message(error: Exception) -> str:
+    """Return what went wrong in one line.
+
+    Examples
+    --------
+    >>> message(FileNotFoundError(2, "No such file or directory", "a.wav"))
+    'a.wav: No such file or directory'
+    """
+    text = str(error)
+    if isinstance(error, OSError) and error.strerror:
+        text = f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+    return " ".join(text.split()) or type(error).__name__
+
+
+def _flush_output() -> None:
+    try:
+        sys.stdout.flush()
+    except OSError:
+        _drop_output()
+
+
+def _drop_output() -> None:
+    """Send what is still buffered nowhere, so that the interpreter's last flush is silent."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, sys.stdout.fileno())
+    os.close(nowhere)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

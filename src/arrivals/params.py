@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import inspect
 from collections.abc import Mapping
+from functools import partial
 from typing import Any, Self
 
 import numpy as np
@@ -68,7 +69,11 @@ class Configurable:
 
     @classmethod
     def _find_type(cls, name: str) -> Any:
-        module, _, qualname = name.partition(":")
+        module, colon, qualname = name.partition(":")
+        if not colon:  # a registered name
+            from arrivals.trackers.registry import find
+
+            return find(name)
         try:
             found: Any = importlib.import_module(module)
             for part in qualname.split("."):
@@ -93,7 +98,7 @@ class Configurable:
         """
         if not isinstance(config, Mapping) or "type" not in config:
             raise ValueError(f"a configuration is a dictionary with the key 'type'; got {config!r}")
-        kind = cls._find_type(config["type"])
+        kind = cls._find_type(str(config["type"]))
         if not (inspect.isclass(kind) and issubclass(kind, cls)):
             raise TypeError(f"{config['type']} is not a {cls.__name__}")
         params = {key: _built(value) for key, value in config.items() if key != "type"}
@@ -119,6 +124,10 @@ class Model(Configurable):
     def __sklearn_clone__(self) -> Self:
         return self
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # by the constructor, so that what it froze is frozen again
+        return partial(type(self), **self.get_params(deep=False)), ()
+
 
 def _plain(value: Any) -> Any:
     if isinstance(value, Configurable):
@@ -133,4 +142,6 @@ def _plain(value: Any) -> Any:
 def _built(value: Any) -> Any:
     if isinstance(value, Mapping) and "type" in value:
         return Configurable.from_dict(value)
+    if isinstance(value, list):
+        return [_built(item) for item in value]
     return value

@@ -1,0 +1,39 @@
+"""What trackers are tried on: simulated truth, recorded data, metrics and plots."""
+
+from arrivals.scenarios.base import Scenario, Trial, available, create, register
+from arrivals.scenarios.base import find_scenario as find
+from arrivals.scenarios.line_arrays import (
+    OnePairOff,
+    PairsInTurn,
+    RandomPairsOff,
+    SixSources,
+    SixStatic,
+    ThreeStatic,
+)
+from arrivals.scenarios.metrics import Gospa, gospa, mean_gospa, mean_rmse, ospa, rmse
+from arrivals.scenarios.readers import read
+from arrivals.scenarios.recordings import Recording, Snapshots
+
+__all__ = [
+    "Gospa",
+    "OnePairOff",
+    "PairsInTurn",
+    "RandomPairsOff",
+    "Recording",
+    "Scenario",
+    "SixSources",
+    "SixStatic",
+    "Snapshots",
+    "ThreeStatic",
+    "Trial",
+    "available",
+    "create",
+    "find",
+    "gospa",
+    "mean_gospa",
+    "mean_rmse",
+    "ospa",
+    "read",
+    "register",
+    "rmse",
+]
