@@ -1,0 +1,47 @@
+"""Memory of `run` over 100 000 steps of 15 sensors: the result, and little beside it."""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import time
+from collections.abc import Iterator
+
+import numpy as np
+
+from arrivals.measurement_models import ArraySnapshot, SensorArray
+from arrivals.trackers import create
+from arrivals.typing import Complex
+
+
+def snapshots(model: ArraySnapshot, n_steps: int) -> Iterator[Complex]:
+    """Give two sources, one step at a time, so that the input takes no memory."""
+    rng = np.random.default_rng(0)
+    for _ in range(n_steps):
+        yield model.simulate([0.3, -0.5], rng.standard_normal(2), rng)
+
+
+def main() -> None:
+    """Print the peak of the process before and after."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--steps", type=int, default=100_000)
+    parser.add_argument("--trackers", nargs="+", default=["cbf", "svalse"])
+    options = parser.parse_args()
+    model = ArraySnapshot(SensorArray.ula(15, spacing=0.5), wavelength=1.0, noise=0.01)
+    for name in options.trackers:
+        create(name, measurement=model).run(snapshots(model, 2))
+        before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+        started = time.process_time()
+        run = create(name, measurement=model).run(snapshots(model, options.steps))
+        cpu = time.process_time() - started
+        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+        arrays = [*run.fields.values(), run.x, run.n_found, run.time]
+        result = sum(array.nbytes for array in arrays) / 2**20
+        print(
+            f"{name}: {len(run)} steps, {cpu:.0f} s CPU, result {result:.0f} MB, "
+            f"process {before:.0f} MB before, peak {peak:.0f} MB"
+        )
+
+
+if __name__ == "__main__":
+    main()
