@@ -2,7 +2,9 @@
 
 from arrivals.motion_models.base import MotionModel
 from arrivals.motion_models.bernoulli_von_mises import BernoulliVonMises
+from arrivals.motion_models.delay import DelayDrift, DelayWalk
 from arrivals.motion_models.linear import ConstantVelocity, LinearMotion, RandomWalk
+from arrivals.motion_models.stacked import Stacked
 from arrivals.motion_models.turn import CoordinatedTurn
 from arrivals.motion_models.von_mises import (
     VonMisesWalk,
@@ -22,9 +24,12 @@ __all__ = [
     "BernoulliVonMises",
     "ConstantVelocity",
     "CoordinatedTurn",
+    "DelayDrift",
+    "DelayWalk",
     "LinearMotion",
     "MotionModel",
     "RandomWalk",
+    "Stacked",
     "VonMisesWalk",
     "bessel_ratio",
     "bessel_ratios",

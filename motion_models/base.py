@@ -25,6 +25,11 @@ class MotionModel(Model, ABC):
     def dim_x(self) -> int:
         """Number of entries of one state."""
 
+    @property
+    def angles(self) -> tuple[int, ...]:
+        """Entries of a state that are angles in rad; trackers take differences on the circle."""
+        return ()
+
     @abstractmethod
     def f(self, x: ArrayLike, dt: float = 1.0) -> Float:
         """Return the states after `dt`, without noise: (..., dim_x) -> (..., dim_x)."""

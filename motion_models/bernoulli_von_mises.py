@@ -63,6 +63,11 @@ class BernoulliVonMises(MotionModel):
         """One angle."""
         return 1
 
+    @property
+    def angles(self) -> tuple[int, ...]:
+        """Its only entry."""
+        return (0,)
+
     def f(self, x: ArrayLike, dt: float = 1.0) -> Float:
         """Return the angles wrapped: without noise they stay where they are."""
         return self.walk.f(x, dt)

@@ -2,11 +2,12 @@
 
 from abc import abstractmethod
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.checks import count, not_negative, real, shaped, state
+from arrivals.checks import constant, count, covariance, not_negative, shaped, state
 from arrivals.motion_models.base import MotionModel
 from arrivals.typing import Float
 
@@ -120,12 +121,11 @@ class ConstantVelocity(_Linear):
 
     def F(self, x: ArrayLike | None = None, dt: float = 1.0) -> Float:
         """Return the transition matrix: each position gains its velocity times `dt`."""
-        return _on_diagonal([[1.0, dt], [0.0, 1.0]], self.n_dims)
+        return _drift(self.n_dims, dt).copy()
 
     def Q(self, dt: float = 1.0) -> Float:
         """Return the covariance that white acceleration leaves behind after `dt`."""
-        dt = not_negative("dt", dt)
-        return self.q * _on_diagonal([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]], self.n_dims)
+        return self.q * _unit_noise(self.n_dims, dt)
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -166,17 +166,12 @@ class LinearMotion(_Linear):
     def __init__(
         self, transition: ArrayLike, noise: ArrayLike, control: ArrayLike | None = None
     ) -> None:
-        transition = _constant("transition", transition)
+        transition = constant("transition", transition)
         n = len(transition)
         shaped("transition", transition, n, n)
-        noise = _constant("noise", shaped("noise", noise, n, n))
-        size = np.abs(noise).max()
-        if np.abs(noise - noise.T).max() > 1e-9 * size:
-            raise ValueError(f"noise must be symmetric; got {noise.tolist()}")
-        if np.linalg.eigvalsh(noise).min() < -1e-9 * size:
-            raise ValueError(f"noise must have no negative eigenvalue; got {noise.tolist()}")
+        noise = constant("noise", covariance("noise", noise, n))
         if control is not None:
-            control = _constant("control", control)
+            control = constant("control", control)
             shaped("control", control, n, control.shape[1])
         for name, value in (("transition", transition), ("noise", noise), ("control", control)):
             object.__setattr__(self, name, value)
@@ -213,6 +208,17 @@ class LinearMotion(_Linear):
         return type(self), (self.transition, self.noise, self.control)
 
 
+@lru_cache(maxsize=64)  # read at every step of a filter, for the same dt
+def _drift(n: int, dt: float) -> Float:
+    return _on_diagonal([[1.0, dt], [0.0, 1.0]], n)
+
+
+@lru_cache(maxsize=64)
+def _unit_noise(n: int, dt: float) -> Float:
+    dt = not_negative("dt", dt)
+    return _on_diagonal([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]], n)
+
+
 def _on_diagonal(block: ArrayLike, n: int) -> Float:
     """Return a matrix with `block` n times on its diagonal; np.kron is several times slower."""
     block = np.asarray(block, dtype=np.float64)
@@ -220,16 +226,6 @@ def _on_diagonal(block: ArrayLike, n: int) -> Float:
     each = np.arange(n)
     blocks[each, :, each, :] = block
     return blocks.reshape(n * len(block), n * len(block))
-
-
-def _constant(name: str, value: ArrayLike) -> Float:
-    matrix = np.array(real(name, value))
-    if matrix.ndim != 2 or matrix.size == 0:
-        raise ValueError(f"{name} must be a matrix; got shape {matrix.shape}")
-    if not np.isfinite(matrix).all():
-        raise ValueError(f"{name} must be finite; got {matrix.tolist()}")
-    matrix.setflags(write=False)
-    return matrix
 
 
 def _one_step(dt: float) -> None:

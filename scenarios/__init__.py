@@ -2,6 +2,11 @@
 
 from arrivals.scenarios.base import Scenario, Trial, available, create, register
 from arrivals.scenarios.base import find_scenario as find
+from arrivals.scenarios.interpolation import (
+    InterpolationBand,
+    InterpolationCoupled,
+    InterpolationTone,
+)
 from arrivals.scenarios.line_arrays import (
     OnePairOff,
     PairsInTurn,
@@ -16,6 +21,9 @@ from arrivals.scenarios.recordings import Recording, Snapshots
 
 __all__ = [
     "Gospa",
+    "InterpolationBand",
+    "InterpolationCoupled",
+    "InterpolationTone",
     "OnePairOff",
     "PairsInTurn",
     "RandomPairsOff",

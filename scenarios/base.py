@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from arrivals.measurement_models import ArraySnapshot
+from arrivals.measurement_models import ArraySamples, ArraySnapshot
 from arrivals.motion_models import MotionModel
 from arrivals.params import Model
 from arrivals.trackers import Tracker, find
@@ -24,15 +24,16 @@ class Trial:
     Parameters
     ----------
     measurements : ndarray, shape (n_steps, n_sensors)
+        Complex for an `ArraySnapshot`, real for `ArraySamples`.
     truth : ndarray, shape (n_steps, n_sources)
         Directions, rad; NaN while a source is off.
-    measurement : ArraySnapshot
+    measurement : ArraySnapshot or ArraySamples
     motion : MotionModel
     """
 
-    measurements: Complex
+    measurements: Complex | Float
     truth: Float
-    measurement: ArraySnapshot
+    measurement: ArraySnapshot | ArraySamples
     motion: MotionModel
 
     def tracker(self, name: str, **params: Any) -> Tracker:

@@ -72,6 +72,30 @@ def peaks(power: Float, *, circular: bool) -> Int:
     return found[np.argsort(-power[found], kind="stable")]
 
 
+def refined(doa_grid: Float, power: Float, top: Int) -> Float:
+    """Return the vertices of the parabolas through peaks and neighbours, in dB.
+
+    Parameters
+    ----------
+    doa_grid, power : ndarray, shape (n_directions,)
+        Look directions, equally far apart, rad, and the spectrum.
+    top : ndarray of int, shape (n_peaks,)
+        Indices of the peaks.
+
+    Examples
+    --------
+    >>> level = np.array([3.0, 4.0, 4.0, 3.0])
+    >>> refined(np.arange(4.0), np.exp(level), np.array([1]))
+    array([1.5])
+    """
+    level = np.log(np.maximum(power, np.finfo(float).tiny))
+    left, middle, right = level[top - 1], level[top], level[(top + 1) % len(power)]
+    bend = 2 * middle - left - right
+    shift = (right - left) / (2 * np.where(bend > 0, bend, np.inf))
+    step = doa_grid[1] - doa_grid[0]
+    return np.asarray(doa_grid[top] + step * np.clip(shift, -0.5, 0.5))
+
+
 @register("cbf")
 class CBF(Tracker):
     """Peaks of the conventional beamformer, within some dB of the highest.
@@ -144,31 +168,28 @@ class CBF(Tracker):
         z = self.measurement.snapshot(np.asarray(z))
         array, wavelength = self.measurement.array, self.measurement.wavelength
         self.doa_grid = look_directions(array, self.n_directions)
-        self.power = beam_power(array.steering_vector(self.doa_grid, wavelength), z)
+        self.power = self.spectrum(array.steering_vector(self.doa_grid, wavelength), z)
         top = peaks(self.power, circular=array.dim > 1)
         high = self.power[top] > self.power.max() * 10 ** (-self.threshold_db / 10)
-        doa = self._refined(top[high][: self.n_slots])
-        heard = ~np.isnan(z)
-        a = array.steering_vector(doa, wavelength)[:, heard]
+        doa = refined(self.doa_grid, self.power, top[high][: self.n_slots])
         self._show(
             DirectionEstimate(
                 doa=doa,
                 std=np.full(len(doa), np.nan),
                 existence=np.full(len(doa), np.nan),
-                amplitude=a.conj() @ z[heard] / heard.sum(),
+                amplitude=self.beam(array.steering_vector(doa, wavelength), z),
                 label=np.full(len(doa), -1),
             )
         )
 
-    def _refined(self, top: Int) -> Float:
-        """Return the vertices of the parabolas through peaks and neighbours, in dB."""
-        n = self.n_directions
-        level = np.log(np.maximum(self.power, np.finfo(float).tiny))
-        left, middle, right = level[top - 1], level[top], level[(top + 1) % n]
-        bend = 2 * middle - left - right
-        shift = (right - left) / (2 * np.where(bend > 0, bend, np.inf))
-        step = self.doa_grid[1] - self.doa_grid[0]
-        return np.asarray(self.doa_grid[top] + step * np.clip(shift, -0.5, 0.5))
+    def spectrum(self, A: Complex, z: Complex) -> Float:
+        """Return the power of one snapshot from directions with steering vectors A."""
+        return beam_power(A, z)
+
+    def beam(self, A: Complex, z: Complex) -> Complex:
+        """Return the amplitudes of plane waves with steering vectors A, each as if alone."""
+        heard = ~np.isnan(z)
+        return np.asarray(A[:, heard].conj() @ z[heard] / heard.sum())
 
     def _show(self, estimate: DirectionEstimate) -> None:
         self._estimate = estimate

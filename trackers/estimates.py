@@ -145,3 +145,30 @@ class PositionEstimate(Estimate):
         return list(
             zip(self.label, x, y, std_x, std_y, corr, self.existence, level_db, strict=True)
         )
+
+
+@dataclass(frozen=True, eq=False)
+class StateEstimate(Estimate):
+    """Mean and covariance of a state; "what was found" are its entries.
+
+    Parameters
+    ----------
+    x : ndarray, shape (n,)
+    P : ndarray, shape (n, n)
+
+    Examples
+    --------
+    >>> StateEstimate(np.array([3.0]), np.array([[4.0]])).rows()
+    [(0, 3.0, 2.0)]
+    """
+
+    x: Float
+    P: Float
+
+    per_source: ClassVar[dict[str, Any]] = {"x": np.nan, "P": np.nan}
+    columns: ClassVar[tuple[str, ...]] = ("entry", "x", "std")
+
+    def rows(self) -> list[tuple[Any, ...]]:
+        """Return number, mean and standard deviation of each entry of the state."""
+        std = np.sqrt(np.maximum(self.P.diagonal(), 0))
+        return list(zip(range(len(self.x)), self.x.tolist(), std.tolist(), strict=True))

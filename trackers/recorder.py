@@ -191,7 +191,8 @@ class Recorder:
             if field.name not in self._kind.per_source
         }
         columns |= {name: column[: self._n].copy() for name, column in self._columns.items()}
-        x = columns.pop("x", np.zeros((0, 0)))
+        keep_x = "x" in self._kind.per_source
+        x = columns["x"] if keep_x else columns.pop("x", np.zeros((0, 0)))
         n_found = columns.pop("n_found", np.zeros(0, dtype=np.int64))
         time: Float = dt * np.arange(self._n, dtype=np.float64)
         return Run(self._kind, columns, x, n_found, time, elapsed)

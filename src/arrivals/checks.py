@@ -166,3 +166,50 @@ def state(x: ArrayLike, dim_x: int) -> Float:
         got = f"the column {array.shape}: pass x.ravel()" if column else f"{array.shape}"
         raise ValueError(f"states must have shape (..., {dim_x}); got {got}")
     return array
+
+
+def constant(name: str, value: ArrayLike) -> Float:
+    """Return a finite matrix as a copy that cannot be written to.
+
+    Examples
+    --------
+    >>> constant("matrix", [1.0, 2.0])
+    Traceback (most recent call last):
+    ValueError: matrix must be a matrix; got shape (2,)
+    """
+    matrix = np.array(real(name, value))
+    if matrix.ndim != 2 or matrix.size == 0:
+        raise ValueError(f"{name} must be a matrix; got shape {matrix.shape}")
+    if not np.isfinite(matrix).all():
+        raise ValueError(f"{name} must be finite; got {matrix.tolist()}")
+    matrix.setflags(write=False)
+    return matrix
+
+
+def covariance(name: str, value: ArrayLike, n: int) -> Float:
+    """Return a finite symmetric (n, n) matrix without negative eigenvalues, up to rounding.
+
+    Examples
+    --------
+    >>> covariance("P", [[1.0, 2.0], [2.0, 1.0]], 2)
+    Traceback (most recent call last):
+    ValueError: P must have no negative eigenvalue; got [[1.0, 2.0], [2.0, 1.0]]
+    """
+    matrix = shaped(name, value, n, n)
+    if (matrix == matrix.T).all() and _has_factor(matrix):
+        return matrix  # the usual case, in a third of the time of what follows
+    size = np.abs(matrix).max()
+    if not size < np.inf:
+        raise ValueError(f"{name} must be finite; got {matrix.tolist()}")
+    if np.abs(matrix - matrix.T).max() > 1e-9 * size:
+        raise ValueError(f"{name} must be symmetric; got {matrix.tolist()}")
+    if np.linalg.eigvalsh(matrix)[0] < -1e-9 * size:
+        raise ValueError(f"{name} must have no negative eigenvalue; got {matrix.tolist()}")
+    return matrix
+
+
+def _has_factor(matrix: Float) -> bool:
+    try:
+        return bool(np.isfinite(np.linalg.cholesky(matrix)).all())
+    except np.linalg.LinAlgError:
+        return False

@@ -1,0 +1,87 @@
+"""The Kalman-type trackers, the particle filter and the IMM through the list for all trackers."""
+
+import numpy as np
+import pytest
+
+from arrivals.measurement_models import ArraySnapshot, Bearing, LinearMeasurement, SensorArray
+from arrivals.motion_models import (
+    ConstantVelocity,
+    CoordinatedTurn,
+    LinearMotion,
+    RandomWalk,
+    VonMisesWalk,
+)
+from arrivals.trackers import EKF, IMM, UKF, Kalman, Particle, find
+from arrivals.trackers.conformance import CHECKS, Check, MakeTracker, Measurements
+
+X, P = np.array([5.0, 0.1, 4.0, -0.1]), np.diag([1.0, 0.1, 1.0, 0.1])
+MOVES = ConstantVelocity(q=0.01)
+SEEN = LinearMeasurement(np.eye(4)[::2], [[0.2, 0.05], [0.05, 0.1]])
+FADES = LinearMotion([[0.9]], [[0.19]], control=[[1.0]])
+BEARING = Bearing([[0.0, 0.0], [10.0, 0.0], [3.0, 9.0]], noise=1e-3)
+NEAR = Bearing([[0.0, 0.0], [10.0, 0.0]], noise=1e-3, position=(0, 1))
+ANGLE = LinearMeasurement([[1.0]], [[0.01]])
+LINE = ArraySnapshot(SensorArray.ula(6, spacing=0.5), wavelength=1.0, noise=0.05)
+
+
+def positions() -> Measurements:
+    z = np.random.default_rng(3).normal([5.0, 4.0], 0.4, (5, 2))
+    z[2, 1] = np.nan
+    return z
+
+
+def bearings(model: Bearing, position: tuple[float, float] = (5.0, 4.0)) -> Measurements:
+    x = np.zeros(5)
+    x[list(model.position)] = position
+    return np.array([model.sample(x, np.random.default_rng(seed)) for seed in range(5)])
+
+
+def snapshots() -> Measurements:
+    doa = np.linspace(0.2, 0.4, 5)[:, None]
+    return LINE.simulate(doa, [1.0], np.random.default_rng(4))
+
+
+def imm() -> IMM:
+    turning = EKF(RandomWalk(0.1), NEAR, X[::2], np.eye(2))
+    return IMM([Kalman(RandomWalk(0.01), POINT, X[::2], np.eye(2)), turning], [0.6, 0.4], MARKOV)
+
+
+POINT = LinearMeasurement(np.eye(2), 1e-2 * np.eye(2))
+MARKOV = np.array([[0.9, 0.1], [0.2, 0.8]])
+
+TRACKERS: list[tuple[str, MakeTracker, Measurements]] = [
+    ("kalman", lambda: Kalman(MOVES, SEEN, X, P), positions()),
+    ("kalman", lambda: Kalman(FADES, ANGLE, [1.0], [[1.0]]), np.array([[0.5], [0.4], [0.6]])),
+    ("ekf", lambda: EKF(MOVES, BEARING, X, P), bearings(BEARING)),
+    (
+        "ekf",
+        lambda: EKF(CoordinatedTurn(0.01, 0.01), BEARING, [*X, 0.1], np.eye(5)),
+        bearings(BEARING),
+    ),
+    ("ekf", lambda: EKF(VonMisesWalk(50.0), ANGLE, [3.1], [[0.1]]), np.array([[3.1], [-3.1]])),
+    ("ukf", lambda: UKF(RandomWalk(0.01), NEAR, X[::2], np.eye(2)), bearings(NEAR)),
+    ("ukf", lambda: UKF(VonMisesWalk(50.0), ANGLE, [3.1], [[0.1]]), np.array([[3.1], [-3.1]])),
+    (
+        "particle",
+        lambda: Particle(RandomWalk(0.1), NEAR, X[::2], np.eye(2), n_particles=200, rng=1),
+        bearings(NEAR),
+    ),
+    (
+        "particle",
+        lambda: Particle(VonMisesWalk(50.0), LINE, [0.2], [[0.1]], n_particles=100, rng=2),
+        snapshots(),
+    ),
+    ("imm", imm, positions()),
+]
+IDS = [f"{name}-{n}" for n, (name, _, _) in enumerate(TRACKERS)]
+
+
+@pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
+@pytest.mark.parametrize(("name", "make", "measurements"), TRACKERS, ids=IDS)
+def test_conforms(name: str, make: MakeTracker, measurements: Measurements, check: Check) -> None:
+    check(make, measurements)
+
+
+@pytest.mark.parametrize(("name", "make", "measurements"), TRACKERS, ids=IDS)
+def test_is_registered(name: str, make: MakeTracker, measurements: Measurements) -> None:
+    assert type(make()) is find(name)
