@@ -53,8 +53,8 @@ def unfold(moments: Complex, harmonics: Int) -> Complex:
     >>> unfold(np.array([1, 0.5j]), np.array([-1, 0, 1]))
     array([0.-0.5j, 1.+0.j , 0.+0.5j])
     """
-    either = moments[np.abs(harmonics)]
-    return np.asarray(np.where(harmonics < 0, either.conj(), either))
+    two_sided = np.concatenate([moments, moments[:0:-1].conj()])  # negative k from the end
+    return np.asarray(two_sided[harmonics])
 
 
 def quadrature(c: Complex) -> tuple[Complex, complex]:

@@ -23,9 +23,12 @@ class Configurable:
     @classmethod
     def _param_names(cls) -> list[str]:
         parameters = list(inspect.signature(cls).parameters.values())
-        open_ended = [p.name for p in parameters if p.kind in (p.VAR_POSITIONAL, p.VAR_KEYWORD)]
-        if open_ended:
-            raise TypeError(f"{cls.__name__} must name its parameters; it takes *{open_ended[0]}")
+        for p in parameters:
+            if p.kind in (p.VAR_POSITIONAL, p.VAR_KEYWORD):
+                stars = "*" if p.kind is p.VAR_POSITIONAL else "**"
+                raise TypeError(
+                    f"{cls.__name__} must name its parameters; it takes {stars}{p.name}"
+                )
         return [p.name for p in parameters]
 
     def get_params(self, deep: bool = True) -> dict[str, Any]:
