@@ -109,15 +109,15 @@ def _in_windows(c: Complex) -> Complex:
     return np.asarray(np.einsum("wp,wpi->i", weight / weight.sum(), d))
 
 
-def _modes(c: Complex) -> tuple[Float, Float, Float]:
-    """Places, heights and curvatures of the local maxima, by a grid and four Newton steps."""
+def _modes(c: Complex, within: float = NATS) -> tuple[Float, Float, Float]:
+    """Places, heights and curvatures of the maxima near the top, by a grid and Newton's method."""
     i = np.arange(len(c))
     n_points = 1 << int(np.ceil(np.log2(8 * len(c))))
     log_q = np.fft.irfft(c, n_points, norm="forward") / 2
     left, right = np.roll(log_q, 1), np.roll(log_q, -1)
     # a peak between grid points may stand above both by an eighth of their neighbours' drop
     headroom = np.maximum(2 * log_q - left - right, 0)
-    top = (log_q >= left) & (log_q > right) & (log_q + headroom >= log_q.max() - NATS)
+    top = (log_q >= left) & (log_q > right) & (log_q + headroom >= log_q.max() - within)
     step = 2 * np.pi / n_points
     theta = np.asarray(np.flatnonzero(top) * step, dtype=np.float64)
     start = theta
@@ -144,7 +144,7 @@ def top_mode(c: Complex) -> tuple[Complex, complex]:
     """
     if not c[1:].any():
         return np.eye(1, len(c), dtype=np.complex128)[0], 0j
-    modes, heights, curvatures = _modes(c)
+    modes, heights, curvatures = _modes(c, within=0.0)
     best = np.argmax(heights)
     moments = _von_mises(float(modes[best]), float(curvatures[best]), len(c))
     return moments, moments[1]
