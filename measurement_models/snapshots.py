@@ -13,6 +13,8 @@ from arrivals.measurement_models.base import MeasurementModel
 from arrivals.measurement_models.manifolds import GridLine, Manifold, Reference
 from arrivals.typing import Complex, Float
 
+LARGEST, SMALLEST = 1e140, 1e-140
+
 
 def composite(z: ArrayLike) -> Float:
     """Return complex vectors (..., n) as real ones (..., 2n): [Re; Im].
@@ -70,6 +72,8 @@ class ArraySnapshot(MeasurementModel):
     def snapshot(self, z: ArrayLike) -> Complex:
         """Return a snapshot as complex numbers, (n_sensors,), NaN where a sensor gave none.
 
+        Numbers whose squares would overflow count as infinite, those that would vanish as zero.
+
         Raises
         ------
         ValueError
@@ -84,7 +88,9 @@ class ArraySnapshot(MeasurementModel):
                 f"got {array.shape}"
             )
         array = array.astype(np.complex128)
-        array[~np.isfinite(array)] = complex(np.nan, np.nan)
+        size = np.abs(array)
+        array[~(size < LARGEST)] = complex(np.nan, np.nan)
+        array[size < SMALLEST] = 0
         if np.isnan(array).all():
             raise ValueError("no sensor of the snapshot gave a finite number")
         return array

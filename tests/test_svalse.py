@@ -99,6 +99,18 @@ def test_amplitudes_rebuild_the_snapshot(reference: Reference) -> None:
     np.testing.assert_allclose(found.amplitude @ a, y, atol=1e-3)
 
 
+@pytest.mark.parametrize("scale", [1e-200, 1e-130, 1e130, 1e200])
+def test_numbers_near_the_ends_of_the_scale_do_no_harm(scale: float) -> None:
+    z = tone([0.3], noise=1e-3)[0]
+    for tracker in (SVALSE(LINE), VALSE(LINE)):
+        if scale > 1e140:
+            with pytest.raises(ValueError, match="no sensor of the snapshot gave a finite number"):
+                tracker.update(z * scale)
+        else:
+            tracker.update(z * scale)
+            assert tracker.estimate.n_found == (1 if scale > 1e-140 else 0)
+
+
 # -- what is found ----------------------------------------------------------------------------
 
 

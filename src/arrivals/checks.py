@@ -20,7 +20,7 @@ def number(name: str, value: Any) -> float:
     Traceback (most recent call last):
     TypeError: kappa must be a number; got 'many'
     """
-    if isinstance(value, bool) or not np.isscalar(value) or not np.isrealobj(value):
+    if isinstance(value, bool | str | bytes) or not np.isscalar(value) or not np.isrealobj(value):
         raise TypeError(f"{name} must be a number; got {value!r}")
     try:
         return float(value)  # type: ignore[arg-type]  # anything scalar that float() understands
