@@ -116,8 +116,8 @@ def test_missing_sensors_are_left_out_and_the_others_stay() -> None:
 
 
 NONSENSE: list[tuple[Any, type[Exception], str]] = [
-    (lambda: SensorArray(np.array([0.0, 1.0, 0.0])), ValueError, "sensors 0 and 2 share"),
-    (lambda: SensorArray(np.array([[0.0, 1.0], [0.0, 1.0]])), ValueError, "sensors 0 and 1 share"),
+    (lambda: SensorArray(np.array([0.0, 1.0, 0.0])), ValueError, "numbers 1 and 3 of 3"),
+    (lambda: SensorArray(np.array([[0.0, 1.0], [0.0, 1.0]])), ValueError, "numbers 1 and 2 of"),
     (lambda: SensorArray(np.array([0.0, np.nan])), ValueError, "finite; sensor 1 is at"),
     (lambda: SensorArray(np.zeros((2, 4))), ValueError, r"dim 1, 2 or 3; got \(2, 4\)"),
     (lambda: SensorArray(np.zeros((0, 2))), ValueError, r"got \(0, 2\)"),
@@ -371,7 +371,10 @@ BAD = [
     ('kind = "ula"\nn_sensors = 2.5\nspacing = 1', "n_sensors must be a whole number; got 2.5"),
     ('kind = "ula"\nn_sensors = 3\nspacing = "wide"', "spacing must be a number; got 'wide'"),
     ('kind = "symmetric"\ndistances = "far"', "distances must hold real numbers"),
-    ('kind = "positions"\npositions = [[0, 1], [0, 1]]', "sensors 0 and 1 share the position"),
+    (
+        'kind = "positions"\npositions = [[0, 1], [0, 1]]',
+        r"share the position \(0, 1\) m: numbers 1 and 2 of 2",
+    ),
     ('kind = "positions"\npositions = [[0, 1], [0]]', "positions must be numbers, or lists of the"),
     ('kind = "positions"\npositions = ["a"]', "positions must be numbers, or lists of the same"),
     ('kind = "positions"\npositions = [0, inf]', "positions must be finite; sensor 1"),
@@ -436,7 +439,7 @@ def test_positions_from_a_table(
         (b"x,y\n", "holds no positions"),
         (b"0,1\n2\n", r"row 2 must hold 2 numbers; got \['2'\]"),
         (b"0,1\n2,b\n", "row 2 must hold 2 numbers"),
-        (b"0,1\n0,1\n", "sensors 0 and 1 share"),
+        (b"0,1\n0,1\n", "numbers 1 and 2 of"),
         (b"0,1\n0,nan\n", "must be finite"),
         (b"1,2,3,4\n", "dim 1, 2 or 3"),
     ],
