@@ -13,13 +13,13 @@ from functools import lru_cache
 
 import numpy as np
 
-from arrivals.motion_models.von_mises import (
+from arrivals.motion_models.bessel import (
     bessel_ratio,
     bessel_ratios,
     inverse_bessel_ratio,
     log_i0,
-    mfold_concentration,
 )
+from arrivals.motion_models.von_mises import mfold_concentration
 from arrivals.typing import Complex, Float, Int
 
 AnglePosterior = Callable[[Complex], tuple[Complex, complex]]

@@ -9,7 +9,7 @@ from arrivals.checks import instance, not_negative, positive
 from arrivals.measurement_models.manifolds import Reference
 from arrivals.measurement_models.snapshots import ArraySnapshot
 from arrivals.motion_models.bernoulli_von_mises import BernoulliVonMises
-from arrivals.motion_models.von_mises import bessel_ratio, inverse_bessel_ratio
+from arrivals.motion_models.bessel import bessel_ratio, inverse_bessel_ratio
 from arrivals.trackers.base import missed
 from arrivals.trackers.coordinate_ascent import CoordinateAscent, PosteriorName
 from arrivals.trackers.estimates import DirectionEstimate
