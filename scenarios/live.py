@@ -114,7 +114,8 @@ def _snapshot(
 ) -> Complex:
     """Return the snapshot of one window of raw samples."""
     if samples.dtype.kind == "c":
-        z = samples[0].astype(np.complex128)
+        with np.errstate(invalid="ignore"):  # signalling NaN, in bytes that are no floats
+            z = samples[0].astype(np.complex128)
         return np.where(np.isfinite(z), z, complex(np.nan, np.nan))
     if samples.dtype.kind == "i":
         samples = samples * 2.0 ** (1 - 8 * samples.itemsize)

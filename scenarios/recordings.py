@@ -105,7 +105,8 @@ def narrowband(
     n_block = max(1, BLOCK // (max(window, hop) * max(1, samples.shape[1])))
     for i in range(0, n_steps, n_block):
         n = min(n_block, n_steps - i)
-        block = samples[i * hop : (i + n - 1) * hop + window].astype(np.float64)
+        with np.errstate(invalid="ignore"):  # signalling NaN, in bytes that are no floats
+            block = samples[i * hop : (i + n - 1) * hop + window].astype(np.float64)
         block[np.isinf(block)] = np.nan
         y[i : i + n] = stft.stft(block, 0, n, k_offset=stft.m_num_mid, axis=0)[0].T
     return np.asarray(y * (2 / taper.sum() * np.exp(-2j * np.pi * (cycles % 1)))[:, None])

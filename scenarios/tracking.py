@@ -77,6 +77,9 @@ def _tracker(name: str, measurement: ArraySnapshot, settings: dict[str, Any]) ->
     if "measurement" not in known:
         raise ValueError(f"the tracker {name!r} takes no measurement: it cannot track an array's "
                          "snapshots")  # fmt: skip
+    for setting in settings:
+        if setting.partition("__")[0] == "measurement":
+            raise ValueError(f"--set {setting}: the measurement comes from --array and --frequency")
     plain = {key: value for key, value in settings.items() if key in known}
     tracker = kind(**{"measurement": measurement} | plain)
     return kind(**tracker.set_params(**settings).get_params(deep=False))
@@ -86,6 +89,10 @@ def _check_outputs(arguments: argparse.Namespace) -> None:
     """Refuse, before the work begins, what could not be written at its end."""
     from arrivals.scenarios.plots import picture_format
 
+    files = [name for name in (arguments.array, arguments.file, arguments.out, arguments.plot)
+             if name and name != "-"]  # fmt: skip
+    if len({Path(name).resolve() for name in files}) < len(files):
+        raise ValueError("FILE, --array, --out and --plot must be different files")
     for name in filter(None, (arguments.out, arguments.plot)):
         folder = Path(name).parent
         if not folder.is_dir():

@@ -484,3 +484,16 @@ def test_an_interrupt_is_status_130_and_leaves_no_file(
     assert main(track(scene, "--out", "tracks.csv")) == 130
     assert capsys.readouterr() == ("", "")
     assert os.listdir(here) == []
+
+
+def test_an_output_never_takes_the_place_of_an_input(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    np.save("in.npy", np.ones((4, 4), complex))
+    Path("a.toml").write_text('kind = "ula"\nn_sensors = 4\nspacing = 0.5\nspeed = 100.0\n')
+    job = ["track", "in.npy", "--array", "a.toml", "--frequency", "50"]
+    for more in (["--out", "in.npy"], ["--out", "a.toml"], ["--out", "x.png", "--plot", "x.png"]):
+        assert main([*job, *more]) == 2
+        assert "must be different files" in capsys.readouterr().err
+    assert main([*job, "--set", "measurement__wavelength=9"]) == 2
+    assert "comes from --array and --frequency" in capsys.readouterr().err

@@ -597,3 +597,24 @@ def test_nothing_but_nan_is_missed(z: ArrayLike | None) -> None:
 @pytest.mark.parametrize("z", [0.0, [np.nan, 1.0], np.inf, [], "nan", [True], 3, 1j])
 def test_anything_else_is_not(z: ArrayLike) -> None:
     assert not missed(z)
+
+
+def test_whole_numbers_set_as_parameters_can_be_cloned() -> None:
+    from sklearn.base import clone
+
+    model = ArraySnapshot(SensorArray.ula(5, 0.5), 1.0)
+    for name, params in (("svalse", {"snr_db": 10, "merge": 0}), ("cbf", {"threshold_db": 6})):
+        tracker = create(name, measurement=model).set_params(**params)
+        assert clone(tracker).get_params() == tracker.get_params()
+        assert isinstance(getattr(tracker, next(iter(params))), float)
+
+
+def test_a_tracker_that_cannot_be_imported_says_so(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    point = EntryPoint("broken", "no_such_package_here:Thing", "arrivals.trackers")
+    monkeypatch.setattr("arrivals.trackers.registry.entry_points", lambda group: [point])
+    with pytest.raises(ValueError, match="tracker 'broken', no_such_package_here:Thing, cannot"):
+        find("broken")
+    with pytest.raises(TypeError, match="named by a string; got 3"):
+        find(3)  # type: ignore[arg-type]

@@ -144,8 +144,8 @@ def test_snapshot_keeps_its_argument_and_masks_what_is_no_number() -> None:
         (np.ones(4), ValueError, r"shape \(5,\), one number a sensor; got \(4,\)"),
         (np.ones((5, 1)), ValueError, r"got \(5, 1\)"),
         (1.0, ValueError, r"got \(\)"),
-        (["a"] * 5, TypeError, "must hold complex numbers; got <U1"),
-        ([None] * 5, TypeError, "must hold complex numbers; got object"),
+        (["a"] * 5, TypeError, "must hold complex numbers, NaN for a missing one; got <U1"),
+        ([None] * 5, TypeError, "NaN for a missing one; got object"),
         (np.full(5, np.inf), ValueError, "no sensor of the snapshot gave a finite number"),
     ],
 )

@@ -24,7 +24,7 @@ from arrivals.typing import Complex, Float, Int
 
 AnglePosterior = Callable[[Complex], tuple[Complex, complex]]
 LARGEST_GRID = 2048  # beyond it, windows about the modes are cheaper
-FINEST_GRID = 1 << 16  # points where windows do not serve
+FINEST_GRID = 1 << 18  # points at most where windows do not serve
 NATS = 30.0  # what lies further below the top than this does not count
 
 
@@ -68,10 +68,7 @@ def quadrature(c: Complex) -> tuple[Complex, complex]:
     """
     sharpness = float(np.abs(c) @ _squares(len(c)))
     n_points = 2 * math.pi * 1.2 * math.sqrt(1 + sharpness)
-    if n_points <= LARGEST_GRID:
-        moments = _on_grid(c, 1 << max(8, int(n_points).bit_length()))
-    else:
-        moments = _in_windows(c)
+    moments = _on_grid(c, n_points) if n_points <= LARGEST_GRID else _in_windows(c)
     return moments, moments[1]
 
 
@@ -80,8 +77,9 @@ def _squares(n: int) -> Float:
     return np.arange(n, dtype=np.float64) ** 2
 
 
-def _on_grid(c: Complex, n_points: int) -> Complex:
+def _on_grid(c: Complex, n_points: float) -> Complex:
     """Moments by the trapezoidal rule: an inverse real FFT, an exponential, a real FFT."""
+    n_points = 1 << max(8, int(max(n_points, 2 * len(c))).bit_length())
     log_q = np.fft.irfft(c, n_points, norm="forward")  # twice, but for the constant
     log_q -= log_q.max()
     log_q *= 0.5
@@ -104,7 +102,7 @@ def _in_windows(c: Complex) -> Complex:
     gaps = np.diff(centres, append=centres[0] + 2 * np.pi)
     overlap = len(centres) > 1 and (gaps < 8.1 * (std + np.roll(std, -1))).any()
     if overlap or log_q[:, [0, -1]].max() > -22:
-        return _on_grid(c, FINEST_GRID)
+        return _on_grid(c, min(2 * math.pi / (0.45 * float(std.min())), FINEST_GRID))
     weight = std[:, None] * np.exp(log_q)
     return np.asarray(np.einsum("wp,wpi->i", weight / weight.sum(), d))
 

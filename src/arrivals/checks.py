@@ -114,11 +114,13 @@ def instance(name: str, value: Any, kind: type[T]) -> T:
     TypeError: motion must be a str; got 3, an int
     """
     if not isinstance(value, kind):
-        article = "an" if type(value).__name__[0].lower() in "aeiou" else "a"
-        raise TypeError(
-            f"{name} must be a {kind.__name__}; got {value!r}, {article} {type(value).__name__}"
-        )
+        wanted, given = _with_article(kind.__name__), _with_article(type(value).__name__)
+        raise TypeError(f"{name} must be {wanted}; got {value!r}, {given}")
     return value
+
+
+def _with_article(noun: str) -> str:
+    return f"an {noun}" if noun[0].lower() in "aeiou" else f"a {noun}"
 
 
 def shaped(name: str, value: ArrayLike, *shape: int) -> Float:
