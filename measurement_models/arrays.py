@@ -311,4 +311,6 @@ def _distinct(positions: Float) -> None:
     if same.any():
         first = int(np.argmax(same))
         one, other = sorted(order[first : first + 2].tolist())
-        raise ValueError(f"sensors {one} and {other} share the position {positions[one]}")
+        place = ", ".join(f"{x:g}" for x in positions[one])
+        which = f"numbers {one + 1} and {other + 1} of {len(positions)}"
+        raise ValueError(f"two sensors share the position ({place}) m: {which}")

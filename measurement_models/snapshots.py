@@ -7,11 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.checks import instance, positive, state
+from arrivals.checks import instance, positive, shaped, state
 from arrivals.measurement_models.arrays import SensorArray, direction
 from arrivals.measurement_models.base import MeasurementModel
 from arrivals.measurement_models.manifolds import GridLine, Manifold, Reference
 from arrivals.typing import Complex, Float
+
+LARGEST, SMALLEST = 1e140, 1e-140
 
 
 def composite(z: ArrayLike) -> Float:
@@ -70,6 +72,8 @@ class ArraySnapshot(MeasurementModel):
     def snapshot(self, z: ArrayLike) -> Complex:
         """Return a snapshot as complex numbers, (n_sensors,), NaN where a sensor gave none.
 
+        Numbers whose squares would overflow count as infinite, those that would vanish as zero.
+
         Raises
         ------
         ValueError
@@ -77,14 +81,18 @@ class ArraySnapshot(MeasurementModel):
         """
         array = np.asarray(z)
         if array.dtype.kind not in "biufc":
-            raise TypeError(f"a snapshot must hold complex numbers; got {array.dtype}")
+            raise TypeError(
+                f"a snapshot must hold complex numbers, NaN for a missing one; got {array.dtype}"
+            )
         if array.shape != (self.array.n_sensors,):
             raise ValueError(
                 f"a snapshot must have shape ({self.array.n_sensors},), one number a sensor; "
                 f"got {array.shape}"
             )
         array = array.astype(np.complex128)
-        array[~np.isfinite(array)] = complex(np.nan, np.nan)
+        size = np.abs(array)
+        array[~(size < LARGEST)] = complex(np.nan, np.nan)
+        array[size < SMALLEST] = 0
         if np.isnan(array).all():
             raise ValueError("no sensor of the snapshot gave a finite number")
         return array
@@ -137,16 +145,20 @@ class ArraySnapshot(MeasurementModel):
         misfit = (np.vdot(y, y) - explained).real / self.noise
         return np.asarray(-n * np.log(np.pi * self.noise) - log_det - misfit)
 
+    def wave(self, doa: ArrayLike, amplitude: ArrayLike) -> Complex:
+        """Return noiseless snapshots of sources at `doa` (..., n_sources), as in `simulate`."""
+        doa = np.asarray(doa, dtype=np.float64)
+        on = ~np.isnan(doa)
+        A = self.array.steering_vector(np.where(on, doa, 0.0), self.wavelength)
+        return np.asarray(np.einsum("...k,...km->...m", np.where(on, amplitude, 0.0), A))
+
     def simulate(self, doa: ArrayLike, amplitude: ArrayLike, rng: np.random.Generator) -> Complex:
         """Draw snapshots (..., n_sensors) of sources at `doa` (..., n_sources), rad.
 
         Amplitudes (..., n_sources) are complex, at the origin of coordinates; a NaN direction is
         a source that is off.
         """
-        doa = np.asarray(doa, dtype=np.float64)
-        on = ~np.isnan(doa)
-        A = self.array.steering_vector(np.where(on, doa, 0.0), self.wavelength)
-        wave = np.einsum("...k,...km->...m", np.where(on, amplitude, 0.0), A)
+        wave = self.wave(doa, amplitude)
         u = rng.standard_normal((*wave.shape, 2)) @ np.array([1, 1j]) * np.sqrt(self.noise / 2)
         return np.asarray(wave + u)
 
@@ -167,7 +179,7 @@ class ArraySnapshot(MeasurementModel):
 
     def H(self, x: ArrayLike) -> Float:
         """Return the Jacobian of `h` at one state, (dim_z, 3)."""
-        doa, re, im = state(x, 3)
+        doa, re, im = shaped("x", x, 3)
         a = self._a(doa)
         turned = direction(doa + np.pi / 2, max(self.array.dim, 2))  # du/dβ in the plane
         slope = turned[..., 1:2] if self.array.dim == 1 else turned

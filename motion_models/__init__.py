@@ -2,18 +2,20 @@
 
 from arrivals.motion_models.base import MotionModel
 from arrivals.motion_models.bernoulli_von_mises import BernoulliVonMises
+from arrivals.motion_models.bessel import (
+    bessel_ratio,
+    bessel_ratios,
+    inverse_bessel_ratio,
+    log_bessel_ratio,
+    log_i0,
+)
 from arrivals.motion_models.delay import DelayDrift, DelayWalk
 from arrivals.motion_models.linear import ConstantVelocity, LinearMotion, RandomWalk
 from arrivals.motion_models.stacked import Stacked
 from arrivals.motion_models.turn import CoordinatedTurn
 from arrivals.motion_models.von_mises import (
     VonMisesWalk,
-    bessel_ratio,
-    bessel_ratios,
-    inverse_bessel_ratio,
-    log_bessel_ratio,
     log_density,
-    log_i0,
     mfold_concentration,
     mfold_modes,
     product,

@@ -16,6 +16,7 @@ from arrivals.scenarios.line_arrays import (
     ThreeStatic,
 )
 from arrivals.scenarios.metrics import Gospa, gospa, mean_gospa, mean_rmse, ospa, rmse
+from arrivals.scenarios.plots import plot_array, plot_bearing_time
 from arrivals.scenarios.readers import read
 from arrivals.scenarios.recordings import Recording, Snapshots
 
@@ -41,6 +42,8 @@ __all__ = [
     "mean_gospa",
     "mean_rmse",
     "ospa",
+    "plot_array",
+    "plot_bearing_time",
     "read",
     "register",
     "rmse",

@@ -7,7 +7,7 @@ very step, so that the signal-to-noise ratio is the same in every snapshot.
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -63,8 +63,7 @@ class LineScenario(Scenario):
         power = (np.abs(alpha) ** 2).sum(axis=1) / self.n_sensors
         noise = 10 ** (-self.snr_db / 10) * power
         model = self.measurement
-        silent = replace(model, noise=1e-300)
-        waves = silent.simulate(truth, alpha / np.sqrt(self.n_sensors), rng)
+        waves = model.wave(truth, alpha / np.sqrt(self.n_sensors))
         u = np.sqrt(noise)[:, None] * complex_normal(rng, waves.shape)
         return Trial(waves + u, truth, model, BernoulliVonMises())
 

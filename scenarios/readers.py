@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arrivals.checks import positive
+from arrivals.measurement_models import SensorArray
 from arrivals.scenarios.recordings import Recording
 from arrivals.typing import Float
 
@@ -38,6 +39,7 @@ def read(
     rate: float | None = None,
     variable: str | None = None,
     transpose: bool = False,
+    array: SensorArray | None = None,
 ) -> Recording:
     """Read a recording from a file.
 
@@ -60,6 +62,8 @@ def read(
         Name of the array in an npz or mat file, needed if there is more than one.
     transpose : bool
         Whether the rows of the file are the channels.
+    array : SensorArray, optional
+        Takes the channels of its sensors, in its order, and goes with the recording.
 
     Returns
     -------
@@ -90,7 +94,8 @@ def read(
         positive("rate", rate)
     with path.open("rb") as file:
         try:
-            return _recording(_contents(file, path, variable), rate, transpose)
+            recording = _recording(_contents(file, path, variable), rate, transpose)
+            return recording if array is None else _of_array(recording, array)
         except Exception as error:  # the parsers fail on a damaged file in every way there is
             raise ValueError(f"{path}: {' '.join(str(error).split())}") from error
 
@@ -117,6 +122,11 @@ def _recording(contents: Contents, rate: float | None, transpose: bool) -> Recor
     if rate is None and contents.time is not None:
         rate = _rate_of(contents.time)
     return Recording(array, rate)
+
+
+def _of_array(recording: Recording, array: SensorArray) -> Recording:
+    samples = array.select(recording.samples)
+    return Recording(samples, recording.rate, recording.time, array)
 
 
 def _rate_of(time: Float) -> float:

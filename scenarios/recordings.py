@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from arrivals.checks import count, positive, shaped
+from arrivals.measurement_models import SensorArray
 from arrivals.typing import Complex, Float
 
 Samples: TypeAlias = NDArray[np.floating[Any] | np.complexfloating[Any, Any]]
@@ -104,7 +105,8 @@ def narrowband(
     n_block = max(1, BLOCK // (max(window, hop) * max(1, samples.shape[1])))
     for i in range(0, n_steps, n_block):
         n = min(n_block, n_steps - i)
-        block = samples[i * hop : (i + n - 1) * hop + window].astype(np.float64)
+        with np.errstate(invalid="ignore"):  # signalling NaN, in bytes that are no floats
+            block = samples[i * hop : (i + n - 1) * hop + window].astype(np.float64)
         block[np.isinf(block)] = np.nan
         y[i : i + n] = stft.stft(block, 0, n, k_offset=stft.m_num_mid, axis=0)[0].T
     return np.asarray(y * (2 / taper.sum() * np.exp(-2j * np.pi * (cycles % 1)))[:, None])
@@ -143,6 +145,8 @@ class Recording:
         Rows per second, Hz.
     time : array_like, shape (n_samples,), optional
         Time of each snapshot in s; only for complex ones.
+    array : SensorArray, optional
+        The sensors whose channels these are, in its order.
 
     Raises
     ------
@@ -167,6 +171,7 @@ class Recording:
     samples: Samples
     rate: float | None = None
     time: Float | None = None
+    array: SensorArray | None = None
 
     def __post_init__(self) -> None:
         samples = _cleaned(np.asarray(self.samples))
@@ -177,6 +182,11 @@ class Recording:
             if not self.is_narrowband:
                 raise ValueError("time goes with complex snapshots; real samples have a rate")
             object.__setattr__(self, "time", shaped("time", self.time, len(samples)))
+        if self.array is not None and self.array.n_sensors != samples.shape[1]:
+            raise ValueError(
+                f"the array has {self.array.n_sensors} sensors, the recording {samples.shape[1]} "
+                "channels: pass array.select(samples)"
+            )
 
     @property
     def is_narrowband(self) -> bool:

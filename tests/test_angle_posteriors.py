@@ -94,3 +94,12 @@ def test_folding_keeps_the_exponent(seed: int) -> None:
     assert (c @ np.exp(1j * np.arange(7) * theta)).real == pytest.approx(exponent)
     d = np.exp(1j * np.arange(7) * theta)
     np.testing.assert_allclose(ap.unfold(d, k), np.exp(1j * k * theta))
+
+
+@pytest.mark.parametrize("degree", [20, 150])
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
+def test_every_harmonic_gets_its_moment(degree: int, size: float) -> None:
+    c = np.zeros(degree + 1, dtype=complex)
+    c[degree] = size
+    moments, _ = ap.quadrature(c)
+    np.testing.assert_allclose(moments, dense(c), atol=1e-9)

@@ -101,7 +101,7 @@ def test_direct_quadrature(
 
 @pytest.mark.parametrize("name", ["fig4_001", "fig6_001"])
 def test_free_running_mixture_keeps_the_recorded_number_of_sources(name: str) -> None:
-    """The tracker itself, in the paper's form, over all 50 steps: K as recorded in most (without the slip)."""
+    """The tracker itself, in the paper's form, without the slip: K as recorded in most steps."""
     from arrivals.trackers import SVALSE
 
     z = np.load(Path(FOLDER or "") / "svalse" / f"{name}.npz")

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.io import wavfile
 
+from arrivals.measurement_models import SensorArray
 from arrivals.scenarios import recordings
 from arrivals.scenarios.readers import read
 from arrivals.scenarios.recordings import Recording, default_window, narrowband
@@ -513,3 +514,15 @@ def test_a_file_of_a_plane_wave_from_end_to_end(tmp_path: Path) -> None:
     wavfile.write(tmp_path / "a.wav", int(RATE), wave_int16)
     y = read(tmp_path / "a.wav").snapshots(1000.0).values
     assert_allclose(y.mean(axis=0), 0.5 * np.exp(1j * (0.3 - 2e3 * np.pi * delays)), atol=3e-5)
+
+
+def test_an_array_takes_its_channels_and_goes_with_the_recording(tmp_path: Path) -> None:
+    np.save(tmp_path / "a.npy", np.arange(8.0).reshape(2, 4))
+    array = SensorArray.ula(4, 0.5, missing=[1])
+    recording = read(tmp_path / "a.npy", rate=10.0, array=array)
+    assert recording.samples.tolist() == [[0, 2, 3], [4, 6, 7]]
+    assert recording.array == array
+    with pytest.raises(ValueError, match="the array wants 5 channels; the recording has 4"):
+        read(tmp_path / "a.npy", rate=10.0, array=SensorArray.ula(5, 0.5))
+    with pytest.raises(ValueError, match="the array has 3 sensors, the recording 4 channels"):
+        Recording(np.ones((2, 4)), array=array)

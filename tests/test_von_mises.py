@@ -9,14 +9,16 @@ import scipy.stats
 from hypothesis import given
 from hypothesis import strategies as st
 
-from arrivals.motion_models.von_mises import (
-    VonMisesWalk,
+from arrivals.motion_models.bessel import (
     bessel_ratio,
     bessel_ratios,
     inverse_bessel_ratio,
     log_bessel_ratio,
-    log_density,
     log_i0,
+)
+from arrivals.motion_models.von_mises import (
+    VonMisesWalk,
+    log_density,
     mfold_concentration,
     mfold_modes,
     product,

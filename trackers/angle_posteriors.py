@@ -13,18 +13,18 @@ from functools import lru_cache
 
 import numpy as np
 
-from arrivals.motion_models.von_mises import (
+from arrivals.motion_models.bessel import (
     bessel_ratio,
     bessel_ratios,
     inverse_bessel_ratio,
     log_i0,
-    mfold_concentration,
 )
+from arrivals.motion_models.von_mises import mfold_concentration
 from arrivals.typing import Complex, Float, Int
 
 AnglePosterior = Callable[[Complex], tuple[Complex, complex]]
 LARGEST_GRID = 2048  # beyond it, windows about the modes are cheaper
-FINEST_GRID = 1 << 16  # points where windows do not serve
+FINEST_GRID = 1 << 18  # points at most where windows do not serve
 NATS = 30.0  # what lies further below the top than this does not count
 
 
@@ -53,8 +53,8 @@ def unfold(moments: Complex, harmonics: Int) -> Complex:
     >>> unfold(np.array([1, 0.5j]), np.array([-1, 0, 1]))
     array([0.-0.5j, 1.+0.j , 0.+0.5j])
     """
-    either = moments[np.abs(harmonics)]
-    return np.asarray(np.where(harmonics < 0, either.conj(), either))
+    two_sided = np.concatenate([moments, moments[:0:-1].conj()])  # negative k from the end
+    return np.asarray(two_sided[harmonics])
 
 
 def quadrature(c: Complex) -> tuple[Complex, complex]:
@@ -68,10 +68,7 @@ def quadrature(c: Complex) -> tuple[Complex, complex]:
     """
     sharpness = float(np.abs(c) @ _squares(len(c)))
     n_points = 2 * math.pi * 1.2 * math.sqrt(1 + sharpness)
-    if n_points <= LARGEST_GRID:
-        moments = _on_grid(c, 1 << max(8, int(n_points).bit_length()))
-    else:
-        moments = _in_windows(c)
+    moments = _on_grid(c, n_points) if n_points <= LARGEST_GRID else _in_windows(c)
     return moments, moments[1]
 
 
@@ -80,8 +77,9 @@ def _squares(n: int) -> Float:
     return np.arange(n, dtype=np.float64) ** 2
 
 
-def _on_grid(c: Complex, n_points: int) -> Complex:
+def _on_grid(c: Complex, n_points: float) -> Complex:
     """Moments by the trapezoidal rule: an inverse real FFT, an exponential, a real FFT."""
+    n_points = 1 << max(8, int(max(n_points, 2 * len(c))).bit_length())
     log_q = np.fft.irfft(c, n_points, norm="forward")  # twice, but for the constant
     log_q -= log_q.max()
     log_q *= 0.5
@@ -104,20 +102,20 @@ def _in_windows(c: Complex) -> Complex:
     gaps = np.diff(centres, append=centres[0] + 2 * np.pi)
     overlap = len(centres) > 1 and (gaps < 8.1 * (std + np.roll(std, -1))).any()
     if overlap or log_q[:, [0, -1]].max() > -22:
-        return _on_grid(c, FINEST_GRID)
+        return _on_grid(c, min(2 * math.pi / (0.45 * float(std.min())), FINEST_GRID))
     weight = std[:, None] * np.exp(log_q)
     return np.asarray(np.einsum("wp,wpi->i", weight / weight.sum(), d))
 
 
-def _modes(c: Complex) -> tuple[Float, Float, Float]:
-    """Places, heights and curvatures of the local maxima, by a grid and four Newton steps."""
+def _modes(c: Complex, within: float = NATS) -> tuple[Float, Float, Float]:
+    """Places, heights and curvatures of the maxima near the top, by a grid and Newton's method."""
     i = np.arange(len(c))
     n_points = 1 << int(np.ceil(np.log2(8 * len(c))))
     log_q = np.fft.irfft(c, n_points, norm="forward") / 2
     left, right = np.roll(log_q, 1), np.roll(log_q, -1)
     # a peak between grid points may stand above both by an eighth of their neighbours' drop
     headroom = np.maximum(2 * log_q - left - right, 0)
-    top = (log_q >= left) & (log_q > right) & (log_q + headroom >= log_q.max() - NATS)
+    top = (log_q >= left) & (log_q > right) & (log_q + headroom >= log_q.max() - within)
     step = 2 * np.pi / n_points
     theta = np.asarray(np.flatnonzero(top) * step, dtype=np.float64)
     start = theta
@@ -144,7 +142,7 @@ def top_mode(c: Complex) -> tuple[Complex, complex]:
     """
     if not c[1:].any():
         return np.eye(1, len(c), dtype=np.complex128)[0], 0j
-    modes, heights, curvatures = _modes(c)
+    modes, heights, curvatures = _modes(c, within=0.0)
     best = np.argmax(heights)
     moments = _von_mises(float(modes[best]), float(curvatures[best]), len(c))
     return moments, moments[1]

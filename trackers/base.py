@@ -91,9 +91,9 @@ class Tracker(Configurable, ABC):
             If there is no such parameter or its value is refused; nothing has changed then.
         """
         changed = self._changed(params)
-        type(self)(**changed)  # the constructor's checks
-        for name, value in changed.items():
-            setattr(self, name, value)
+        checked = type(self)(**changed)
+        for name in changed:
+            setattr(self, name, getattr(checked, name))
         return self
 
     @classmethod

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.checks import count, instance, positive
+from arrivals.checks import count, instance, not_negative, positive
 from arrivals.measurement_models.arrays import SensorArray
 from arrivals.measurement_models.snapshots import ArraySnapshot
 from arrivals.trackers.base import Tracker, missed
@@ -65,7 +65,8 @@ def peaks(power: Float, *, circular: bool) -> Int:
     >>> peaks(np.array([9.0, 1.0, 3.0, 2.0, 4.0, 0.0]), circular=False)
     array([4, 2])
     """
-    top = (power > np.roll(power, 1)) & (power >= np.roll(power, -1))
+    rise = 1e-9 * power.max()  # a flat spectrum has none: its ripple is rounding
+    top = (power > np.roll(power, 1) + rise) & (power >= np.roll(power, -1))
     if not circular:
         top[[0, -1]] = False
     found = np.flatnonzero(top)
@@ -158,6 +159,7 @@ class CBF(Tracker):
 
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
         """Forget: nothing is carried from snapshot to snapshot."""
+        not_negative("dt", dt)
         self.power = np.full(self.n_directions, np.nan)
         self._show(DirectionEstimate.nothing())
 

@@ -140,7 +140,8 @@ class PositionEstimate(Estimate):
         x, y = self.position.T
         variance = np.diagonal(self.covariance, axis1=-2, axis2=-1)
         std_x, std_y = np.sqrt(variance).T
-        corr = self.covariance[:, 0, 1] / (std_x * std_y)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            corr = self.covariance[:, 0, 1] / (std_x * std_y)
         level_db = 20 / np.log(10) * self.log_amplitude
         return list(
             zip(self.label, x, y, std_x, std_y, corr, self.existence, level_db, strict=True)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Generic, TypeVar
 
+from arrivals.params import FINDERS
 from arrivals.trackers.base import Tracker
 
 Base = TypeVar("Base")
@@ -77,10 +78,12 @@ class Registry(Generic[Base]):
         ValueError
             If there is none, with the names that come near; or if two packages claim the name.
         """
+        if not isinstance(name, str):
+            raise TypeError(f"a {self.noun} is named by a string; got {name!r}")
         points = self._entry_points().get(name, [])
         ours = self._classes.get(name)
         if ours is not None:  # a package may name its class by another path than the class does
-            points = [point for point in points if point.load() is not ours]
+            points = [point for point in points if self._load(point) is not ours]
         claims = [point.value for point in points]
         if ours is not None:
             claims.append(f"{ours.__module__}:{ours.__qualname__}")
@@ -89,8 +92,7 @@ class Registry(Generic[Base]):
         if ours is not None:
             return ours
         if points:
-            loaded: type[Base] = points[0].load()
-            return self.register(name)(loaded)
+            return self.register(name)(self._load(points[0]))
         near = difflib.get_close_matches(name, self.available(), n=3, cutoff=0.5)
         hint = (
             f"did you mean {' or '.join(near)}?"
@@ -98,6 +100,16 @@ class Registry(Generic[Base]):
             else f"known: {', '.join(self.available())}"
         )
         raise ValueError(f"there is no {self.noun} {name!r}; {hint}")
+
+    def _load(self, point: EntryPoint) -> type[Base]:
+        """Import what an entry point names; whatever goes wrong in it is somebody else's."""
+        try:
+            loaded: type[Base] = point.load()
+        except Exception as error:
+            raise ValueError(
+                f"the {self.noun} {point.name!r}, {point.value}, cannot be loaded: {error}"
+            ) from error
+        return loaded
 
     def create(self, name: str, **params: Any) -> Base:
         """Make the one of that name from its constructor's arguments."""
@@ -109,6 +121,7 @@ class Registry(Generic[Base]):
 
 
 _trackers: Registry[Tracker] = Registry(Tracker, "arrivals.trackers", "tracker")  # type: ignore[type-abstract]  # only its subclasses are made
+FINDERS.append(_trackers.find)
 available, create, find, register = (
     _trackers.available,
     _trackers.create,

@@ -9,7 +9,7 @@ from arrivals.checks import instance, not_negative, positive
 from arrivals.measurement_models.manifolds import Reference
 from arrivals.measurement_models.snapshots import ArraySnapshot
 from arrivals.motion_models.bernoulli_von_mises import BernoulliVonMises
-from arrivals.motion_models.von_mises import bessel_ratio, inverse_bessel_ratio
+from arrivals.motion_models.bessel import bessel_ratio, inverse_bessel_ratio
 from arrivals.trackers.base import missed
 from arrivals.trackers.coordinate_ascent import CoordinateAscent, PosteriorName
 from arrivals.trackers.estimates import DirectionEstimate
@@ -42,7 +42,8 @@ class SVALSE(VALSE):
         Of two active components nearer than this, rad of direction, the later is switched off;
         0 for never. (Only in the paper's program, not in its text.)
     snr_db : float
-        Signal-to-noise ratio from which the noise estimate of each step starts.
+        Signal-to-noise ratio from which the noise estimate of each step starts; above 0, so
+        that something is left to the sources.
 
     Attributes
     ----------
@@ -58,7 +59,8 @@ class SVALSE(VALSE):
     given when a component is first reported and stays while the component is carried; two
     sources nearer than `merge` become one, and sources that cross may exchange their labels.
     Between measurements, and after a missed one, the components whose predicted existence is
-    at least one half are reported.
+    at least one half are reported; a snapshot that no more sensors heard than there are such
+    components counts as missed.
 
     References
     ----------
@@ -121,7 +123,11 @@ class SVALSE(VALSE):
         )
 
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
-        """Widen the angles' densities, and let sources be born and die, (62)-(65)."""
+        """Widen the angles' densities, and let sources be born and die, (62)-(65).
+
+        The width is that of the exact convolution, A(κ') = A(κ) A(κ_r), whose limit for large
+        κ (63) is.
+        """
         self.kappa, self.existence, self.birth = (
             self.motion.blur(self.kappa, dt),
             np.where(self.carried, self.motion.predict_existence(self.existence, dt), 0.0),
@@ -131,7 +137,7 @@ class SVALSE(VALSE):
 
     def update(self, z: ArrayLike | None) -> None:
         """Fit one snapshot, (n_sensors,), given what is carried; leave out sensors that are NaN."""
-        if missed(z):
+        if missed(z) or self._too_few(z):
             return
         manifold, fit = self._fit(z, self._prediction())
         label = np.full(len(fit.theta), -1)
@@ -146,6 +152,11 @@ class SVALSE(VALSE):
         order = np.concatenate([np.flatnonzero(fit.active), np.flatnonzero(history)])
         kappa = inverse_bessel_ratio(fit.resultant[order])
         self._carry(fit.theta[order], kappa, fit.active[order], label[order])
+
+    def _too_few(self, z: ArrayLike | None) -> bool:
+        """Tell whether fewer sensors gave a number than the expected sources need."""
+        heard = np.isfinite(self.measurement.snapshot(np.asarray(z))).sum()
+        return bool(heard <= (self.carried & (self.existence >= 0.5)).sum())
 
     @property
     def carried(self) -> Bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.checks import count, instance, one_of, positive
+from arrivals.checks import count, instance, not_negative, one_of, positive
 from arrivals.measurement_models.manifolds import Manifold, Reference
 from arrivals.measurement_models.snapshots import ArraySnapshot
 from arrivals.trackers.base import Tracker, missed
@@ -110,6 +110,7 @@ class VALSE(Tracker):
 
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
         """Forget: nothing is carried from snapshot to snapshot."""
+        not_negative("dt", dt)
         self._nothing()
 
     def update(self, z: ArrayLike | None) -> None:

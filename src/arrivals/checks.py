@@ -20,7 +20,7 @@ def number(name: str, value: Any) -> float:
     Traceback (most recent call last):
     TypeError: kappa must be a number; got 'many'
     """
-    if isinstance(value, bool) or not np.isscalar(value) or not np.isrealobj(value):
+    if isinstance(value, bool | str | bytes) or not np.isscalar(value) or not np.isrealobj(value):
         raise TypeError(f"{name} must be a number; got {value!r}")
     try:
         return float(value)  # type: ignore[arg-type]  # anything scalar that float() understands
@@ -114,11 +114,13 @@ def instance(name: str, value: Any, kind: type[T]) -> T:
     TypeError: motion must be a str; got 3, an int
     """
     if not isinstance(value, kind):
-        article = "an" if type(value).__name__[0].lower() in "aeiou" else "a"
-        raise TypeError(
-            f"{name} must be a {kind.__name__}; got {value!r}, {article} {type(value).__name__}"
-        )
+        wanted, given = _with_article(kind.__name__), _with_article(type(value).__name__)
+        raise TypeError(f"{name} must be {wanted}; got {value!r}, {given}")
     return value
+
+
+def _with_article(noun: str) -> str:
+    return f"an {noun}" if noun[0].lower() in "aeiou" else f"a {noun}"
 
 
 def shaped(name: str, value: ArrayLike, *shape: int) -> Float:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import importlib
 import inspect
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, Self
 
 import numpy as np
+
+FINDERS: list[Callable[[str], type]] = []  # what turns registered names into classes
 
 
 class Configurable:
@@ -23,9 +25,12 @@ class Configurable:
     @classmethod
     def _param_names(cls) -> list[str]:
         parameters = list(inspect.signature(cls).parameters.values())
-        open_ended = [p.name for p in parameters if p.kind in (p.VAR_POSITIONAL, p.VAR_KEYWORD)]
-        if open_ended:
-            raise TypeError(f"{cls.__name__} must name its parameters; it takes *{open_ended[0]}")
+        for p in parameters:
+            if p.kind in (p.VAR_POSITIONAL, p.VAR_KEYWORD):
+                stars = "*" if p.kind is p.VAR_POSITIONAL else "**"
+                raise TypeError(
+                    f"{cls.__name__} must name its parameters; it takes {stars}{p.name}"
+                )
         return [p.name for p in parameters]
 
     def get_params(self, deep: bool = True) -> dict[str, Any]:
@@ -70,10 +75,8 @@ class Configurable:
     @classmethod
     def _find_type(cls, name: str) -> Any:
         module, colon, qualname = name.partition(":")
-        if not colon:  # a registered name
-            from arrivals.trackers.registry import find
-
-            return find(name)
+        if not colon:
+            return _registered(name)
         try:
             found: Any = importlib.import_module(module)
             for part in qualname.split("."):
@@ -127,6 +130,15 @@ class Model(Configurable):
     def __reduce__(self) -> tuple[Any, ...]:
         # by the constructor, so that what it froze is frozen again
         return partial(type(self), **self.get_params(deep=False)), ()
+
+
+def _registered(name: str) -> type:
+    for find in FINDERS:
+        try:
+            return find(name)
+        except ValueError as error:
+            unknown = error
+    raise unknown if FINDERS else ValueError(f"nothing is registered under {name!r}")
 
 
 def _plain(value: Any) -> Any:

@@ -1,7 +1,6 @@
-"""The Kalman-type trackers, the particle filter and the IMM through the list for all trackers."""
+"""The Kalman-type trackers, the particle filter and the IMM, for `test_conformance`."""
 
 import numpy as np
-import pytest
 
 from arrivals.measurement_models import ArraySnapshot, Bearing, LinearMeasurement, SensorArray
 from arrivals.motion_models import (
@@ -11,8 +10,8 @@ from arrivals.motion_models import (
     RandomWalk,
     VonMisesWalk,
 )
-from arrivals.trackers import EKF, IMM, UKF, Kalman, Particle, find
-from arrivals.trackers.conformance import CHECKS, Check, MakeTracker, Measurements
+from arrivals.trackers import EKF, IMM, UKF, Kalman, Particle
+from arrivals.trackers.conformance import MakeTracker, Measurements
 
 X, P = np.array([5.0, 0.1, 4.0, -0.1]), np.diag([1.0, 0.1, 1.0, 0.1])
 MOVES = ConstantVelocity(q=0.01)
@@ -73,15 +72,3 @@ TRACKERS: list[tuple[str, MakeTracker, Measurements]] = [
     ),
     ("imm", imm, positions()),
 ]
-IDS = [f"{name}-{n}" for n, (name, _, _) in enumerate(TRACKERS)]
-
-
-@pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
-@pytest.mark.parametrize(("name", "make", "measurements"), TRACKERS, ids=IDS)
-def test_conforms(name: str, make: MakeTracker, measurements: Measurements, check: Check) -> None:
-    check(make, measurements)
-
-
-@pytest.mark.parametrize(("name", "make", "measurements"), TRACKERS, ids=IDS)
-def test_is_registered(name: str, make: MakeTracker, measurements: Measurements) -> None:
-    assert type(make()) is find(name)

@@ -1,0 +1,257 @@
+"""The main job of the command line: a recording or a stream in, a tracks file and a picture out."""
+
+from __future__ import annotations
+
+import argparse
+import inspect
+import os
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from arrivals.checks import count
+from arrivals.measurement_models import ArraySamples, ArraySnapshot, SensorArray
+from arrivals.scenarios.live import live_snapshots, track_live
+from arrivals.scenarios.readers import read
+from arrivals.scenarios.sampled import band_samples, live_samples, track_samples
+from arrivals.trackers import Tracker, find
+from arrivals.trackers.recorder import Run, header, text
+from arrivals.typing import Complex, Float
+
+Bar: TypeAlias = Callable[..., Any]
+
+
+def track(arguments: argparse.Namespace, bar: Bar) -> None:
+    """Track directions through the recording, or the stream, that the arguments name.
+
+    Parameters
+    ----------
+    arguments : argparse.Namespace
+        Those of `arrivals track`.
+    bar : callable
+        Takes the steps, and gives them back while it shows how far it is, as tqdm does.
+
+    Raises
+    ------
+    ValueError, TypeError, OSError
+        If something is wrong with the arguments, the files or the stream. No output file has been
+        made then, or changed.
+    """
+    from threadpoolctl import threadpool_limits
+
+    array = SensorArray.from_toml(arguments.array)
+    _check_outputs(arguments)
+    with threadpool_limits(1, "blas"):  # the matrices are small: more threads only wait
+        if arguments.band:
+            _track_band(arguments, array, bar)
+        else:
+            _track_snapshots(arguments, array, bar)
+
+
+def _track_snapshots(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -> None:
+    measurement = _measurement(array, arguments)
+    tracker = _tracker(arguments.tracker, measurement, dict(arguments.set))
+    job = _track_stream if arguments.file == "-" else _track_file
+    job(arguments, tracker, measurement, bar)
+
+
+def _measurement(array: SensorArray, arguments: argparse.Namespace) -> ArraySnapshot:
+    """Return the array at the frequency, which must be unambiguous."""
+    if arguments.frequency is None:
+        raise ValueError("give --frequency, or --band for a tracker of real samples")
+    if array.speed is None:
+        raise ValueError(
+            f"{arguments.array}: the key 'speed' is missing: "
+            "a frequency wants the speed of the waves, m/s"
+        )
+    wavelength = array.wavelength(arguments.frequency)
+    limit = array.alias_limit
+    if limit is not None and wavelength < limit * (1 - 1e-6):
+        raise ValueError(
+            f"frequency must not exceed the array's alias limit, {array.speed / limit:g} Hz, at "
+            f"which its grid spacing is half the wavelength; got {arguments.frequency:g} Hz"
+        )
+    return ArraySnapshot(array, wavelength)
+
+
+def _tracker(
+    name: str, measurement: ArraySnapshot | ArraySamples, settings: dict[str, Any]
+) -> Tracker:
+    """Make a tracker of directions, its parameters changed by (nested) names."""
+    kind = find(name)
+    known = inspect.signature(kind).parameters
+    if "measurement" not in known:
+        raise ValueError(f"the tracker {name!r} takes no measurement: it cannot track an array's "
+                         "snapshots")  # fmt: skip
+    for setting in settings:
+        if setting.partition("__")[0] == "measurement":
+            raise ValueError(f"--set {setting}: the measurement comes from --array and --frequency")
+    needs = [key for key, value in known.items() if value.default is value.empty]
+    if needs != ["measurement"]:
+        raise ValueError(
+            f"the tracker {name!r} is made from {', '.join(needs)}, not from an array file alone"
+        )
+    plain = {key: value for key, value in settings.items() if key in known}
+    tracker = kind(**{"measurement": measurement} | plain)
+    return kind(**tracker.set_params(**settings).get_params(deep=False))
+
+
+def _check_outputs(arguments: argparse.Namespace) -> None:
+    """Refuse, before the work begins, what could not be written at its end."""
+    from arrivals.scenarios.plots import picture_format
+
+    files = [name for name in (arguments.array, arguments.file, arguments.out, arguments.plot)
+             if name and name != "-"]  # fmt: skip
+    if len({Path(name).resolve() for name in files}) < len(files):
+        raise ValueError("FILE, --array, --out and --plot must be different files")
+    for name in filter(None, (arguments.out, arguments.plot)):
+        folder = Path(name).parent
+        if not folder.is_dir():
+            raise FileNotFoundError(2, "the folder does not exist", str(folder))
+        if Path(name).is_dir():
+            raise IsADirectoryError(21, "this is a folder", name)
+        if not os.access(folder, os.W_OK):
+            raise PermissionError(13, "the folder may not be written to", str(folder))
+    if arguments.plot:
+        picture_format(arguments.plot)
+
+
+def _refuse(arguments: argparse.Namespace, names: Iterable[str], reason: str) -> None:
+    for name in names:
+        if getattr(arguments, name):
+            raise ValueError(f"--{name} {reason}")
+
+
+@dataclass(frozen=True)
+class _Heard:
+    """The snapshots of the array's sensors, and their times, s, if they are known."""
+
+    values: Complex
+    time: Float | None
+
+
+def _heard(arguments: argparse.Namespace, array: SensorArray) -> _Heard:
+    """Read a recording, and find the snapshots of the array's sensors in it."""
+    recording = read(arguments.file, rate=arguments.rate, variable=arguments.variable,
+                     transpose=arguments.transpose, array=array)  # fmt: skip
+    found = recording.snapshots(arguments.frequency, window=arguments.window, hop=arguments.hop)
+    values = found.values
+    if not np.isfinite(values).any():
+        raise ValueError(f"{arguments.file}: no sample of the array's channels is finite")
+    return _Heard(values, found.time if np.isfinite(found.time).all() else None)
+
+
+def _track_file(
+    arguments: argparse.Namespace, tracker: Tracker, measurement: ArraySnapshot, bar: Bar
+) -> None:
+    _refuse(arguments, ("dtype", "channels"), "goes with samples from standard input")
+    heard = _heard(arguments, measurement.array)
+    result = tracker.run(bar(heard.values, desc=arguments.tracker))
+    result = result if heard.time is None else result.at(heard.time)
+    if arguments.out:
+        result.to_csv(arguments.out)
+    else:
+        _print_rows(result)
+    if arguments.plot:
+        _plot(arguments.plot, result, heard, measurement)
+
+
+def _print_rows(result: Run) -> None:
+    sys.stdout.write(",".join(header(result.kind)) + "\n")
+    for row in result.rows():
+        sys.stdout.write(",".join(text(row)) + "\n")
+
+
+def _plot(path: str, result: Run, heard: _Heard, measurement: ArraySnapshot) -> None:
+    from arrivals.scenarios.plots import plot_bearing_time, save
+
+    ax = plot_bearing_time(result, snapshots=heard.values, measurement=measurement, time=heard.time)
+    save(ax, path)
+
+
+def _track_stream(
+    arguments: argparse.Namespace, tracker: Tracker, measurement: ArraySnapshot, bar: Bar
+) -> None:
+    _refuse(arguments, ("plot", "variable", "transpose"), "goes with a file, not with a stream")
+    array = measurement.array
+    snapshots = live_snapshots(
+        sys.stdin.buffer, _stream_channels(arguments.channels, array),
+        dtype=arguments.dtype or "int16", frequency=arguments.frequency, rate=arguments.rate,
+        window=arguments.window, hop=arguments.hop,
+    )  # fmt: skip
+    steps = ((time, array.select(z)) for time, z in snapshots)
+    with _live_output(arguments.out) as write:
+        track_live(tracker, bar(steps, desc=arguments.tracker), write)
+
+
+def _track_band(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -> None:
+    """Track by a tracker that takes real samples one by one, from a recording or a stream."""
+    _refuse(arguments, ("frequency", "window"), "goes with snapshots, not with --band")
+    if arguments.file == "-":
+        _track_band_stream(arguments, array, bar)
+        return
+    _refuse(arguments, ("dtype", "channels"), "goes with samples from standard input")
+    recording = read(arguments.file, rate=arguments.rate, variable=arguments.variable,
+                     transpose=arguments.transpose, array=array)  # fmt: skip
+    if recording.is_narrowband:
+        raise ValueError(f"{arguments.file}: --band wants real samples; these are complex")
+    tracker, rate = _band_tracker(arguments, array, recording.rate)
+    samples = bar(recording.samples, desc=arguments.tracker)
+    result = track_samples(tracker, samples, rate, every=arguments.hop or 1)
+    if arguments.out:
+        result.to_csv(arguments.out)
+    else:
+        _print_rows(result)
+    if arguments.plot:
+        from arrivals.scenarios.plots import plot_bearing_time, save
+
+        save(plot_bearing_time(result, time=result.time), arguments.plot)
+
+
+def _track_band_stream(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -> None:
+    _refuse(arguments, ("plot", "variable", "transpose"), "goes with a file, not with a stream")
+    tracker, rate = _band_tracker(arguments, array, arguments.rate)
+    n_channels = _stream_channels(arguments.channels, array)
+    frames = live_samples(sys.stdin.buffer, n_channels, dtype=arguments.dtype or "int16")
+    steps = ((k / rate, array.select(z)) for k, z in enumerate(frames))
+    with _live_output(arguments.out) as write:
+        bars = bar(steps, desc=arguments.tracker)
+        if track_live(tracker, bars, write, every=arguments.hop or 1) == 0:
+            raise ValueError("the stream ended before one sample of every channel")
+
+
+def _band_tracker(
+    arguments: argparse.Namespace, array: SensorArray, rate: float | None
+) -> tuple[Tracker, float]:
+    """Return the tracker of a source that fills the band, and the rate."""
+    if rate is None:
+        raise ValueError("--band needs the samples per second: pass --rate")
+    measurement = band_samples(array, rate, arguments.band, arguments.snr)
+    return _tracker(arguments.tracker, measurement, dict(arguments.set)), rate
+
+
+def _stream_channels(channels: int | None, array: SensorArray) -> int:
+    """Return how many channels a stream has: what was said, or what the array tells."""
+    wired = array.n_sensors if array.channels is None else max(array.channels) + 1
+    if channels is None and array.n_channels is None and wired > array.n_sensors:
+        raise ValueError("the array file names some channels of a larger stream: pass --channels")
+    given = channels if channels is not None else array.n_channels or array.n_sensors
+    array.select(np.empty(count("channels", given)))
+    return given
+
+
+@contextmanager
+def _live_output(path: str | None) -> Iterator[Callable[[str], object]]:
+    """Give what writes lines at once, to standard output or to a file that the first ones make."""
+    if path is None:
+        yield lambda lines: (sys.stdout.write(lines), sys.stdout.flush())
+        return
+    with ExitStack() as stack:
+        opened = cache(lambda: stack.enter_context(open(path, "wb", buffering=0)))
+        yield lambda lines: opened().write(lines.encode())

@@ -1,0 +1,55 @@
+"""One direction of arrival, from the phase step between neighbouring sensors."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from arrivals.checks import instance, positive
+from arrivals.measurement_models import ArraySnapshot
+from arrivals.trackers import DirectionEstimate, Tracker
+from arrivals.trackers.base import missed
+
+
+class LagOne(Tracker):
+    """The mean phase step of a uniform line, remembered with a forgetting factor.
+
+    Parameters
+    ----------
+    measurement : ArraySnapshot
+        Its array is a uniform line.
+    memory : float
+        Weight of the past after one step.
+    """
+
+    def __init__(self, measurement: ArraySnapshot, memory: float = 0.5) -> None:
+        self.measurement = instance("measurement", measurement, ArraySnapshot)
+        self.memory = positive("memory", memory)
+        self.lag, self.power = 0j, 0.0
+        self.x, self.P = np.full(1, np.nan), np.zeros((1, 1))
+
+    def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
+        """Forget a little."""
+        self.lag, self.power = self.lag * self.memory**dt, self.power * self.memory**dt
+
+    def update(self, z: ArrayLike | None) -> None:
+        """Add the products of neighbours, those of which both are heard."""
+        if missed(z):
+            return
+        z = self.measurement.snapshot(np.asarray(z))
+        products = z[1:] * z[:-1].conj()
+        lag = self.lag + np.nansum(products)
+        power = self.power + np.nansum(np.abs(products))
+        if power > 0:
+            model = self.measurement
+            sine = np.angle(lag) / (2 * np.pi * (model.array.spacing or np.inf) / model.wavelength)
+            self.x = np.arcsin(np.clip([sine], -1.0, 1.0))
+            self.P = np.array([[1 - abs(lag) / power]])
+        self.lag, self.power = lag, power
+
+    @property
+    def estimate(self) -> DirectionEstimate:
+        """The one direction, once something was heard."""
+        doa = self.x[~np.isnan(self.x)]
+        n = len(doa)
+        std = np.sqrt(np.maximum(self.P[0, :n], 0.0))
+        unknown = np.full(n, complex(np.nan, np.nan))
+        return DirectionEstimate(doa, std, np.full(n, np.nan), unknown, np.zeros(n, dtype=np.int64))
