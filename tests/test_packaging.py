@@ -203,7 +203,6 @@ def test_import_in_the_wrong_direction_is_seen(place: str, source: str) -> None:
             "arrivals/scenarios/a.py",
             "import matplotlib, joblib\nfrom arrivals.trackers import find",
         ),
-        ("arrivals/params.py", "def f():\n    from arrivals.trackers.registry import find"),
     ],
 )
 def test_import_in_the_right_direction_is_not(place: str, source: str) -> None:
