@@ -1,4 +1,7 @@
-"""CPU time beside filterpy's, in one run, the two taking turns. Prints ratios and versions."""
+"""CPU time beside filterpy's and Stone Soup's, in one run, taking turns. Prints ratios, versions.
+
+Stone Soup is measured where it is installed: `pip install "arrivals[bench]"`.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,8 @@ import os
 import time
 from collections.abc import Callable
 from importlib.metadata import version
+from importlib.util import find_spec
+from typing import Any
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
@@ -17,6 +22,7 @@ from arrivals.measurement_models import Bearing, LinearMeasurement
 from arrivals.motion_models import ConstantVelocity, LinearMotion
 from arrivals.trackers import EKF, IMM, Kalman
 from arrivals.trackers.recorder import Recorder
+from arrivals.typing import Float
 
 Step = Callable[[], object]
 
@@ -102,6 +108,46 @@ def batch(n_filters: int = 100, n_steps: int = 20) -> tuple[Step, Step]:
     return loop, lambda: tracker.run_batch(zs)
 
 
+def soup(ekf: bool) -> Step:
+    """Stone Soup's predict and update, of the Kalman filter or of the EKF on two bearings.
+
+    Its likelihood is not asked for; its EKF finds Jacobians by differences. Each step starts from
+    the update before, because it caches by object.
+    """
+    from stonesoup.models.measurement.linear import LinearGaussian
+    from stonesoup.models.measurement.nonlinear import (
+        Cartesian2DToBearing,
+        CombinedReversibleGaussianMeasurementModel,
+    )
+    from stonesoup.models.transition.linear import LinearGaussianTimeInvariantTransitionModel
+    from stonesoup.predictor.kalman import ExtendedKalmanPredictor, KalmanPredictor
+    from stonesoup.types.array import StateVector
+    from stonesoup.types.detection import Detection
+    from stonesoup.types.hypothesis import SingleHypothesis
+    from stonesoup.types.state import GaussianState
+    from stonesoup.updater.kalman import ExtendedKalmanUpdater, KalmanUpdater
+
+    walk = LinearGaussianTimeInvariantTransitionModel(transition_matrix=F, covariance_matrix=Q)
+    seen: Any = LinearGaussian(ndim_state=4, mapping=(0, 2), noise_covar=np.eye(2))
+    predictor, updater, z = KalmanPredictor(walk), KalmanUpdater(seen, use_joseph_cov=True), Z
+    if ekf:
+        bearings = [
+            Cartesian2DToBearing(4, (0, 2), noise_covar=[[0.01]], translation_offset=place[:, None])
+            for place in BEARING.sensor_positions
+        ]
+        seen = CombinedReversibleGaussianMeasurementModel(bearings)
+        predictor, updater, z = ExtendedKalmanPredictor(walk), ExtendedKalmanUpdater(seen), ANGLES
+    state = GaussianState(StateVector(X), P)
+    detection = Detection(StateVector(z), measurement_model=seen)
+
+    def step() -> None:
+        nonlocal state
+        state = updater.update(SingleHypothesis(predictor.predict(state), detection))
+        state.hypothesis = None  # or the whole past hangs on it
+
+    return step
+
+
 def cpu(step: Step, repeats: int) -> float:
     """Return CPU seconds of a call."""
     started = time.process_time()
@@ -110,16 +156,16 @@ def cpu(step: Step, repeats: int) -> float:
     return (time.process_time() - started) / repeats
 
 
-def compare(pair: tuple[Step, Step], repeats: int, rounds: int = 15) -> tuple[float, float, float]:
-    """Return CPU seconds of both and the ratio of ours to theirs, medians over the rounds."""
-    for step in pair:
+def compare(steps: list[Step], repeats: int, rounds: int = 15) -> tuple[Float, Float]:
+    """Return CPU seconds of each and its ratio to the first, medians over the rounds."""
+    for step in steps:
         cpu(step, max(repeats // 5, 1))
-    times = np.array([[cpu(step, repeats) for step in pair] for _ in range(rounds)])
-    one, other = np.median(times, axis=0)
-    return float(one), float(other), float(np.median(times[:, 1] / times[:, 0]))
+    times = np.array([[cpu(step, repeats) for step in steps] for _ in range(rounds)])
+    return np.median(times, axis=0), np.median(times / times[:, :1], axis=0)
 
 
 def main() -> None:
+    has_soup = find_spec("stonesoup") is not None
     rows: list[tuple[str, tuple[Step, Step], int, float]] = [
         ("kalman, with log-likelihood", kalman(), 500, 0.5),
         ("ekf on bearings, ours with likelihood", ekf(), 500, 1.6),
@@ -127,12 +173,19 @@ def main() -> None:
         ("recording a step", recording(), 200, 0.3),
         ("100 filters, 20 steps, as a batch", batch(), 1, 0.1),
     ]
-    peers = ", ".join(f"{name} {version(name)}" for name in ("numpy", "filterpy"))
-    print(f"CPU time of one core; {peers}\n")
-    print("| what | filterpy, us | ours, us | ratio | wanted |\n|---|---|---|---|---|")
+    soups = {rows[0][0]: soup(ekf=False), rows[1][0]: soup(ekf=True)} if has_soup else {}
+    names = ("numpy", "filterpy", "stonesoup") if has_soup else ("numpy", "filterpy")
+    print(f"CPU time of one core; {', '.join(f'{name} {version(name)}' for name in names)}\n")
+    print("| what | whose | us | ratio to filterpy | wanted |\n|---|---|---|---|---|")
     for what, pair, repeats, wanted in rows:
-        one, other, ratio = compare(pair, repeats)
-        print(f"| {what} | {1e6 * one:.1f} | {1e6 * other:.1f} | {ratio:.3f} | {wanted} |")
+        steps = [*pair, *([soups[what]] if what in soups else [])]
+        (theirs_s, ours_s, *soup_s), (_, ratio, *soup_ratio) = compare(steps, repeats)
+        print(f"| {what} | filterpy | {1e6 * theirs_s:.1f} | 1 | |")
+        print(f"| | ours | {1e6 * ours_s:.1f} | {ratio:.3f} | {wanted} |")
+        for seconds, times in zip(soup_s, soup_ratio, strict=True):
+            print(f"| | Stone Soup | {1e6 * seconds:.1f} | {times:.3f} | |")
+    if not has_soup:
+        print('\nStone Soup is not installed, its rows are left out: pip install "arrivals[bench]"')
 
 
 if __name__ == "__main__":

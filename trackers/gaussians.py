@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -50,12 +50,13 @@ def apply(A: Float, x: Float) -> Float:
 
 def inner(a: Float, b: Float) -> Float:
     """Return aᵀ b of vectors (..., n)."""
-    return np.asarray(a.dot(b) if a.ndim == 1 else (a[..., None, :] @ b[..., None])[..., 0, 0])
+    product: Float = a.dot(b) if a.ndim == 1 else (a[..., None, :] @ b[..., None])[..., 0, 0]
+    return product
 
 
 def multiplication(A: Float) -> Product:
-    """Return the product that suits matrices like A: on single ones np.dot takes half of matmul."""
-    return np.dot if A.ndim == 2 else np.matmul
+    """Return the product that suits matrices like A: on single ones dot takes a third of matmul."""
+    return np.ndarray.dot if A.ndim == 2 else np.matmul
 
 
 def transposed(A: Float) -> Float:
@@ -70,12 +71,34 @@ def symmetric(A: Float) -> Float:
     return total
 
 
+def half_log_det(L: Float) -> float | Float:
+    """Return log |L|, half of log |L Lᵀ|, of Cholesky factors (..., n, n).
+
+    Examples
+    --------
+    >>> half_log_det(np.eye(2)), half_log_det(np.ones((3, 1, 1)))
+    (0.0, array([0., 0., 0.]))
+    """
+    diagonal = L.diagonal(0, -2, -1)
+    if diagonal.ndim == 1:
+        return sum(map(math.log, diagonal.tolist()))  # of a few numbers, a third of numpy's time
+    return np.asarray(np.log(diagonal).sum(axis=-1))
+
+
 @lru_cache(maxsize=64)
 def identity(n: int) -> Float:
     """Return the unit matrix, shared and not to be written to."""
     one = np.eye(n)
     one.setflags(write=False)
     return one
+
+
+@cache
+def lapack() -> Any:
+    """Return scipy's LAPACK, on a small matrix several times quicker than numpy's calls of it."""
+    from scipy.linalg import lapack  # takes long to import, so not before it is called
+
+    return lapack
 
 
 def cholesky(A: Float) -> tuple[Float, Float, int]:
@@ -92,6 +115,9 @@ def cholesky(A: Float) -> tuple[Float, Float, int]:
     >>> jittered, np.allclose(L @ L.T, 1.0)
     (1, True)
     """
+    if A.ndim == 2:
+        L, failed = lapack().dpotrf(A, lower=True)
+        return _jittered(A) if failed else (A, L, 0)
     try:
         return A, np.asarray(np.linalg.cholesky(A), np.float64), 0
     except np.linalg.LinAlgError:
@@ -115,6 +141,23 @@ def _jittered(A: Float) -> tuple[Float, Float, int]:
     return A, np.asarray(np.linalg.cholesky(A), np.float64), int(np.sum(weak))
 
 
+def inverse(A: Float) -> Float:
+    """Return A⁻¹ of matrices (..., n, n): the numbers of `numpy.linalg.inv`.
+
+    Examples
+    --------
+    >>> inverse(np.array([[2.0, 0.0], [0.0, 4.0]]))
+    array([[0.5 , 0.  ],
+           [0.  , 0.25]])
+    """
+    if A.ndim > 2:
+        return np.asarray(np.linalg.inv(A), np.float64)
+    _, _, solution, failed = lapack().dgesv(A, identity(len(A)))
+    if failed:
+        raise np.linalg.LinAlgError("a matrix to invert is singular")
+    return np.asarray(solution)
+
+
 def predict_gaussian(P: Float, F: Float, Q: Float) -> Float:
     """Return F P Fᵀ + Q, the covariance after a step.
 
@@ -135,7 +178,7 @@ def update_gaussian(
     H: Float,
     R: Float,
     missing: Bool | None = None,
-    inv: Inverse = np.linalg.inv,
+    inv: Inverse = inverse,
 ) -> Correction:
     """Correct Gaussian beliefs by the residuals of linear measurements, in Joseph's form.
 
@@ -182,8 +225,7 @@ def update_gaussian(
     I_KH = identity(P.shape[-1]) - dot(K, H)
     P = symmetric(dot(dot(I_KH, P), transposed(I_KH)) + dot(dot(K, R), transposed(K)))
     square = inner(y, apply(SI, y))
-    half_log_det = np.add.reduce(np.log(L.diagonal(0, -2, -1)), -1)
-    log_likelihood = -0.5 * (n_heard * LOG_2PI + square) - half_log_det
+    log_likelihood = -0.5 * (n_heard * LOG_2PI + square) - half_log_det(L)
     return Correction(x + apply(K, y), P, y, K, S, SI, log_likelihood, square, jittered)
 
 

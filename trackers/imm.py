@@ -14,9 +14,10 @@ from numpy.typing import ArrayLike
 from arrivals.checks import shaped
 from arrivals.trackers.base import Tracker, missed
 from arrivals.trackers.estimates import StateEstimate
+from arrivals.trackers.gaussians import likelihood
 from arrivals.trackers.kalman_type import KalmanType
 from arrivals.trackers.registry import register
-from arrivals.trackers.tangent import Angles, add, difference
+from arrivals.trackers.tangent import Angles, add, difference, spread
 from arrivals.typing import Float
 
 TINY = sys.float_info.min
@@ -162,14 +163,15 @@ class IMM(Tracker):
 
     def _weigh(self) -> None:
         """Set μ ∝ c̄ Λ, in the log domain."""
-        log = np.array([_log_likelihood(member) for member in self.filters])
-        odds = log + [math.log(p) if p > 0 else -math.inf for p in self.mu.tolist()]
-        top = odds.max()
-        weights = np.exp(odds - top)
-        total = weights.sum()
-        self.mu = weights / total
-        self.log_likelihood = float(top) + math.log(total)
-        self.likelihood = np.maximum(np.exp(log), TINY)
+        logs = [_log_likelihood(member) for member in self.filters]
+        priors = [math.log(p) if p > 0 else -math.inf for p in self.mu.tolist()]
+        odds = [log + prior for log, prior in zip(logs, priors, strict=True)]
+        top = max(odds)
+        weights = [math.exp(each - top) for each in odds]
+        total = sum(weights)
+        self.mu = np.array([weight / total for weight in weights])
+        self.log_likelihood = top + math.log(total)
+        self.likelihood = np.array([likelihood(log) for log in logs])
         self._combine()
 
     def _combine(self) -> None:
@@ -184,8 +186,8 @@ class IMM(Tracker):
     def _circular(self) -> Angles:
         if self.angles is not None:
             return self.angles
-        named = [_angles(getattr(member, "motion", None)) for member in self.filters]
-        return tuple(sorted(set().union(*named))) if any(named) else ()
+        motions = [getattr(member, "motion", None) for member in self.filters]
+        return tuple(sorted({entry for motion in motions for entry in _angles(motion)}))
 
     @property
     def estimate(self) -> StateEstimate:
@@ -201,7 +203,7 @@ def mixture(
 ) -> tuple[Float, Float]:
     """Return means and covariances of Gaussian mixtures of the same m parts.
 
-    x = Σ wᵢ xᵢ and P = Σ wᵢ (Pᵢ + xᵢxᵢᵀ) - xxᵀ, in the tangent space at the part that weighs most.
+    x = Σ wᵢ xᵢ, P = Σ wᵢ (Pᵢ + (xᵢ-x)(xᵢ-x)ᵀ), in the tangent space at the part that weighs most.
 
     Parameters
     ----------
@@ -227,9 +229,9 @@ def mixture(
     origin = means[heaviest]
     steps = difference(means, origin, angles)
     shift = weights.dot(steps)
-    second = (covariances + steps[:, :, None] * steps[:, None, :]).reshape(m, n * n)
-    P = weights.dot(second).reshape(*shift.shape, n) - shift[..., :, None] * shift[..., None, :]
-    return add(origin, shift, angles), P
+    within = weights.dot(covariances.reshape(m, n * n)).reshape(*shift.shape, n)
+    between = spread(steps - shift[..., None, :], weights)
+    return add(origin, shift, angles), within + between
 
 
 def _check_members(filters: Sequence[Filter]) -> None:

@@ -16,6 +16,7 @@ from arrivals.trackers.gaussians import (
     Correction,
     Inverse,
     apply,
+    inverse,
     predict_gaussian,
     update_gaussian,
 )
@@ -52,7 +53,7 @@ class KalmanSteps(FilterpyNames):
         self.P_prior, self.P_post = self.P.copy(), self.P.copy()
         self._known_x, self._known_P, self._dt = self.x, self.P, 1.0
         self.K, self.S, self.SI = np.zeros((n, m)), np.zeros((m, m)), np.zeros((m, m))
-        self.inv: Inverse = np.linalg.inv
+        self.inv: Inverse = inverse
         self.jitter_count = 0
         self._note_missed()
 

@@ -48,7 +48,7 @@ class KalmanType(KalmanSteps):
     log_likelihood, mahalanobis : float
         Of the last measurement; 0 if it was missed.
     inv : callable
-        Inverts S: `numpy.linalg.inv`, unless another is assigned.
+        Inverts S: `gaussians.inverse`, unless another is assigned.
     jitter_count : int
         How often `gaussians.JITTER` had to be added to a covariance.
 

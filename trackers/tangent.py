@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from arrivals.motion_models.von_mises import wrap
+from arrivals.trackers.gaussians import multiplication, transposed
 from arrivals.typing import Float
 
 Angles = tuple[int, ...]
@@ -83,4 +84,5 @@ def spread(steps: Float, weights: Float) -> Float:
     >>> spread(np.array([[1.0], [-1.0]]), np.array([0.5, 0.5]))
     array([[1.]])
     """
-    return np.asarray((weights[..., :, None] * steps).swapaxes(-1, -2) @ steps)
+    dot = multiplication(steps)
+    return dot(transposed(weights[..., :, None] * steps), steps)
