@@ -283,6 +283,10 @@ def _draw_rmse(rows: list[tuple[Any, ...]], column: int, label: str, scale: str)
                 color=COLOURS[method], label=NAMES[method])  # fmt: skip
     ax.plot([row[column] for row in mine], [row[5] for row in mine], color="black", label="bound")
     ax.set(xlabel=label, ylabel="RMSE, degrees", xscale=scale, yscale="log")
+    if scale == "log":
+        places = sorted({row[column] for row in rows})
+        ax.set_xticks(places, [f"{place:g}" for place in places])
+        ax.minorticks_off()
     ax.set_title(f"60 degrees, {mine[0][0]}")
     ax.grid(which="both", linewidth=0.3)
     ax.legend(fontsize=8)
