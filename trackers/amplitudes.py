@@ -72,13 +72,13 @@ class Amplitudes:
 
     def deltas(self) -> Float:
         """Return by how much the ELBO (56) would rise if each component were flipped."""
-        v = np.where(self.active, self.C.diagonal().real, self.nu / self.g)
-        u = np.where(self.active, self.w, self.z / self.g)
+        v, u = self.nu / self.g, self.z / self.g  # of an addition
+        np.copyto(v, self.C.diagonal().real, where=self.active)
+        np.copyto(u, self.w, where=self.active)
         gain = np.log(v) + (u.real**2 + u.imag**2) / v + self.odds
-        delta = np.where(self.active, -gain, gain)
         if np.count_nonzero(self.active) >= len(self.y) - 1:
-            delta[~self.active] = -np.inf
-        return np.asarray(delta)
+            gain[~self.active] = -np.inf
+        return np.asarray(np.negative(gain, out=gain, where=self.active))
 
     def flip(self, k: int) -> None:
         """Add component k to the support or remove it: a rank-one change of C and w."""
