@@ -174,6 +174,17 @@ def test_a_source_at_endfire_is_reported_at_endfire() -> None:
     assert np.isfinite(run.std[:, 0]).all()
 
 
+def test_a_prediction_that_left_the_physical_range_is_not_reported() -> None:
+    close = ArraySnapshot(SensorArray.ula(16, spacing=0.2), wavelength=1.0)
+    tracker = SVALSE(close)
+    tracker.run(tone([[0.3]] * 2, noise=1e-3, model=close))
+    outside = tracker.mu.copy()
+    outside[0] = 3.0  # 2π d/λ is 1.26
+    tracker.mu = outside
+    tracker.predict()
+    assert tracker.estimate.n_found == 0
+
+
 # -- what is carried --------------------------------------------------------------------------
 
 

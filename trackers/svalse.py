@@ -180,6 +180,8 @@ class SVALSE(VALSE):
         """Return what is likely to be there, before it is measured."""
         manifold = self.measurement.manifold(self.reference)
         likely = self.carried & (self.existence >= 0.5) & (self.label >= 0)
+        slack = 3 * circular_std(bessel_ratio(self.kappa))
+        likely &= ~np.isnan(manifold.to_doa(self.mu, slack))
         theta, std = self.mu[likely], circular_std(bessel_ratio(self.kappa[likely]))
         return DirectionEstimate(
             doa=manifold.to_doa(theta, slack=np.inf),
