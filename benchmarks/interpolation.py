@@ -11,6 +11,7 @@ import copy
 import os
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
@@ -21,6 +22,7 @@ from arrivals.scenarios.interpolation import InterpolationTone
 from arrivals.scenarios.interpolation_trials import draws, rms, tracker
 from arrivals.scenarios.reproduce_interpolation import convergence, moving, rmse_study, table1
 from arrivals.trackers import InterpolationEKF
+from arrivals.trackers.delay_updates import move
 from arrivals.typing import Float
 
 # 9.1: mean (variance) at 15, 30, 45, 60, 75 degrees
@@ -250,15 +252,16 @@ def array_calls(made: InterpolationEKF, samples: Float) -> int:
             calls += 1
             return super().__array_function__(func, types, args, kwargs)
 
-    filters = copy.copy(made)
-    lead = samples.shape[:1]
-    for name in ("x", "P", "frames", "n_heard", "energy"):
-        value = getattr(filters, name)
-        setattr(filters, name, np.broadcast_to(value, lead + value.shape).copy().view(Counting))
+    lead, n, parts = samples.shape[:1], made.dim_x, made._parts
+    F, Q = parts.motion.F(np.zeros(n)), parts.motion.Q()
+    x: Float = np.broadcast_to(made.x, (*lead, n)).copy().view(Counting)
+    P: Float = np.broadcast_to(made.P, (*lead, n, n)).copy().view(Counting)
+    heard = made.heard.copies(lead)
+    heard = replace(heard, frames=heard.frames.copy().view(Counting))
     for k in range(3):
         calls = 0
-        filters.predict()
-        filters._hear(samples[:, k].view(Counting))
+        heard = heard.then(samples[:, k].view(Counting))
+        x, P = parts.update(*move(x, P, F, Q), made._frames(heard), heard.n_snapshots)
     return calls
 
 

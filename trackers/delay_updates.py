@@ -7,11 +7,13 @@ any leading axes: many independent filters are one array program. What was not h
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from arrivals.measurement_models.delay_line import SourceAtCentre
 from arrivals.measurement_models.interpolation import InterpolationDelay
+from arrivals.trackers.gaussians import symmetric
 from arrivals.typing import Bool, Float
 
 
@@ -24,18 +26,6 @@ def move(x: Float, P: Float, F: Float, Q: Float) -> tuple[Float, Float]:
     (array([2.]), array([[5.]]))
     """
     return (F @ x[..., None])[..., 0], symmetric(F @ P @ F.T + Q)
-
-
-def symmetric(P: Float) -> Float:
-    """Return (P + Pᵀ) / 2.
-
-    Examples
-    --------
-    >>> symmetric(np.array([[1.0, 2.0], [0.0, 1.0]]))
-    array([[1., 1.],
-           [1., 1.]])
-    """
-    return (P + np.swapaxes(P, -1, -2)) / 2
 
 
 def fuse(x: Float, P: Float, e: Float, H: Float, R: Float) -> tuple[Float, Float]:
@@ -69,6 +59,14 @@ def kept(e: Float, variance: Float, gate: float | None) -> Bool:
     """
     inside = np.isfinite(e)
     return inside if gate is None else inside & (e * e <= gate**2 * variance)
+
+
+class Seen(NamedTuple):
+    """What a snapshot says of a state, to first order: one residual y = H d + v for each sensor."""
+
+    y: Float  # (..., n_sensors), 0 where a sensor says nothing
+    H: Float  # (..., n_sensors, dim_x), 0 there too
+    R: Float  # variances of v, (..., n_sensors)
 
 
 @dataclass(frozen=True)
@@ -119,20 +117,44 @@ class Neighbours:
             step = 1 if self.each_sensor else look.dim_z
             for first in range(0, look.dim_z, step):
                 sensors = slice(first, first + step)
-                x, P = self._corrected(x, P, look, z[..., sensors], X[..., sensors, :])
+                x, P = fuse(x, P, *self._residuals(x, P, look, z[..., sensors], X[..., sensors, :]))
+                x[..., 0] = np.clip(x[..., 0], -self.kappa, self.kappa)
         return x, P
 
-    def _corrected(
+    def linearise(self, x: Float, P: Float, frames: Float) -> Seen:
+        """Return what the newest of `frames` says near beliefs, all looks of a sensor as one.
+
+        The looks l of a sensor have residuals e, slopes h and variances r. Of the delay they say
+        as much as one residual y with the slope H and the variance R of the first look, where
+        H² / R = Σ h² / r and H y / R = Σ h e / r.
+        """
+        newest = frames.shape[-2] - 1
+        information, gradient, sign = np.zeros((3, *frames.shape[:-2], frames.shape[-1]))
+        R = self.looks[0].linearise(x[..., 0])[1][..., None]
+        for look in self.looks:
+            z, X = look.split(frames, newest - (self.latency if self.aligned else look.latency))
+            e, h, r = self._residuals(x, P, look, z, X)
+            sensors = slice(max(look.baseline, 0), max(look.baseline, 0) + look.dim_z)
+            information[..., sensors] += h * h / r[..., None]
+            gradient[..., sensors] += h * e / r[..., None]
+            sign[..., sensors] += (sign[..., sensors] == 0) * np.sign(h)
+        slope = sign * np.sqrt(information * R)
+        heard = slope != 0
+        y = np.where(heard, gradient * R / np.where(heard, slope, 1.0), 0.0)
+        H = np.zeros((*slope.shape, x.shape[-1]))
+        H[..., 0] = slope
+        return Seen(y, H, R + np.zeros_like(y))
+
+    def _residuals(
         self, x: Float, P: Float, look: InterpolationDelay, z: Float, X: Float
-    ) -> tuple[Float, Float]:
+    ) -> tuple[Float, Float, Float]:
+        """Return residuals, slopes and variance of a look; 0 where one is not used."""
         taps, R = look.linearise(x[..., 0])
         foretold = taps @ np.swapaxes(X, -1, -2)  # X c and X c', (..., 2, n)
         e, H = z - foretold[..., 0, :], look.baseline * foretold[..., 1, :]
         used = kept(e, H * H * P[..., :1, 0] + R[..., None], self.gate)
         used &= self._unambiguous(look.baseline, P)[..., None]
-        x, P = fuse(x, P, np.where(used, e, 0.0), np.where(used, H, 0.0), R)
-        x[..., 0] = np.clip(x[..., 0], -self.kappa, self.kappa)
-        return x, P
+        return np.where(used, e, 0.0), np.where(used, H, 0.0), R
 
     def _unambiguous(self, baseline: int, P: Float) -> Bool:
         """Tell where a longer baseline's phase is known well enough to be no cycle off."""
@@ -162,11 +184,7 @@ class AllSensors:
 
     def update(self, x: Float, P: Float, frames: Float) -> tuple[Float, Float]:
         """Correct beliefs by the newest of `frames`, (..., span or more, n_sensors)."""
-        h, H, R = self.line.linearise(x)
-        e = frames[..., -1, :] - h
-        variance = ((H @ P) * H).sum(axis=-1) + R
-        used = kept(e, variance, self.gate)
-        e, H = np.where(used, e, 0.0), np.where(used[..., None], H, 0.0)
+        e, H, R = self.linearise(x, P, frames)
         HP = H @ P
         S = HP @ np.swapaxes(H, -1, -2) + R[..., None] * np.eye(R.shape[-1])
         K = np.swapaxes(np.linalg.solve(S, HP), -1, -2)
@@ -175,3 +193,10 @@ class AllSensors:
         P = I_KH @ P @ np.swapaxes(I_KH, -1, -2) + (K * R[..., None, :]) @ np.swapaxes(K, -1, -2)
         x[..., 0] = np.clip(x[..., 0], -self.kappa, self.kappa)
         return x, symmetric(P)
+
+    def linearise(self, x: Float, P: Float, frames: Float) -> Seen:
+        """Return what the newest of `frames` says near beliefs."""
+        h, H, R = self.line.linearise(x)
+        e = frames[..., -1, :] - h
+        used = kept(e, ((H @ P) * H).sum(axis=-1) + R, self.gate)
+        return Seen(np.where(used, e, 0.0), np.where(used[..., None], H, 0.0), R)

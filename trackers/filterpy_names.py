@@ -21,9 +21,14 @@ class FilterpyNames(Tracker):
     _dt: float
 
     @property
+    def state_motion(self) -> MotionModel:
+        """How the whole state moves: `motion`, unless a method puts more into the state."""
+        return self.motion
+
+    @property
     def dim_x(self) -> int:
         """Number of entries of the state."""
-        return self.motion.dim_x
+        return self.state_motion.dim_x
 
     @property
     def dim_z(self) -> int:
@@ -38,17 +43,17 @@ class FilterpyNames(Tracker):
     @property
     def F(self) -> Float:
         """Jacobian of the motion at the present mean, for the length of the last step."""
-        return self.motion.F(np.ravel(self.x), self._dt)
+        return self.state_motion.F(np.ravel(self.x), self._dt)
 
     @property
     def Q(self) -> Float:
         """Noise of the motion, for the length of the last step."""
-        return self.motion.Q(self._dt)
+        return self.state_motion.Q(self._dt)
 
     @property
     def B(self) -> Float | None:
         """Control matrix of the motion, None if it has none."""
-        control: Float | None = getattr(self.motion, "control", None)
+        control: Float | None = getattr(self.state_motion, "control", None)
         return control
 
     @property

@@ -2,66 +2,35 @@
 
 from __future__ import annotations
 
-import copy
 import time
 import warnings
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
-from functools import lru_cache
-from typing import Any, Literal, Self, TypeAlias
+from dataclasses import replace
+from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from arrivals.checks import count, instance, not_negative, number, one_of, positive
-from arrivals.measurement_models.correlation import SourceCorrelation, Tones
-from arrivals.measurement_models.delay_line import DelayLine, Phasor, SourceAtCentre
-from arrivals.measurement_models.interpolation import (
-    DelayInterpolator,
-    InterpolationDelay,
-    window,
-)
+from arrivals.checks import count, instance, number, one_of, positive
 from arrivals.measurement_models.samples import ArraySamples
 from arrivals.motion_models.base import MotionModel
 from arrivals.motion_models.delay import DelayWalk
-from arrivals.motion_models.linear import LinearMotion
-from arrivals.motion_models.stacked import Stacked
-from arrivals.trackers.base import Tracker, missed
-from arrivals.trackers.delay_updates import AllSensors, Neighbours, move
+from arrivals.trackers.base import missed
+from arrivals.trackers.delay_recipes import LOBE, VARIANTS, Parts, Recipe, Variant, assembled
+from arrivals.trackers.delay_updates import Seen, move
 from arrivals.trackers.estimates import DirectionEstimate
+from arrivals.trackers.gaussians import Correction, apply, symmetric, update_gaussian
+from arrivals.trackers.given import noise_matrix
+from arrivals.trackers.heard import Heard
+from arrivals.trackers.kalman_type import KalmanType
+from arrivals.trackers.linearised import Linear
 from arrivals.trackers.recorder import Run
 from arrivals.trackers.registry import register
 from arrivals.typing import Float
 
-Variant: TypeAlias = Literal["B", "Bw", "C", "D", "E", "E2", "phasor"]
-LOBE = 0.12  # of κ: the largest standard deviation of a delay that the joint filters start from
-
-
-@dataclass(frozen=True)
-class Recipe:
-    """What a variant is made of; None leaves the choice to the source and the array."""
-
-    offsets: tuple[int, ...] | None = None
-    loading: float | None = None
-    baselines: tuple[int, ...] = (1,)
-    both_ways: bool = False
-    joint: Literal["delay_line", "phasor"] | None = None
-    acquire: bool = False
-
-
-VARIANTS: dict[str, Recipe] = {
-    "B": Recipe(offsets=(0, 1), loading=0.0),
-    "Bw": Recipe(offsets=(0, 1)),
-    "C": Recipe(both_ways=True),
-    "D": Recipe(baselines=(1, 2, 4, 7)),
-    "E": Recipe(joint="delay_line"),
-    "E2": Recipe(both_ways=True, joint="delay_line", acquire=True),
-    "phasor": Recipe(joint="phasor"),
-}
-
 
 @register("interpolation_ekf")
-class InterpolationEKF(Tracker):
+class InterpolationEKF(KalmanType):
     """Direction of one source from the delay at which neighbours interpolate each other.
 
     Parameters
@@ -102,6 +71,11 @@ class InterpolationEKF(Tracker):
     x, P : ndarray, shape (dim_x,), (dim_x, dim_x)
         The delay between neighbours, samples, then what else the motion carries; then, in "E",
         the source's waveform at the array's centre.
+    y, H, R, K, S : ndarray
+        As in every `KalmanType`, one row a sensor. `y` is what a sensor's samples say of the delay
+        beyond the mean, all that is foretold of it from its neighbours taken together; 0 where
+        nothing is. With one baseline in one direction, and in "E", it is the plain residual of the
+        snapshot `latency` steps ago. The samples are scaled to a source of power 1.
     latency : int
         Snapshots after its own for which a correction waits: an estimate describes the source so
         many snapshots ago.
@@ -133,7 +107,7 @@ class InterpolationEKF(Tracker):
 
     Examples
     --------
-    >>> from arrivals.measurement_models import SensorArray
+    >>> from arrivals.measurement_models import SensorArray, Tones
     >>> array = SensorArray.ula(10, spacing=0.5, speed=1000.0)
     >>> model = ArraySamples(array, rate=4000.0, correlation=Tones(0.25), snr_db=20.0)
     >>> lag = model.places * model.delay(np.deg2rad(40.0))
@@ -142,6 +116,8 @@ class InterpolationEKF(Tracker):
     >>> np.rad2deg(tracker.run(z).doa[-1]).round(1), tracker.latency
     (array([40.]), 3)
     """
+
+    measurement: ArraySamples  # type: ignore[assignment]  # its h depends on what was heard
 
     def __init__(
         self,
@@ -184,28 +160,47 @@ class InterpolationEKF(Tracker):
         parts = self._parts
         delay = float(self.measurement.delay(self.doa))
         self.x, self.P = parts.start(delay, self._delay_std() ** 2, self.rate_std)
-        self.frames = np.full((parts.span, parts.n_places), np.nan)
-        self.n_snapshots = 0
-        self.n_heard, self.energy = np.zeros(()), np.zeros(())
+        self._start()
+        self.heard = Heard.nothing(parts.span, parts.n_places)
 
-    def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
-        """Move the delay, and the source's waveform if it is part of the state."""
-        motion = self.state_motion
-        F = motion.F(np.zeros(motion.dim_x), dt)
-        self.x, self.P = move(self.x, self.P, F, motion.Q(dt))
+    def update(
+        self, z: ArrayLike | None, R: ArrayLike | None = None, H: ArrayLike | None = None
+    ) -> None:
+        """Correct the belief by a snapshot.
 
-    def update(self, z: ArrayLike | None) -> None:
-        """Correct the delay by one snapshot, (n_sensors,), real; leave out what is NaN."""
-        n = self.measurement.array.n_sensors
-        snapshot = np.full(n, np.nan) if z is None or missed(z) else np.asarray(z)
-        if snapshot.ndim != 1:
-            raise ValueError(f"a snapshot must have shape ({n},); got {snapshot.shape}")
-        self._hear(self.measurement.frame(snapshot))
+        Parameters
+        ----------
+        z : array_like, shape (n_sensors,) or (n_sensors, 1), real
+            NaN where a sample is missing, None where all are.
+        R : float or array_like, shape (n_sensors, n_sensors), optional
+            In place of the noise of `y`, which then is one vector measurement, linear at the
+            present mean; scaled to a source of power 1.
+        H : array_like, shape (m, dim_x), optional
+            For once another measurement of the state, z = H x + v with z (m,): no snapshot.
+        """
+        if H is not None:
+            super().update(z, self.measurement.noise_ratio if R is None else R, H)
+            return
+        x, P = self._belief()
+        snapshot = self._snapshot(z)
+        noise = None if R is None else noise_matrix(R, self.dim_z)
+        heard = self.heard.then(self.measurement.frame(snapshot))
+        found = self._by_sensors(x, P, heard, noise)
+        if noise is None:
+            x, P = self._parts.update(x, P, self._frames(heard), heard.n_snapshots)
+            found = found._replace(x=x, P=P)
+        self.hold(found.x, found.P)
+        self.heard = heard
+        if missed(snapshot):
+            self._note_missed()
+        else:
+            self._note(snapshot, found)
+        self.x_post, self.P_post = self.x.copy(), self.P.copy()
 
     @property
-    def estimate(self) -> DirectionEstimate:
+    def estimate(self) -> DirectionEstimate:  # type: ignore[override]  # what users ask for
         """The direction, and the filter's own standard deviation of it."""
-        doa, std = self._direction(self.x, self.P)
+        doa, std = self._direction(np.ravel(self.x), self.P)
         nan = np.full(1, np.nan)
         return DirectionEstimate(
             doa=doa[None], std=std[None], existence=nan, amplitude=nan.astype(complex),
@@ -216,6 +211,21 @@ class InterpolationEKF(Tracker):
     def state_motion(self) -> MotionModel:
         """How the whole state moves: the delay, and the source's waveform if it is part of it."""
         return self._parts.motion
+
+    @property
+    def dim_z(self) -> int:
+        """Number of sensors."""
+        return self.measurement.array.n_sensors
+
+    @property
+    def H(self) -> Float:
+        """Slopes of `y`, at the present mean and the newest snapshots, (n_sensors, dim_x)."""
+        return self._seen(np.ravel(self.x), self.P, self.heard).H
+
+    @property
+    def R(self) -> Float:
+        """Noise of `y` at the present mean, scaled to a source of power 1."""
+        return np.diag(self._seen(np.ravel(self.x), self.P, self.heard).R)
 
     @property
     def latency(self) -> int:
@@ -265,23 +275,24 @@ class InterpolationEKF(Tracker):
             raise ValueError(
                 f"measurements must have shape (..., n_steps, n_sensors); got {frames.shape}"
             )
-        filters = copy.copy(self)
-        for name in ("x", "P", "frames", "n_heard", "energy"):
-            value = getattr(self, name)
-            setattr(filters, name, np.broadcast_to(value, frames.shape[:-2] + value.shape))
-        xs = np.empty((*frames.shape[:-1], self.x.size))
-        Ps = np.empty((*frames.shape[:-1], self.x.size, self.x.size))
+        n, shape, parts = self.dim_x, frames.shape[:-2], self._parts
+        F, Q = parts.motion.F(np.zeros(n), dt), parts.motion.Q(dt)
+        x, P = self._belief()
+        x, P = np.broadcast_to(x, (*shape, n)), np.broadcast_to(P, (*shape, n, n))
+        heard = self.heard.copies(shape)
+        xs, Ps = np.empty((*frames.shape[:-1], n)), np.empty((*frames.shape[:-1], n, n))
         for k in range(frames.shape[-2]):
-            filters.predict(dt=dt)
-            filters._hear(frames[..., k, :])
-            xs[..., k, :], Ps[..., k, :, :] = filters.x, filters.P
+            heard = heard.then(frames[..., k, :])
+            x, P = parts.update(*move(x, P, F, Q), self._frames(heard), heard.n_snapshots)
+            xs[..., k, :], Ps[..., k, :, :] = x, P
         return xs, Ps
 
     def set_params(self, **params: Any) -> Self:
         """Change parameters by name; keep the belief where it still fits, else start again."""
         super().set_params(**params)
         parts = self._parts
-        if self.frames.shape != (parts.span, parts.n_places) or len(self.x) != parts.motion.dim_x:
+        spans = (parts.span, parts.n_places)
+        if self.heard.frames.shape != spans or len(self.x) != parts.motion.dim_x:
             self.restart()
         return self
 
@@ -300,9 +311,9 @@ class InterpolationEKF(Tracker):
         )
 
     @property
-    def _parts(self) -> _Parts:
+    def _parts(self) -> Parts:
         """The models that do the work; the same ones as long as no parameter changes."""
-        return _assembled(
+        return assembled(
             self.measurement, self.motion, self.recipe, self.each_sensor, self.aligned,
             self.drive, self.acquisition, self.gate, self.extrapolate,
         )  # fmt: skip
@@ -325,27 +336,44 @@ class InterpolationEKF(Tracker):
 
     # -- one snapshot --------------------------------------------------------------------------
 
-    def _hear(self, frame: Float) -> None:
-        """Correct beliefs by snapshots, (..., n_places)."""
-        parts, n = self._parts, self.n_snapshots + 1
-        frames = np.concatenate([self.frames[..., 1:, :], frame[..., None, :]], axis=-2)
-        n_heard = self.n_heard + np.isfinite(frame).sum(axis=-1)
-        energy = self.energy + np.nansum(frame * frame, axis=-1)
-        scaled = frames / np.sqrt(self._power(energy, n_heard))[..., None, None]
-        acquiring = parts.acquire is not None and n <= self.acquisition
-        stage = parts.acquire if parts.acquire is not None and acquiring else parts.last
-        x, P = stage.update(self.x, self.P, scaled)
-        if acquiring and n == self.acquisition:
-            x, P = parts.replayed(x, P, scaled[..., -n:, :])
-        self.x, self.P, self.frames = x, P, frames
-        self.n_snapshots, self.n_heard, self.energy = n, n_heard, energy
+    def _moved(
+        self, x: Float, P: Float, dt: float, F: ArrayLike | None, Q: ArrayLike | None
+    ) -> tuple[Float, Float]:
+        x, P = super()._moved(x, P, dt, F, Q)
+        return x, symmetric(P)
 
-    def _power(self, energy: Float, n_heard: Float) -> Float:
-        """Return the source's power, given or learned: total power over 1 + ε."""
-        if self.measurement.power is not None:
-            return np.full(energy.shape, self.measurement.power)
-        mean = energy / np.maximum(n_heard, 1)
-        return np.maximum(mean / (1 + self.measurement.noise_ratio), np.finfo(float).tiny)
+    def linear_motion(self, x: Float, P: Float, dt: float) -> Linear:
+        """Return F x and F."""
+        F = self.state_motion.F(np.zeros(self.dim_x), dt)
+        return Linear(apply(F, x), F)
+
+    def linear_measurement(self, x: Float, P: Float) -> Linear:
+        """Return what is expected of `y`, nothing, and its slopes."""
+        return Linear(np.zeros(self.dim_z), self._seen(x, P, self.heard).H)
+
+    def _snapshot(self, z: ArrayLike | None) -> NDArray[Any]:
+        n = self.dim_z
+        snapshot = np.full(n, np.nan) if z is None or missed(z) else np.asarray(z)
+        if snapshot.shape == (n, 1):
+            return snapshot[:, 0]
+        if snapshot.ndim != 1:
+            raise ValueError(f"a snapshot must have shape ({n},) or ({n}, 1); got {snapshot.shape}")
+        return snapshot
+
+    def _frames(self, heard: Heard) -> Float:
+        return heard.scaled(self.measurement.power, self.measurement.noise_ratio)
+
+    def _seen(self, x: Float, P: Float, heard: Heard) -> Seen:
+        """Return what the newest snapshot says near a belief, in the order of the sensors."""
+        stage, places = self._parts.stage(max(heard.n_snapshots, 1)), self.measurement.places
+        y, H, R = stage.linearise(x, P, self._frames(heard))
+        return Seen(y[places], H[places], R[places])
+
+    def _by_sensors(self, x: Float, P: Float, heard: Heard, R: Float | None) -> Correction:
+        """Correct a belief by one vector update of what the sensors say."""
+        y, H, own = self._seen(x, P, heard)
+        silent = np.asarray(~H.any(axis=-1))
+        return update_gaussian(x, P, y, H, np.diag(own) if R is None else R, silent, self.inv)
 
     def _direction(self, x: Float, P: Float) -> tuple[Float, Float]:
         delay, variance = x[..., 0], np.maximum(P[..., 0, 0], 0.0)
@@ -368,118 +396,3 @@ def _run(doa: Float, std: Float, x: Float, dt: float, elapsed: float) -> Run:
     }
     ones = np.ones(n, dtype=np.int64)
     return Run(DirectionEstimate, fields, x, ones, dt * np.arange(n, dtype=np.float64), elapsed)
-
-
-@dataclass(frozen=True)
-class _Parts:
-    """The models that a recipe makes of a source, an array and a motion."""
-
-    motion: MotionModel
-    acquire: Neighbours | None
-    last: Neighbours | AllSensors
-    kappa: float
-    n_places: int
-    acquisition: int
-
-    @property
-    def joint(self) -> SourceAtCentre | None:
-        return self.last.line if isinstance(self.last, AllSensors) else None
-
-    @property
-    def n_delay(self) -> int:
-        """Elements of the state that come before the source's."""
-        return self.motion.dim_x - (0 if self.joint is None else self.joint.dim_source)
-
-    @property
-    def span(self) -> int:
-        return self.last.span if self.acquire is None else max(self.acquire.span, self.acquisition)
-
-    def start(self, delay: float, variance: float, rate_std: float) -> tuple[Float, Float]:
-        """Return the belief before anything is heard."""
-        x, P = np.zeros(self.motion.dim_x), np.zeros((self.motion.dim_x, self.motion.dim_x))
-        P[np.diag_indices(self.n_delay)] = (self.kappa * rate_std) ** 2
-        x[0], P[0, 0] = delay, variance
-        if self.joint is not None:
-            P[self.n_delay :, self.n_delay :] = self.joint.covariance
-        return x, P
-
-    def replayed(self, x: Float, P: Float, frames: Float) -> tuple[Float, Float]:
-        """Start the joint filter where acquisition ended, and let it hear `frames` again."""
-        n = self.n_delay
-        fresh, prior = self.start(0.0, 0.0, 0.0)
-        fresh, prior = np.zeros_like(x) + fresh, np.zeros_like(P) + prior
-        fresh[..., :n], prior[..., :n, :n] = x[..., :n], P[..., :n, :n]
-        prior[..., 0, 0] = np.minimum(2 * P[..., 0, 0], (LOBE * self.kappa) ** 2)
-        x, P = fresh, prior
-        F, Q = self.motion.F(np.zeros(self.motion.dim_x)), self.motion.Q()
-        for k in range(frames.shape[-2]):
-            x, P = self.last.update(*move(x, P, F, Q), frames[..., k : k + 1, :])
-        return x, P
-
-
-@lru_cache(maxsize=128)
-def _assembled(
-    measurement: ArraySamples,
-    motion: MotionModel,
-    recipe: Recipe,
-    each_sensor: bool,
-    aligned: bool,
-    drive: float | None,
-    acquisition: int,
-    gate: float | None,
-    extrapolate: bool,
-) -> _Parts:
-    """Build the parts of a recipe."""
-    kappa, n_places = measurement.kappa, measurement.n_places
-    line = _line(measurement, recipe, drive)
-    looks, highest = _looks(measurement, recipe, extrapolate), measurement.correlation.highest
-    neighbours = Neighbours(looks, kappa, highest, each_sensor, aligned, gate)
-    if line is None:
-        return _Parts(motion, None, neighbours, kappa, n_places, acquisition)
-    both = Stacked(motion, LinearMotion(line.transition, line.innovation))
-    first = neighbours if recipe.acquire else None
-    return _Parts(both, first, AllSensors(line, kappa, gate), kappa, n_places, acquisition)
-
-
-def _line(measurement: ArraySamples, recipe: Recipe, drive: float | None) -> SourceAtCentre | None:
-    n, ratio, source = measurement.n_places, measurement.noise_ratio, measurement.correlation
-    if recipe.joint is None:
-        return None
-    if recipe.joint == "delay_line":
-        return DelayLine(n, ratio, source, measurement.kappa, drive)
-    if not isinstance(source, Tones) or source.order != 2:
-        raise ValueError(f"variant 'phasor' is for one tone; the source is {source!r}")
-    return Phasor(n, ratio, source.highest, 1e-2 if drive is None else drive)
-
-
-def _looks(
-    measurement: ArraySamples, recipe: Recipe, extrapolate: bool
-) -> tuple[InterpolationDelay, ...]:
-    """Return the models of all baselines, forwards and, if wanted, backwards."""
-    source, kappa, ratio = measurement.correlation, measurement.kappa, measurement.noise_ratio
-    loading = ratio if recipe.loading is None else not_negative("loading", recipe.loading)
-    looks = []
-    for m in recipe.baselines:
-        if m >= measurement.n_places:
-            continue
-        own = recipe.offsets if m == 1 else None
-        offsets = window(m * kappa) if own is None else own
-        if not extrapolate:
-            _check_reach(source, offsets, m * kappa)
-        taps = DelayInterpolator(source, offsets, loading)
-        inflation = 3.0 if len(recipe.baselines) > 1 else 1.0
-        looks += [
-            InterpolationDelay(taps, measurement.n_places, ratio, way * m, inflation)
-            for way in ((1, -1) if recipe.both_ways else (1,))
-        ]
-    return tuple(looks)
-
-
-def _check_reach(source: SourceCorrelation, offsets: tuple[int, ...], reach: float) -> None:
-    """Refuse taps that would have to extrapolate; tones may, it is exact for them."""
-    exact = source.order is not None and len(offsets) >= source.order
-    if not exact and not min(offsets) - 1 <= -reach + 1e-9 <= reach - 1e-9 <= max(offsets):
-        raise ValueError(
-            f"delays reach ±{reach:.4g} samples, which taps {offsets} cannot serve on this "
-            f"source: use offsets={window(reach)}"
-        )

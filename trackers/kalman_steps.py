@@ -95,7 +95,7 @@ class KalmanSteps(FilterpyNames):
         step = self._controlled(u, B)
         x, P = self._moved(x, P, dt, F, Q)
         if step is not None:
-            x = add(x, step, self.motion.angles)
+            x = add(x, step, self.state_motion.angles)
         self.hold(x, P)
         self._dt = dt
         self.x_prior, self.P_prior = self.x.copy(), P.copy()
@@ -134,7 +134,7 @@ class KalmanSteps(FilterpyNames):
         self, x: Float, P: Float, dt: float, F: ArrayLike | None, Q: ArrayLike | None
     ) -> tuple[Float, Float]:
         near = self._near(x, P, dt, F)
-        noise = self.motion.Q(dt) if Q is None else self._process_noise(Q)
+        noise = self.state_motion.Q(dt) if Q is None else self._process_noise(Q)
         return near.mean, predict_gaussian(P, near.matrix, near.noise(noise))
 
     def _near(self, x: Float, P: Float, dt: float, F: ArrayLike | None) -> Linear:
@@ -153,7 +153,7 @@ class KalmanSteps(FilterpyNames):
             z = np.where(missing, near.mean, z)
         y = self.measurement.residual(z, near.mean) if H is None else z - near.mean
         found = update_gaussian(x, P, y, near.matrix, near.noise(R), missing, self.inv)
-        angles = self.motion.angles
+        angles = self.state_motion.angles
         if angles or near.jittered:
             jittered = found.jittered + near.jittered
             found = found._replace(x=wrapped(found.x, angles), jittered=jittered)
@@ -163,7 +163,7 @@ class KalmanSteps(FilterpyNames):
 
     def _belief(self, fresh: bool = False) -> tuple[Float, Float]:
         """Return mean (n,) and covariance, checked if they were assigned since the last call."""
-        n = self.motion.dim_x
+        n = self.state_motion.dim_x
         if not fresh and self.x is self._known_x and self.P is self._known_P:
             return self.x.reshape(n), self.P
         x = real("x", self.x)

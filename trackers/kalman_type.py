@@ -166,11 +166,11 @@ class KalmanType(KalmanSteps):
         x, Pp, K = means.reshape(n_steps, n).copy(), P.copy(), np.zeros_like(P)
         Fs, Qs = each_step("Fs", Fs, n_steps), each_step("Qs", Qs, n_steps)
         us, dts = each_step("us", us, n_steps), each_step("dts", dts, n_steps)
-        angles = self.motion.angles
+        angles = self.state_motion.angles
         for k in range(n_steps - 2, -1, -1):
             dt = 1.0 if dts[k + 1] is None else dts[k + 1]
             near = self._near(x[k], P[k], dt, Fs[k + 1])
-            Q = self.motion.Q(dt) if Qs[k + 1] is None else self._process_noise(Qs[k + 1])
+            Q = self.state_motion.Q(dt) if Qs[k + 1] is None else self._process_noise(Qs[k + 1])
             Pp[k], _, _ = cholesky(predict_gaussian(P[k], near.matrix, near.noise(Q)))
             step = self._controlled(us[k + 1], None)
             x_next = near.mean if step is None else near.mean + step
