@@ -5,10 +5,10 @@ from __future__ import annotations
 import argparse
 import csv
 import importlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from arrivals.checks import count, one_of
 from arrivals.trackers.recorder import replacing, text
@@ -16,6 +16,7 @@ from arrivals.trackers.recorder import replacing, text
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+T = TypeVar("T")
 QUICK = 10  # runs of a study that is only looked at
 
 # Where each study lives: a function of the number of runs and the seed. A new one gets its line.
@@ -88,8 +89,29 @@ def _cell(value: Any) -> str:
     return str(value)
 
 
+def spread(function: Callable[..., T], cases: Iterable[Sequence[Any]]) -> list[T]:
+    """Call a function with the arguments of every case, on as many processes as joblib is told.
+
+    Inside `joblib.parallel_config(n_jobs=...)` that many, else in this one; the results are those
+    of a loop, in its order.
+
+    Examples
+    --------
+    >>> spread(pow, [(2, 3), (3, 2)])
+    [8, 9]
+    """
+    from joblib import Parallel, delayed
+
+    return list(Parallel()(delayed(function)(*case) for case in cases))
+
+
 def reproduce(
-    name: str, out: str | Path, runs: int | None = None, seed: int = 0, quick: bool = False
+    name: str,
+    out: str | Path,
+    runs: int | None = None,
+    seed: int = 0,
+    quick: bool = False,
+    jobs: int = 1,
 ) -> list[Path]:
     """Run a study, and write NAME.csv, its pictures as NAME-*.png, and NAME.md.
 
@@ -103,6 +125,8 @@ def reproduce(
         Trials of each case; 100, or 10 if `quick`.
     seed : int
     quick : bool
+    jobs : int
+        Processes to use, -1 for one a core; the numbers are the same with any.
 
     Returns
     -------
@@ -120,12 +144,17 @@ def reproduce(
     Traceback (most recent call last):
     ValueError: name must be one of 'interpolation-table1', ...; got 'interpolation-table9'
     """
+    from joblib import parallel_config
+
+    if jobs != -1:
+        count("jobs", jobs)
     module, _, function = STUDIES[one_of("name", name, tuple(STUDIES))].partition(":")
     n_runs = (QUICK if quick else 100) if runs is None else count("runs", runs, least=2)
     study: Callable[[int, int], Report] = getattr(importlib.import_module(module), function)
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
-    report = study(n_runs, seed)
+    with parallel_config(n_jobs=jobs):
+        report = study(n_runs, seed)
     report.to_csv(folder / f"{name}.csv")
     pictures = [f"{name}-{key}.png" for key in report.figures]
     for picture, figure in zip(pictures, report.figures.values(), strict=True):
@@ -149,12 +178,15 @@ def add_reproduce(commands: Any) -> None:
     add.add_argument("--runs", type=int, metavar="N", help="trials of each case (100)")
     add.add_argument("--seed", type=int, default=0, metavar="N", help="(0)")
     add.add_argument("--quick", action="store_true", help=f"{QUICK} trials of each case")
+    add.add_argument("--jobs", type=int, default=1, metavar="N",
+                     help="processes, -1 for one a core (1)")  # fmt: skip
     add.set_defaults(command=_reproduce)
 
 
 def _reproduce(arguments: argparse.Namespace) -> None:
     written = reproduce(
-        arguments.name, arguments.out, arguments.runs, arguments.seed, arguments.quick
-    )
+        arguments.name, arguments.out, arguments.runs, arguments.seed, arguments.quick,
+        arguments.jobs,
+    )  # fmt: skip
     for path in written:
         print(path)

@@ -29,7 +29,7 @@ from arrivals.scenarios.interpolation_trials import (
     rms,
     scanned,
 )
-from arrivals.scenarios.reproduce import Report
+from arrivals.scenarios.reproduce import Report, spread
 from arrivals.typing import Float
 
 if TYPE_CHECKING:
@@ -69,16 +69,8 @@ COLOURS = {"B": "#d62728", "C": "#ff7f0e", "D": "#9467bd", "E": "#2ca02c", "E2":
 def table1(runs: int, seed: int) -> Report:
     """Means and variances at 5 dB for five directions, three kinds of source, seven methods."""
     methods = ("B", "Bw", "C", "D", "E2", "conventional", "mvdr", "mvdr on the grid")
-    rows: list[tuple[Any, ...]] = []
-    for name, source in SOURCES.items():
-        for method in methods:
-            for n, doa in enumerate(ANGLES):
-                scenario = source.replace(doa_deg=doa)
-                ends = found(scenario, runs, seed + n, method, doa - 10)
-                paper = PAPER.get(method.removesuffix(" on the grid"), ((np.nan,) * 2,) * 5)[n]
-                rows.append(
-                    (name, method, doa, *mean_and_variance(ends), *paper, bound_deg(scenario) ** 2)
-                )
+    cases = [(name, m, n, runs, seed) for name in SOURCES for m in methods for n in range(5)]
+    rows = spread(_table1_row, cases)
     remarks = (
         "The paper does not say what its source was; its figures stand beside all three of ours.",
         "Not reproduced: the paper's means of its own method, 0.99 degrees low at four angles and "
@@ -96,6 +88,14 @@ def table1(runs: int, seed: int) -> Report:
                "bound")  # fmt: skip
     title = f"Table 1: mean and variance at 5 dB, {runs} trials"
     return Report(title, columns, rows, remarks, {"table1": _draw_table1(rows)})
+
+
+def _table1_row(name: str, method: str, n: int, runs: int, seed: int) -> tuple[Any, ...]:
+    scenario = SOURCES[name].replace(doa_deg=ANGLES[n])
+    ends = found(scenario, runs, seed + n, method, ANGLES[n] - 10)
+    paper = PAPER.get(method.removesuffix(" on the grid"), ((np.nan,) * 2,) * 5)[n]
+    bound = bound_deg(scenario) ** 2
+    return (name, method, ANGLES[n], *mean_and_variance(ends), *paper, bound)
 
 
 def _draw_table1(rows: list[tuple[Any, ...]]) -> Figure:
@@ -221,16 +221,18 @@ def _three_methods(runs: int, seed: int) -> Figure:
 
 def rmse_study(runs: int, seed: int) -> Report:
     """RMSE at 60 degrees against the number of snapshots, and against the SNR."""
-    rows: list[tuple[Any, ...]] = []
-    methods = ("B", "C", "D", "E2", "conventional", "mvdr")
-    for n, n_steps in enumerate((12, 25, 50, 100, 200, 400)):
-        longer = SOURCES["tone"].replace(n_steps=n_steps)
-        rows += _rmse_rows("tone", longer, methods, runs, seed + n, 50.0)
-    late = ("B", "C", "D", "E", "conventional", "mvdr")
-    for name in ("tone", "band"):
-        for n, snr_db in enumerate((-10.0, -5.0, 0.0, 5.0, 10.0, 15.0, 20.0)):
-            louder = SOURCES[name].replace(snr_db=snr_db)
-            rows += _rmse_rows(name, louder, late, runs, seed + n, 55.0)
+    cases = [
+        ("tone", SOURCES["tone"].replace(n_steps=n_steps), method, runs, seed + n, 50.0)
+        for n, n_steps in enumerate((12, 25, 50, 100, 200, 400))
+        for method in ("B", "C", "D", "E2", "conventional", "mvdr")
+    ]
+    cases += [
+        (name, SOURCES[name].replace(snr_db=snr_db), method, runs, seed + n, 55.0)
+        for name in ("tone", "band")
+        for n, snr_db in enumerate((-10.0, -5.0, 0.0, 5.0, 10.0, 15.0, 20.0))
+        for method in ("B", "C", "D", "E", "conventional", "mvdr")
+    ]
+    rows = spread(_rmse_row, cases)
     figures = {
         "fig7": _draw_rmse([row for row in rows if row[-1] == 50.0], 2, "snapshots", "log"),
         "fig8": _draw_rmse(
@@ -253,21 +255,12 @@ def rmse_study(runs: int, seed: int) -> Report:
     return Report(title, columns, rows, remarks, figures)
 
 
-def _rmse_rows(
-    name: str,
-    scenario: InterpolationScenario,
-    methods: tuple[str, ...],
-    runs: int,
-    seed: int,
-    start: float,
-) -> list[tuple[Any, ...]]:
-    bound = bound_deg(scenario)
-    return [
-        (name, scenario.snr_db, scenario.n_steps, method,
-         rms(found(scenario, runs, seed, method, start_of(method, start)) - scenario.doa_deg),
-         bound, start)
-        for method in methods
-    ]  # fmt: skip
+def _rmse_row(
+    name: str, scenario: InterpolationScenario, method: str, runs: int, seed: int, start: float
+) -> tuple[Any, ...]:
+    ends = found(scenario, runs, seed, method, start_of(method, start))
+    error = rms(ends - scenario.doa_deg)
+    return (name, scenario.snr_db, scenario.n_steps, method, error, bound_deg(scenario), start)
 
 
 def start_of(method: str, start: float) -> float:
@@ -313,18 +306,11 @@ MOVING: tuple[tuple[str, MotionModel, dict[str, Any]], ...] = (
 def moving(runs: int, seed: int) -> Report:
     """Follow a source from 20 to 60 degrees in 400 snapshots, by filters and their smoothers."""
     rows: list[tuple[Any, ...]] = []
-    span = slice(50, 380)
     for name in ("tone", "band"):
-        scenario = SOURCES[name].replace(doa_deg=20.0, end_deg=60.0, n_steps=400)
-        samples = draws(scenario, runs, seed)
-        for method, motion, params in MOVING:
-            if (name, method) == ("band", "phasor"):
-                continue
-            errors = moving_errors(scenario, samples, method, motion, span, **params)
-            rows.append((name, method, type(motion).__name__, _q(motion), *errors))
-        for scan in ("conventional", "mvdr"):
-            error = _window_error(scenario, samples[: min(runs, 20)], scan)
-            rows.append((name, f"{scan}, window of 26", "-", np.nan, error, np.nan))
+        filters = [c for c in MOVING if (name, c[0]) != ("band", "phasor")]
+        rows += spread(_moving_row, [(name, *case, runs, seed) for case in filters])
+        scans = ("conventional", "mvdr")
+        rows += spread(_window_row, [(name, scan, min(runs, 20), seed) for scan in scans])
     remarks = (
         "The paper has no moving source. RMSE over snapshots 50 to 380, degrees; the estimate of "
         "a filter that waits for later samples is held against the snapshot that it treats. The "
@@ -336,20 +322,31 @@ def moving(runs: int, seed: int) -> Report:
     return Report(title, columns, rows, remarks, {"ramp": _draw_ramp(runs, seed)})
 
 
-def _q(motion: MotionModel) -> float:
-    return float(motion.get_params()["q"])
+def _ramp(name: str) -> InterpolationScenario:
+    return SOURCES[name].replace(doa_deg=20.0, end_deg=60.0, n_steps=400)
 
 
-def _window_error(scenario: InterpolationScenario, samples: Float, method: Any) -> float:
+def _moving_row(
+    name: str, method: str, motion: MotionModel, params: dict[str, Any], runs: int, seed: int
+) -> tuple[Any, ...]:
+    scenario = _ramp(name)
+    samples = draws(scenario, runs, seed)
+    errors = moving_errors(scenario, samples, method, motion, slice(50, 380), **params)
+    q = float(motion.get_params()["q"])
+    return (name, method, type(motion).__name__, q, *errors)
+
+
+def _window_row(name: str, method: Any, runs: int, seed: int) -> tuple[Any, ...]:
     """Return the RMSE, degrees, of scans of 26 snapshots around every tenth one."""
-    at = np.arange(50, 380, 10)
-    truth = np.rad2deg(scenario.truth()[:, 0])
+    scenario, at = _ramp(name), np.arange(50, 380, 10)
+    samples, truth = draws(scenario, runs, seed), np.rad2deg(scenario.truth()[:, 0])
     scans = [scanned(scenario, samples[:, k - 13 : k + 13], method) for k in at]
-    return rms(np.array(scans) - (truth[at] + truth[at - 1])[:, None] / 2)
+    error = rms(np.array(scans) - (truth[at] + truth[at - 1])[:, None] / 2)
+    return (name, f"{method}, window of 26", "-", np.nan, error, np.nan)
 
 
 def _draw_ramp(runs: int, seed: int) -> Figure:
-    scenario = InterpolationTone(doa_deg=20.0, end_deg=60.0, n_steps=400)
+    scenario = _ramp("tone")
     samples = draws(scenario, runs, seed)
     figure, (ax,) = _figure(1, 1, (7.0, 4.2))
     drift = {"C": DelayDrift(1e-8), "B": DelayWalk(1e-3), "E": DelayDrift(1e-9)}

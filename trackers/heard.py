@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,7 +60,7 @@ class Heard:
         The source's `power` is given, or learned: the samples' mean power over 1 + ε.
         """
         if power is not None:
-            return self.frames / power**0.5
+            return self.frames / math.sqrt(power)
         mean = self.energy / np.maximum(self.n_samples, 1) / (1 + noise_ratio)
         scale = np.sqrt(np.maximum(mean, np.finfo(float).tiny))[..., None, None]
         scaled: Float = self.frames / scale
