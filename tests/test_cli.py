@@ -566,7 +566,8 @@ def test_neither_frequency_nor_band_is_an_error(
 def test_reproduce_writes_table_page_and_pictures(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["reproduce", "interpolation-table1", "--runs", "2", "--jobs", "2", "--out", "found"]) == 0
+    command = ["reproduce", "interpolation-table1", "--runs", "2", "--jobs", "2", "--out", "found"]
+    assert main(command) == 0
     assert Path("found/interpolation-table1.csv").exists()
     assert Path("found/interpolation-table1.md").exists()
     assert main(["reproduce", "interpolation-tabel1"]) == 2
