@@ -29,12 +29,15 @@ class Trial:
         Directions, rad; NaN while a source is off.
     measurement : ArraySnapshot or ArraySamples
     motion : MotionModel
+    signals : ndarray, shape (n_steps, n_sources), optional
+        What the sources send, where it is their own: complex or real.
     """
 
     measurements: Complex | Float
     truth: Float
     measurement: ArraySnapshot | ArraySamples
     motion: MotionModel
+    signals: Complex | Float | None = None
 
     def tracker(self, name: str, **params: Any) -> Tracker:
         """Make the tracker of that name with as many of the trial's models as it takes.
