@@ -26,6 +26,8 @@ class Blocks:
         Which coefficients a source has.
     shift : ndarray, shape (dim, dim)
         What moves every lag on by one.
+    order : ndarray of int, shape (dim,)
+        Number, source by source, of the lag at each place.
     """
 
     orders: tuple[int, ...]
@@ -33,6 +35,7 @@ class Blocks:
     lags: Int
     used: Bool
     shift: Float
+    order: Int
 
     @property
     def dim(self) -> int:
@@ -55,8 +58,8 @@ class Blocks:
 
 
 @lru_cache(maxsize=256)
-def blocks(orders: tuple[int, ...]) -> Blocks:
-    """Return the places for sources of the given orders.
+def blocks(orders: tuple[int, ...], lag_by_lag: bool = False) -> Blocks:
+    """Return the places for sources of the given orders, counted source by source or lag by lag.
 
     Examples
     --------
@@ -70,15 +73,19 @@ def blocks(orders: tuple[int, ...]) -> Blocks:
            [ 0. ,  0. ,  1. ,  0. ,  0. ],
            [ 0. ,  0. ,  0. ,  1. ,  0. ]])
     """
-    p = np.array(orders)
-    first = np.concatenate([[0], np.cumsum(p + 1)[:-1]])
-    lag = np.arange(p.max() + 1)
-    lags = first[:, None] + np.minimum(lag, p[:, None])
-    shift = np.eye(int((p + 1).sum()), k=-1)
-    shift[first, first - 1] = 0.0  # no lag follows from the block before
-    for array in (first, lags, shift):
+    p = np.array(orders)[:, None]
+    source, lag = np.nonzero(np.arange(p.max() + 1) <= p)  # of the entries source by source
+    by_lag = np.lexsort((source, lag))
+    order = by_lag if lag_by_lag else np.arange(len(source))
+    places = np.full((len(orders), int(p.max()) + 1), -1)
+    places[source[order], lag[order]] = np.arange(len(source))
+    lags = np.take_along_axis(places, np.minimum(np.arange(p.max() + 1), p), axis=1)
+    used = places[:, 1:] >= 0
+    shift = np.zeros((len(source), len(source)))
+    shift[places[:, 1:][used], places[:, :-1][used]] = 1.0
+    for array in (lags, used, shift, order):
         array.setflags(write=False)
-    return Blocks(orders, first, lags, lag[1:] <= p[:, None], shift)
+    return Blocks(orders, lags[:, 0], lags, used, shift, order)
 
 
 def radius(coefficients: Float) -> Float:

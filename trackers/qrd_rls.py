@@ -43,7 +43,8 @@ def ridge_rows(weight: ArrayLike, target: Float) -> Float:
     """
     n = target.shape[-2]
     eye = np.broadcast_to(np.eye(n), (*target.shape[:-1], n))
-    return np.sqrt(weight)[..., None] * np.concatenate([eye, target], axis=-1)
+    root = np.sqrt(np.asarray(weight, dtype=np.float64))[..., None]
+    return np.asarray(root * np.concatenate([eye, target], axis=-1))
 
 
 def ages(heard: Float, forgetting: float) -> tuple[Float, Float]:
