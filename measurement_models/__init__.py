@@ -1,5 +1,6 @@
 """What sensors see: arrays and their geometry, and the models p(z | x)."""
 
+from arrivals.measurement_models.array_manifold import ArrayManifold
 from arrivals.measurement_models.arrays import SensorArray, direction, steering_vector
 from arrivals.measurement_models.base import MeasurementModel
 from arrivals.measurement_models.bearing import Bearing
@@ -17,6 +18,7 @@ from arrivals.measurement_models.samples import ArraySamples
 from arrivals.measurement_models.snapshots import ArraySnapshot, composite
 
 __all__ = [
+    "ArrayManifold",
     "ArraySamples",
     "ArraySnapshot",
     "Bearing",

@@ -1,5 +1,6 @@
 """How states move."""
 
+from arrivals.motion_models.autoregressive import AutoregressiveSources
 from arrivals.motion_models.base import MotionModel
 from arrivals.motion_models.bernoulli_von_mises import BernoulliVonMises
 from arrivals.motion_models.bessel import (
@@ -21,8 +22,15 @@ from arrivals.motion_models.von_mises import (
     product,
     wrap,
 )
+from arrivals.motion_models.yule_walker import (
+    autocovariance,
+    partial_autocorrelation,
+    select_order,
+    yule_walker,
+)
 
 __all__ = [
+    "AutoregressiveSources",
     "BernoulliVonMises",
     "ConstantVelocity",
     "CoordinatedTurn",
@@ -33,6 +41,7 @@ __all__ = [
     "RandomWalk",
     "Stacked",
     "VonMisesWalk",
+    "autocovariance",
     "bessel_ratio",
     "bessel_ratios",
     "inverse_bessel_ratio",
@@ -41,6 +50,9 @@ __all__ = [
     "log_i0",
     "mfold_concentration",
     "mfold_modes",
+    "partial_autocorrelation",
     "product",
+    "select_order",
     "wrap",
+    "yule_walker",
 ]

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ar_trackers import TRACKERS as AR_TRACKERS
 from delay_trackers import TRACKERS as DELAY_TRACKERS
 from kalman_trackers import TRACKERS as KALMAN_TRACKERS
 from numpy.typing import ArrayLike
@@ -51,7 +52,7 @@ GRIDLESS: list[tuple[str, MakeTracker, Measurements]] = [
     ),
 ]
 # A new tracker gets its line here, or in the list that is about its kind.
-TRACKERS = [*GRIDLESS, *KALMAN_TRACKERS, *DELAY_TRACKERS]
+TRACKERS = [*GRIDLESS, *KALMAN_TRACKERS, *DELAY_TRACKERS, *AR_TRACKERS]
 IDS = [f"{name}-{n}" for n, (name, _, _) in enumerate(TRACKERS)]
 
 every_check = pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)

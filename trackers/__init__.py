@@ -1,9 +1,16 @@
 """The methods, and the registry that finds them by name."""
 
+from arrivals.trackers.ar_kalman_qrd_rls import ARKalmanQRDRLS
 from arrivals.trackers.base import Tracker
 from arrivals.trackers.cbf import CBF
 from arrivals.trackers.ekf import EKF
-from arrivals.trackers.estimates import DirectionEstimate, Estimate, PositionEstimate, StateEstimate
+from arrivals.trackers.estimates import (
+    DirectionEstimate,
+    Estimate,
+    PositionEstimate,
+    SourceEstimate,
+    StateEstimate,
+)
 from arrivals.trackers.filterpy_bridge import as_filterpy
 from arrivals.trackers.imm import IMM, Filter
 from arrivals.trackers.interpolation_ekf import InterpolationEKF
@@ -11,6 +18,7 @@ from arrivals.trackers.kalman import Kalman
 from arrivals.trackers.kalman_type import KalmanType
 from arrivals.trackers.mvdr import MVDR
 from arrivals.trackers.particle import Particle
+from arrivals.trackers.qrd_rls import QRDRLS
 from arrivals.trackers.recorder import Run
 from arrivals.trackers.registry import available, create, find, register
 from arrivals.trackers.svalse import SVALSE
@@ -18,10 +26,12 @@ from arrivals.trackers.ukf import UKF
 from arrivals.trackers.valse import VALSE
 
 __all__ = [
+    "ARKalmanQRDRLS",
     "CBF",
     "EKF",
     "IMM",
     "MVDR",
+    "QRDRLS",
     "SVALSE",
     "UKF",
     "VALSE",
@@ -34,6 +44,7 @@ __all__ = [
     "Particle",
     "PositionEstimate",
     "Run",
+    "SourceEstimate",
     "StateEstimate",
     "Tracker",
     "as_filterpy",

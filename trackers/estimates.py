@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from typing import Any, ClassVar
+from dataclasses import dataclass, field, fields
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -78,7 +78,7 @@ class DirectionEstimate(Estimate):
     columns: ClassVar[tuple[str, ...]] = ("label", "doa_deg", "std_deg", "existence", "level_db")
 
     @classmethod
-    def nothing(cls, **per_step: Any) -> DirectionEstimate:
+    def nothing(cls, **others: Any) -> Self:
         """Return the estimate in which no source was found.
 
         Examples
@@ -87,7 +87,7 @@ class DirectionEstimate(Estimate):
         0
         """
         none = np.zeros(0)
-        return cls(none, none, none, none.astype(complex), none.astype(np.int64), **per_step)
+        return cls(none, none, none, none.astype(complex), none.astype(np.int64), **others)
 
     def rows(self) -> list[tuple[Any, ...]]:
         """Return label, direction and its standard deviation in degrees, existence, level in dB."""
@@ -95,6 +95,27 @@ class DirectionEstimate(Estimate):
             level_db = 20 * np.log10(np.abs(self.amplitude))
         degrees = np.rad2deg([self.doa, self.std])
         return list(zip(self.label, *degrees, self.existence, level_db, strict=True))
+
+
+@dataclass(frozen=True, eq=False)
+class SourceEstimate(DirectionEstimate):
+    """Directions, and the autoregressive models of what the sources send.
+
+    Parameters
+    ----------
+    coefficients : ndarray, shape (n_found, largest order)
+        Zero where a source's order is less.
+    driving_noise : ndarray, shape (n_found,)
+        Variance of what drives each source.
+    """
+
+    coefficients: Float = field(default_factory=lambda: np.zeros((0, 0)))
+    driving_noise: Float = field(default_factory=lambda: np.zeros(0))
+
+    per_source: ClassVar[dict[str, Any]] = DirectionEstimate.per_source | {
+        "coefficients": np.nan,
+        "driving_noise": np.nan,
+    }
 
 
 @dataclass(frozen=True, eq=False)

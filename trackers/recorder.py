@@ -6,7 +6,7 @@ import csv
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import IO, Any
 
@@ -36,6 +36,9 @@ class Run:
         Seconds, or the unit of the `dt` that the tracker was run with.
     elapsed : float
         Wall-clock time that the run took, s.
+    extras : mapping of str to ndarray
+        What else a tracker keeps of every step, first axis time, and no estimate holds; they are
+        attributes too, such as `run.signals` (n_steps, n_sources).
     """
 
     kind: type[Estimate]
@@ -44,16 +47,19 @@ class Run:
     n_found: NDArray[np.int64] = field(repr=False)
     time: Float = field(repr=False)
     elapsed: float
+    extras: Mapping[str, NDArray[Any]] = field(default_factory=dict, repr=False)
 
     def __getattr__(self, name: str) -> NDArray[Any]:
-        try:
-            fields: Mapping[str, NDArray[Any]] = object.__getattribute__(self, "fields")
-            return fields[name]
-        except (AttributeError, KeyError):
-            raise AttributeError(f"this run has no {name!r}") from None
+        for home in ("fields", "extras"):
+            try:
+                arrays: Mapping[str, NDArray[Any]] = object.__getattribute__(self, home)
+                return arrays[name]
+            except (AttributeError, KeyError):
+                pass
+        raise AttributeError(f"this run has no {name!r}")
 
     def __dir__(self) -> list[str]:
-        return [*super().__dir__(), *self.fields]
+        return [*super().__dir__(), *self.fields, *self.extras]
 
     def __len__(self) -> int:
         return len(self.time)
@@ -99,7 +105,7 @@ class Run:
         time = np.asarray(time, dtype=np.float64)
         if time.shape != self.time.shape:
             raise ValueError(f"time must have shape {self.time.shape}; got {time.shape}")
-        return Run(self.kind, self.fields, self.x, self.n_found, time, self.elapsed)
+        return replace(self, time=time)
 
 
 def header(kind: type[Estimate]) -> tuple[str, ...]:

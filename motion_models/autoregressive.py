@@ -1,0 +1,184 @@
+"""Sources whose samples are autoregressive."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from arrivals.checks import positive, real, state
+from arrivals.motion_models.base import MotionModel
+from arrivals.motion_models.companion import Blocks, blocks, radius, stationary
+from arrivals.motion_models.stacked import block_diagonal
+from arrivals.typing import Complex, Float
+
+
+@dataclass(frozen=True)
+class AutoregressiveSources(MotionModel):
+    """Samples of sources, each a weighted sum of its last ones plus white noise.
+
+    s_k(j) = Σ_i a_ki s_k(j-i) + v_k(j). The state of source k is [s_k(j), ..., s_k(j-p_k)]: one
+    lag more than the order, so that a filter's covariance holds those between a sample and all
+    that it depends on.
+
+    Parameters
+    ----------
+    coefficients : sequence of sequences of float
+        a_k of each source, which may differ in order.
+    noise : float or sequence of float
+        q_k, variance of v_k; that of both parts together where sources are complex.
+    real_valued : bool
+        Whether the sources are real (speech) rather than complex with independent parts.
+
+    Raises
+    ------
+    ValueError
+        If there is no source or no coefficient, a model is unstable, or a variance not positive.
+
+    Notes
+    -----
+    Shapes: states (..., dim_x), real: source after source for real ones, [Re; Im] of that for
+    complex ones. `complex_state` and `signals` give the complex view. Steps are one sample long.
+
+    References
+    ----------
+    Gu, Chan, Zhu and Swamy, IEEE TCAS-II 60(1), 2013. The additional lag: ours.
+
+    Examples
+    --------
+    >>> speech = AutoregressiveSources([[0.9], [1.37, -0.52]], [0.19, 0.14], real_valued=True)
+    >>> speech.orders, speech.dim_x
+    ((1, 2), 5)
+    >>> speech.power.round(1)
+    array([1., 1.])
+    >>> speech.f([1.0, 0.0, 1.0, 0.0, 0.0])
+    array([0.9 , 1.  , 1.37, 1.  , 0.  ])
+    """
+
+    coefficients: Sequence[Sequence[float]] | Float
+    noise: float | Sequence[float] | Float = 1.0
+    real_valued: bool = False
+
+    def __post_init__(self) -> None:
+        rows = tuple(
+            tuple(real(f"coefficients of source {k}", row).ravel().tolist())
+            for k, row in enumerate(self.coefficients)
+        )
+        if not rows or not all(rows):
+            raise ValueError(
+                "coefficients must be one list of at least one number for each source; "
+                f"got {self.coefficients!r}"
+            )
+        for k, row in enumerate(rows):
+            if not np.isfinite(row).all():
+                raise ValueError(f"coefficients must be finite; source {k} has {list(row)}")
+            largest = float(radius(np.array(row)))
+            if not largest < 1:
+                raise ValueError(
+                    f"the coefficients of source {k}, {list(row)}, are unstable: a pole at the "
+                    f"radius {largest:.6g}, which must be below 1"
+                )
+        given = self.noise
+        noise = [float(q) for q in given] if np.ndim(given) else [given] * len(rows)  # type: ignore[union-attr]
+        if len(noise) != len(rows):
+            raise ValueError(f"noise must be one number or {len(rows)}, one a source; got {given}")
+        object.__setattr__(self, "coefficients", rows)
+        object.__setattr__(self, "noise", tuple(positive("noise", q) for q in noise))
+        object.__setattr__(self, "real_valued", bool(self.real_valued))
+
+    @property
+    def orders(self) -> tuple[int, ...]:
+        """p_k of each source."""
+        return tuple(len(row) for row in self.coefficients)
+
+    @property
+    def n_sources(self) -> int:
+        """Number of sources."""
+        return len(self.coefficients)
+
+    @property
+    def blocks(self) -> Blocks:
+        """Where the lags of the sources stand in the state of real sources."""
+        return blocks(self.orders)
+
+    @property
+    def n_parts(self) -> int:
+        """1 for real sources; 2, real and imaginary part, for complex ones."""
+        return 1 if self.real_valued else 2
+
+    @property
+    def dim_x(self) -> int:
+        """Lags of all sources, twice for complex ones."""
+        return self.n_parts * self.blocks.dim
+
+    @property
+    def padded(self) -> Float:
+        """The coefficients as (n_sources, largest order), zero where a source has fewer."""
+        table = np.zeros((self.n_sources, max(self.orders)))
+        for row, own in zip(table, self.coefficients, strict=True):
+            row[: len(own)] = own
+        return table
+
+    @property
+    def power(self) -> Float:
+        """Variance of each source, (n_sources,), once it is stationary."""
+        P = self.stationary_covariance()
+        n = self.blocks.dim
+        return np.asarray(self.n_parts * P[:n, :n].diagonal()[self.blocks.first])
+
+    def f(self, x: ArrayLike, dt: float = 1.0) -> Float:
+        """Return the states one sample later, without noise."""
+        return np.asarray(state(x, self.dim_x) @ self.F(dt=dt).T)
+
+    def F(self, x: ArrayLike | None = None, dt: float = 1.0) -> Float:
+        """Return the block companion matrix, (dim_x, dim_x), whatever the state."""
+        _one_sample(dt)
+        return self._each_part(self.blocks.transition(self.padded))
+
+    def Q(self, dt: float = 1.0) -> Float:
+        """Return q_k at the current samples; half of it in each part of complex sources."""
+        _one_sample(dt)
+        return self._each_part(self.blocks.drive(np.array(self.noise)) / self.n_parts)
+
+    def stationary_covariance(self) -> Float:
+        """Return the covariance of the state after a long time, (dim_x, dim_x)."""
+        return stationary(self.F(), self.Q())
+
+    def complex_state(self, x: ArrayLike) -> Complex:
+        """Return states (..., dim_x) as complex ones, (..., dim_x / 2); of real sources, as is."""
+        x = state(x, self.dim_x)
+        if self.real_valued:
+            return x.astype(np.complex128)
+        n = self.blocks.dim
+        return np.asarray(x[..., :n] + 1j * x[..., n:])
+
+    def signals(self, x: ArrayLike) -> Complex:
+        """Return the current samples of states: (..., dim_x) -> (..., n_sources).
+
+        Examples
+        --------
+        >>> AutoregressiveSources([[0.9], [0.5]]).signals([1.0, 0, 2.0, 0, 0.5, 0, -1.0, 0])
+        array([1.+0.5j, 2.-1.j ])
+        """
+        return np.asarray(self.complex_state(x)[..., self.blocks.first])
+
+    def scaled(self, power: ArrayLike) -> AutoregressiveSources:
+        """Return the same spectra with other powers, one for all sources or (n_sources,).
+
+        Examples
+        --------
+        >>> AutoregressiveSources([[0.6]]).scaled(2.0).power.round(12)
+        array([2.])
+        """
+        noise = np.array(self.noise) * (real("power", power) / self.power)
+        return self.replace(noise=noise.tolist())
+
+    def _each_part(self, matrix: Float) -> Float:
+        return matrix if self.real_valued else block_diagonal(matrix, matrix)
+
+
+def _one_sample(dt: float) -> None:
+    if dt != 1:
+        raise ValueError(f"autoregressive sources move by whole samples, dt=1; got dt={dt}")

@@ -1,0 +1,46 @@
+"""The tracker of the AR Kalman filter with QRD-RLS, for `test_conformance`."""
+
+import numpy as np
+
+from arrivals.measurement_models import ArraySnapshot, SensorArray
+from arrivals.motion_models import AutoregressiveSources
+from arrivals.trackers import ARKalmanQRDRLS
+from arrivals.trackers.conformance import MakeTracker, Measurements
+
+SNAPSHOT = ArraySnapshot(SensorArray.symmetric([0.25, 0.5]), wavelength=1.0, noise=0.1)
+RAGGED = AutoregressiveSources([[0.7, -0.4], [0.9]]).scaled(1.0)
+SPEECH = AutoregressiveSources([[0.9], [0.5]], real_valued=True).scaled(1.0)
+DOA = [-0.3, 0.5]
+
+
+def spoilt(motion: AutoregressiveSources, n_steps: int, seed: int = 0) -> Measurements:
+    """Two sources; one sensor fails once, and whole snapshots, once the last of an interval."""
+    rng, x, s = np.random.default_rng(seed), np.zeros(motion.dim_x), []
+    for _ in range(n_steps):
+        x = motion.sample(x, rng)
+        s.append(motion.signals(x))
+    z = SNAPSHOT.simulate(np.full((n_steps, 2), [-0.35, 0.52]), s, rng)
+    z[4, 1], z[6:8], z[-1] = np.nan, np.nan, np.nan
+    return z
+
+
+TRACKERS: list[tuple[str, MakeTracker, Measurements]] = [
+    (
+        "ar_kalman_qrd_rls",
+        lambda: ARKalmanQRDRLS(SNAPSHOT, RAGGED, doa=DOA, interval=3, r_start=0.3),
+        spoilt(RAGGED, 14),
+    ),
+    (
+        "ar_kalman_qrd_rls",
+        lambda: ARKalmanQRDRLS(SNAPSHOT, RAGGED, doa=DOA, interval=4, correction=False, inner=2),
+        spoilt(RAGGED, 13),
+    ),
+    (
+        "ar_kalman_qrd_rls",
+        lambda: ARKalmanQRDRLS(
+            SNAPSHOT, SPEECH, doa=DOA, interval=5, gate=0.3, ridge=5.0, adapt_drive=False
+        ),
+        spoilt(SPEECH, 21),
+    ),
+    ("ar_kalman_qrd_rls", lambda: ARKalmanQRDRLS(SNAPSHOT, interval=20), spoilt(RAGGED, 150)),
+]
