@@ -1,5 +1,6 @@
 """What trackers are tried on: simulated truth, recorded data, metrics and plots."""
 
+from arrivals.scenarios.ar_sources import ar_signals
 from arrivals.scenarios.base import Scenario, Trial, available, create, register
 from arrivals.scenarios.base import find_scenario as find
 from arrivals.scenarios.interpolation import (
@@ -15,10 +16,19 @@ from arrivals.scenarios.line_arrays import (
     SixStatic,
     ThreeStatic,
 )
-from arrivals.scenarios.metrics import Gospa, gospa, mean_gospa, mean_rmse, ospa, rmse
+from arrivals.scenarios.metrics import (
+    Gospa,
+    best_assignment_rmse,
+    gospa,
+    mean_gospa,
+    mean_rmse,
+    ospa,
+    rmse,
+)
 from arrivals.scenarios.plots import plot_array, plot_bearing_time
 from arrivals.scenarios.readers import read
 from arrivals.scenarios.recordings import Recording, Snapshots
+from arrivals.scenarios.separation import nmse, sdr
 
 __all__ = [
     "Gospa",
@@ -35,16 +45,20 @@ __all__ = [
     "Snapshots",
     "ThreeStatic",
     "Trial",
+    "ar_signals",
     "available",
+    "best_assignment_rmse",
     "create",
     "find",
     "gospa",
     "mean_gospa",
     "mean_rmse",
+    "nmse",
     "ospa",
     "plot_array",
     "plot_bearing_time",
     "read",
     "register",
     "rmse",
+    "sdr",
 ]

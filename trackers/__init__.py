@@ -3,16 +3,20 @@
 from arrivals.trackers.base import Tracker
 from arrivals.trackers.cbf import CBF
 from arrivals.trackers.ekf import EKF
+from arrivals.trackers.esprit import ESPRIT
 from arrivals.trackers.estimates import DirectionEstimate, Estimate, PositionEstimate, StateEstimate
 from arrivals.trackers.filterpy_bridge import as_filterpy
 from arrivals.trackers.imm import IMM, Filter
 from arrivals.trackers.interpolation_ekf import InterpolationEKF
 from arrivals.trackers.kalman import Kalman
 from arrivals.trackers.kalman_type import KalmanType
+from arrivals.trackers.music import MUSIC
 from arrivals.trackers.mvdr import MVDR
 from arrivals.trackers.particle import Particle
+from arrivals.trackers.past import PAST
 from arrivals.trackers.recorder import Run
 from arrivals.trackers.registry import available, create, find, register
+from arrivals.trackers.root_music import RootMUSIC
 from arrivals.trackers.svalse import SVALSE
 from arrivals.trackers.ukf import UKF
 from arrivals.trackers.valse import VALSE
@@ -20,8 +24,11 @@ from arrivals.trackers.valse import VALSE
 __all__ = [
     "CBF",
     "EKF",
+    "ESPRIT",
     "IMM",
+    "MUSIC",
     "MVDR",
+    "PAST",
     "SVALSE",
     "UKF",
     "VALSE",
@@ -33,6 +40,7 @@ __all__ = [
     "KalmanType",
     "Particle",
     "PositionEstimate",
+    "RootMUSIC",
     "Run",
     "StateEstimate",
     "Tracker",
