@@ -50,13 +50,13 @@ def past_step(W: Complex, P: Complex, y: Complex, beta: ArrayLike) -> tuple[Comp
     """
     beta = np.asarray(beta)[..., None, None]
     y = y[..., None]
-    z = W.swapaxes(-1, -2).conj() @ y
+    z = W.conj().swapaxes(-1, -2) @ y
     h = P @ z
-    hH = h.swapaxes(-1, -2).conj()
-    g = h / (beta + hH @ z)
-    P = (P - g @ hH) / beta
-    P = (P + P.swapaxes(-1, -2).conj()) / 2
-    return W + (y - W @ z) @ g.swapaxes(-1, -2).conj(), P
+    hH = h.conj().swapaxes(-1, -2)
+    gH = hH / (beta + (hH @ z).real)
+    P = (P - h @ gH) / beta
+    P = (P + P.conj().swapaxes(-1, -2)) / 2  # rounding would grow as β⁻ⁿ
+    return W + (y - W @ z) @ gH, P
 
 
 @register("past")
