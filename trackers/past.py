@@ -69,7 +69,8 @@ class PAST(SubspaceTracker[Finder]):
         What `method` asks for: a line on a uniform grid, or any array for "music".
     n_sources, max_sources, forgetting, interval
         As in `MUSIC`. Where a criterion finds the number, a subspace of `max_sources` dimensions
-        is tracked, and the power outside it is taken to be noise.
+        is tracked, and the power outside it is taken to be noise. That wants room: `max_sources`
+        is below half the sensors if None; with more, false sources are found at first.
     method : {"esprit", "root_music", "music"}
         How directions are found from the subspace.
     n_directions : int
@@ -139,6 +140,14 @@ class PAST(SubspaceTracker[Finder]):
     def _start(self) -> None:
         self.W = np.eye(self.measurement.array.n_sensors, self.n_slots, dtype=np.complex128)
         self.inverse, self.energy = np.eye(self.n_slots, dtype=np.complex128), 0.0
+
+    @property
+    def n_slots(self) -> int:
+        """Number of sources that may be reported at once: the dimensions tracked."""
+        if isinstance(self.n_sources, int):
+            return self.n_sources
+        n = self.measurement.array.n_sensors
+        return min(self.max_sources or max(1, (n - 1) // 2), n - 1)
 
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
         """Let the past fade; what is believed of the directions stays."""
