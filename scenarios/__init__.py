@@ -18,7 +18,6 @@ from arrivals.scenarios.line_arrays import (
 )
 from arrivals.scenarios.metrics import (
     Gospa,
-    best_assignment_rmse,
     gospa,
     mean_gospa,
     mean_rmse,
@@ -29,6 +28,7 @@ from arrivals.scenarios.plots import plot_array, plot_bearing_time
 from arrivals.scenarios.readers import read
 from arrivals.scenarios.recordings import Recording, Snapshots
 from arrivals.scenarios.separation import nmse, sdr
+from arrivals.scenarios.unlabelled import best_assignment_rmse
 
 __all__ = [
     "Gospa",

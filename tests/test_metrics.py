@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 
 from arrivals.scenarios.metrics import (
     Gospa,
-    best_assignment_rmse,
     gospa,
     mean_gospa,
     mean_rmse,
     ospa,
     rmse,
 )
+from arrivals.scenarios.unlabelled import best_assignment_rmse
 
 ANGLES = st.lists(st.floats(-90, 90), max_size=4)
 POINTS = st.lists(st.tuples(st.floats(-50, 50), st.floats(-50, 50)), max_size=4)
