@@ -1,4 +1,4 @@
-"""Autoregressive sources before a symmetric line: the simulations of the report on joint tracking."""
+"""Autoregressive sources before a symmetric line: the scenes of the report on joint tracking."""
 
 from __future__ import annotations
 

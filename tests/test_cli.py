@@ -20,6 +20,7 @@ from arrivals.trackers import available
 RATE, FREQUENCY, WINDOW = 8000, 1000.0, 256
 ARRAY = 'kind = "ula"\nn_sensors = 8\nspacing = 0.17\nspeed = 343.0\n'
 DOA = np.linspace(-8.0, 12.0, 20)  # degrees, one a window
+SUBSPACE = ("music", "root_music", "esprit", "past")
 HEADING = "step,time_s,label,doa_deg,std_deg,existence,level_db"
 SHELL = [sys.executable, "-W", "error", "-m", "arrivals"]
 
@@ -126,11 +127,24 @@ def test_complex_snapshots_of_a_file_need_no_rate_and_their_time_is_kept(
     np.testing.assert_allclose([float(row["doa_deg"]) for row in rows], [10, 11], atol=0.3)
 
 
+@pytest.mark.parametrize("name", SUBSPACE)
+def test_subspace_methods_track_with_the_number_of_sources_given(
+    scene: Path, name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    more = ("--tracker", name, "--set", "n_sources=1", "--set", "forgetting=0.5")
+    assert main(track(scene, *more)) == 0
+    rows = table(capsys.readouterr().out)
+    assert {row["label"] for row in rows} == {"-1"}
+    np.testing.assert_allclose([float(row["doa_deg"]) for row in rows], DOA, atol=2.0)
+    assert main(track(scene, "--tracker", name, "--set", "n_sources=8")) == 2
+    assert "n_sources must be at most 7" in capsys.readouterr().err
+
+
 def test_silence_holds_no_sources_and_makes_no_noise(
     scene: Path, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     wavfile.write(here / "silence.wav", RATE, np.zeros((2000, 8), "<i2"))
-    for tracker in ("cbf", "mvdr", "svalse", "valse"):
+    for tracker in ("cbf", "mvdr", "svalse", "valse", *SUBSPACE):
         arguments = ("--tracker", tracker, "--out", "t.csv", "--plot", "t.png")
         array = str(scene / "array.toml")
         assert main(track(here, *arguments, file="silence.wav", array=array)) == 0

@@ -9,6 +9,7 @@ from ar_trackers import TRACKERS as AR_TRACKERS
 from delay_trackers import TRACKERS as DELAY_TRACKERS
 from kalman_trackers import TRACKERS as KALMAN_TRACKERS
 from numpy.typing import ArrayLike
+from subspace_trackers import TRACKERS as SUBSPACE_TRACKERS
 
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.motion_models import BernoulliVonMises
@@ -52,7 +53,13 @@ GRIDLESS: list[tuple[str, MakeTracker, Measurements]] = [
     ),
 ]
 # A new tracker gets its line here, or in the list that is about its kind.
-TRACKERS = [*GRIDLESS, *KALMAN_TRACKERS, *DELAY_TRACKERS, *AR_TRACKERS]
+TRACKERS = [
+    *GRIDLESS,
+    *KALMAN_TRACKERS,
+    *DELAY_TRACKERS,
+    *AR_TRACKERS,
+    *SUBSPACE_TRACKERS,
+]
 IDS = [f"{name}-{n}" for n, (name, _, _) in enumerate(TRACKERS)]
 
 every_check = pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)

@@ -8,7 +8,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from arrivals.scenarios.metrics import Gospa, gospa, mean_gospa, mean_rmse, ospa, rmse
+from arrivals.scenarios.metrics import (
+    Gospa,
+    gospa,
+    mean_gospa,
+    mean_rmse,
+    ospa,
+    rmse,
+)
+from arrivals.scenarios.unlabelled import best_assignment_rmse
 
 ANGLES = st.lists(st.floats(-90, 90), max_size=4)
 POINTS = st.lists(st.tuples(st.floats(-50, 50), st.floats(-50, 50)), max_size=4)
@@ -206,3 +214,35 @@ def test_other_metrics_refuse_it_too() -> None:
         mean_rmse([[1]], [[1], [2]], c=1)
     with pytest.raises(ValueError, match="at least one; got 0 and 0"):
         mean_gospa([], [], c=1)
+
+
+@LAW
+@given(st.integers(0, 2**32 - 1), st.integers(1, 4), st.sampled_from([None, 1.0, 360.0]))
+def test_best_assignment_is_the_best_of_all_permutations(
+    seed: int, n_sources: int, period: float | None
+) -> None:
+    rng = np.random.default_rng(seed)
+    truth, found = rng.uniform(-400, 400, (2, 3, 2, n_sources))
+
+    def squares(t: np.ndarray, f: np.ndarray) -> float:
+        difference = np.abs(t - f) % (period or np.inf)
+        return float((np.minimum(difference, (period or np.inf) - difference) ** 2).sum())
+
+    for run in range(3):
+        total = sum(
+            min(squares(t, f[list(order)]) for order in permutations(range(n_sources)))
+            for t, f in zip(truth[run], found[run], strict=True)
+        )
+        ours = best_assignment_rmse(truth, found, period)
+        assert ours[run] == pytest.approx(np.sqrt(total / 2 / n_sources), abs=1e-9)
+
+
+def test_best_assignment_wants_a_fixed_number_of_finite_angles() -> None:
+    with pytest.raises(ValueError, match="n_steps, n_sources"):
+        best_assignment_rmse([1.0, 2.0], [1.0, 2.0])
+    with pytest.raises(ValueError, match=r"got \(1, 2\) and \(1, 1\)"):
+        best_assignment_rmse([[1.0, 2.0]], [[1.0]])
+    with pytest.raises(ValueError, match="rmse takes sources that were missed"):
+        best_assignment_rmse([[1.0, 2.0]], [[1.0, np.nan]])
+    with pytest.raises(ValueError, match="period must be finite and positive"):
+        best_assignment_rmse([[1.0]], [[1.0]], period=0)

@@ -4,6 +4,7 @@ from arrivals.trackers.ar_kalman_qrd_rls import ARKalmanQRDRLS
 from arrivals.trackers.base import Tracker
 from arrivals.trackers.cbf import CBF
 from arrivals.trackers.ekf import EKF
+from arrivals.trackers.esprit import ESPRIT
 from arrivals.trackers.estimates import (
     DirectionEstimate,
     Estimate,
@@ -16,11 +17,14 @@ from arrivals.trackers.imm import IMM, Filter
 from arrivals.trackers.interpolation_ekf import InterpolationEKF
 from arrivals.trackers.kalman import Kalman
 from arrivals.trackers.kalman_type import KalmanType
+from arrivals.trackers.music import MUSIC
 from arrivals.trackers.mvdr import MVDR
 from arrivals.trackers.particle import Particle
+from arrivals.trackers.past import PAST
 from arrivals.trackers.qrd_rls import QRDRLS
 from arrivals.trackers.recorder import Run
 from arrivals.trackers.registry import available, create, find, register
+from arrivals.trackers.root_music import RootMUSIC
 from arrivals.trackers.svalse import SVALSE
 from arrivals.trackers.ukf import UKF
 from arrivals.trackers.valse import VALSE
@@ -29,9 +33,12 @@ __all__ = [
     "ARKalmanQRDRLS",
     "CBF",
     "EKF",
+    "ESPRIT",
     "IMM",
+    "MUSIC",
     "MVDR",
     "QRDRLS",
+    "PAST",
     "SVALSE",
     "UKF",
     "VALSE",
@@ -43,6 +50,7 @@ __all__ = [
     "KalmanType",
     "Particle",
     "PositionEstimate",
+    "RootMUSIC",
     "Run",
     "SourceEstimate",
     "StateEstimate",

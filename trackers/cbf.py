@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -26,6 +28,23 @@ def look_directions(array: SensorArray, n: int) -> Float:
     if array.dim == 1:
         return np.linspace(-np.pi / 2, np.pi / 2, n)
     return np.linspace(-np.pi, np.pi, n, endpoint=False)
+
+
+@lru_cache(maxsize=4)  # of parts that never change; it was a third of the time of a step
+def look_vectors(array: SensorArray, wavelength: float, n: int) -> tuple[Float, Complex]:
+    """Return n look directions and their steering vectors, (n, n_sensors), not to be written to.
+
+    Examples
+    --------
+    >>> doa_grid, A = look_vectors(SensorArray.ula(4, 0.5), 1.0, 5)
+    >>> doa_grid.shape, A.shape
+    ((5,), (5, 4))
+    """
+    doa_grid = look_directions(array, n)
+    A = array.steering_vector(doa_grid, wavelength)
+    for shared in (doa_grid, A):
+        shared.setflags(write=False)
+    return doa_grid, A
 
 
 def beam_power(A: Complex, z: ArrayLike) -> Float:
@@ -66,11 +85,12 @@ def peaks(power: Float, *, circular: bool) -> Int:
     array([4, 2])
     """
     rise = 1e-9 * power.max()  # a flat spectrum has none: its ripple is rounding
-    top = (power > np.roll(power, 1) + rise) & (power >= np.roll(power, -1))
+    around = np.concatenate([power[-1:], power, power[:1]])
+    top = (power > around[:-2] + rise) & (power >= around[2:])
     if not circular:
         top[[0, -1]] = False
-    found = np.flatnonzero(top)
-    return found[np.argsort(-power[found], kind="stable")]
+    found = top.nonzero()[0]
+    return np.asarray(found[np.argsort(-power[found], kind="stable")])
 
 
 def refined(doa_grid: Float, power: Float, top: Int) -> Float:
@@ -89,12 +109,22 @@ def refined(doa_grid: Float, power: Float, top: Int) -> Float:
     >>> refined(np.arange(4.0), np.exp(level), np.array([1]))
     array([1.5])
     """
-    level = np.log(np.maximum(power, np.finfo(float).tiny))
-    left, middle, right = level[top - 1], level[top], level[(top + 1) % len(power)]
+    return parabolic(doa_grid, np.log(np.maximum(power, np.finfo(float).tiny)), top)
+
+
+def parabolic(doa_grid: Float, level: Float, top: Int) -> Float:
+    """Return the vertices of the parabolas through peaks of a level and their neighbours.
+
+    Examples
+    --------
+    >>> parabolic(np.arange(4.0), np.array([3.0, 4.0, 4.0, 3.0]), np.array([1]))
+    array([1.5])
+    """
+    left, middle, right = level[top - 1], level[top], level[(top + 1) % len(level)]
     bend = 2 * middle - left - right
     shift = (right - left) / (2 * np.where(bend > 0, bend, np.inf))
     step = doa_grid[1] - doa_grid[0]
-    return np.asarray(doa_grid[top] + step * np.clip(shift, -0.5, 0.5))
+    return np.asarray(doa_grid[top] + step * np.maximum(np.minimum(shift, 0.5), -0.5))
 
 
 @register("cbf")
@@ -169,8 +199,8 @@ class CBF(Tracker):
             return
         z = self.measurement.snapshot(np.asarray(z))
         array, wavelength = self.measurement.array, self.measurement.wavelength
-        self.doa_grid = look_directions(array, self.n_directions)
-        self.power = self.spectrum(array.steering_vector(self.doa_grid, wavelength), z)
+        self.doa_grid, A = look_vectors(array, wavelength, self.n_directions)
+        self.power = self.spectrum(A, z)
         top = peaks(self.power, circular=array.dim > 1)
         high = self.power[top] > self.power.max() * 10 ** (-self.threshold_db / 10)
         doa = refined(self.doa_grid, self.power, top[high][: self.n_slots])

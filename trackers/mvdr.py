@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.checks import positive, probability
+from arrivals.checks import instance, positive, probability
 from arrivals.measurement_models.snapshots import ArraySnapshot
 from arrivals.trackers.cbf import CBF
+from arrivals.trackers.covariances import RunningCovariance
 from arrivals.trackers.registry import register
 from arrivals.typing import Complex, Float
 
@@ -43,7 +44,7 @@ def capon_power(A: Complex, R: Complex) -> Float:
 
 
 @register("mvdr")
-class MVDR(CBF):
+class MVDR(RunningCovariance, CBF):
     """Peaks of Capon's spectrum, of a covariance that forgets.
 
     Parameters
@@ -96,8 +97,7 @@ class MVDR(CBF):
     ) -> None:
         self.loading = positive("loading", loading)
         self.forgetting = probability("forgetting", forgetting)
-        n = measurement.array.n_sensors if isinstance(measurement, ArraySnapshot) else 0
-        self.covariance, self.weight = np.zeros((n, n), dtype=np.complex128), np.zeros((n, n))
+        self._know_nothing(instance("measurement", measurement, ArraySnapshot).array.n_sensors)
         super().__init__(
             measurement,
             n_directions=n_directions,
@@ -108,15 +108,11 @@ class MVDR(CBF):
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
         """Let the past fade; report nothing until something is heard."""
         super().predict(u, dt=dt)
-        self.covariance = self.forgetting**dt * self.covariance
-        self.weight = self.forgetting**dt * self.weight
+        self._fade(dt)
 
     def spectrum(self, A: Complex, z: Complex) -> Float:
         """Add a snapshot to the covariance, and return Capon's spectrum."""
-        heard = ~np.isnan(z)
-        y = np.where(heard, z, 0)
-        self.covariance = self.covariance + np.multiply.outer(y, y.conj())
-        self.weight = self.weight + np.multiply.outer(heard, heard)
+        self._add(z)
         if not self.covariance.any():
             return np.zeros(len(A))
         return capon_power(A, self._loaded())
@@ -130,5 +126,4 @@ class MVDR(CBF):
         return np.asarray(A.conj() @ np.linalg.solve(R, z[heard]) * capon_power(A, R))
 
     def _loaded(self) -> Complex:
-        mean = self.covariance / np.where(self.weight > 0, self.weight, 1.0)
-        return np.asarray(loaded(mean, self.loading), dtype=np.complex128)
+        return np.asarray(loaded(self._mean(), self.loading), dtype=np.complex128)

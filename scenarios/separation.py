@@ -1,0 +1,101 @@
+"""How far separated source signals lie from the true ones."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from arrivals.typing import Complex, Float
+
+
+def nmse(truth: ArrayLike, found: ArrayLike, *, db: bool = False) -> Float:
+    """Measure the error of each source's signal, relative to its power.
+
+    Parameters
+    ----------
+    truth, found : array_like, shape (..., n_steps, n_sources)
+        Signals, real or complex, in the same order of sources.
+    db : bool
+        Give 10 log10 of it.
+
+    Returns
+    -------
+    ndarray, shape (..., n_sources)
+        Σ|ŝ - s|² / Σ|s|², over the steps: 0 is exact, and 1 what zeros get.
+
+    Raises
+    ------
+    ValueError
+        If shapes differ, a number is not finite, or a true signal is zero throughout.
+
+    Examples
+    --------
+    >>> nmse([[1.0], [1j]], [[1.1], [1j]])
+    array([0.005])
+    >>> nmse([[1.0], [1.0]], [[1.1], [0.9]], db=True).round(6)
+    array([-20.])
+    """
+    s, s_hat = _signals(truth, found)
+    ratio = _energy(s_hat - s) / _energy(s)
+    return _decibels(ratio) if db else ratio
+
+
+def sdr(truth: ArrayLike, found: ArrayLike) -> Float:
+    """Measure the signal-to-distortion ratio of each source, dB, its scale and phase set free.
+
+    Parameters
+    ----------
+    truth, found : array_like, shape (..., n_steps, n_sources)
+        Signals, real or complex, in the same order of sources.
+
+    Returns
+    -------
+    ndarray, shape (..., n_sources)
+        10 log10 of |αs|² / |ŝ - αs|², α = sᴴŝ / sᴴs the best factor; -inf if nothing of s is in ŝ,
+        inf if nothing else is.
+
+    Raises
+    ------
+    ValueError
+        As in `nmse`.
+
+    References
+    ----------
+    Le Roux, Wisdom, Erdogan and Hershey, "SDR - half-baked or well done?", ICASSP 2019, (3).
+
+    Examples
+    --------
+    >>> sdr([[1.0], [1.0]], [[3.3j], [2.7j]]).round(6)
+    array([20.])
+    """
+    s, s_hat = _signals(truth, found)
+    alpha = (s.conj() * s_hat).sum(axis=-2, keepdims=True) / _energy(s)[..., None, :]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = _energy(alpha * s) / _energy(s_hat - alpha * s)
+    return _decibels(np.where(np.isnan(ratio), 0.0, ratio))  # 0/0: nothing was found
+
+
+def _signals(truth: ArrayLike, found: ArrayLike) -> tuple[Complex | Float, Complex | Float]:
+    s, s_hat = np.asarray(truth), np.asarray(found)
+    if s.shape != s_hat.shape or s.ndim < 2:
+        raise ValueError(
+            "truth and found must have the same shape (..., n_steps, n_sources); "
+            f"got {s.shape} and {s_hat.shape}"
+        )
+    for name, signals in (("truth", s), ("found", s_hat)):
+        if signals.dtype.kind not in "biufc":
+            raise TypeError(f"{name} must hold numbers; got {signals.dtype}")
+        if not np.isfinite(signals).all():
+            raise ValueError(f"{name} must be finite: leave out steps that hold nothing")
+    if not _energy(s).all():
+        raise ValueError("truth must not be zero throughout, for any source")
+    return s + 0.0, s_hat + 0.0
+
+
+def _energy(s: Complex | Float) -> Float:
+    return np.asarray((s.real**2 + s.imag**2).sum(axis=-2))
+
+
+def _decibels(ratio: Float) -> Float:
+    with np.errstate(divide="ignore"):
+        return np.asarray(10 * np.log10(ratio))
