@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.checks import count, real
+from arrivals.motion_models.companion import radius, stationary
 from arrivals.typing import Complex, Float
 
 
@@ -85,23 +86,19 @@ def stationary_covariance(a: ArrayLike, q: float) -> Float:
     Traceback (most recent call last):
     ValueError: an AR process needs roots inside the unit circle; [1.0] has one of modulus 1
     """
-    from scipy.linalg import solve_discrete_lyapunov
-
     a = np.atleast_1d(real("coefficients", a))
     p = len(a)
     if a.ndim != 1 or p == 0 or not np.isfinite(a).all():
         raise ValueError(f"coefficients must be finite numbers a_1 ... a_p; got {a.tolist()}")
-    F = np.eye(p, k=-1)
-    F[0] = a
-    radius = np.abs(np.linalg.eigvals(F)).max()
-    if radius >= 1:
+    largest = float(radius(a))
+    if largest >= 1:
         raise ValueError(
             f"an AR process needs roots inside the unit circle; {a.tolist()} has one of modulus "
-            f"{radius:.6g}"
+            f"{largest:.6g}"
         )
-    Q = np.zeros((p, p))
-    Q[0, 0] = q
-    return np.asarray(solve_discrete_lyapunov(F, Q))
+    F, Q = np.eye(p, k=-1), np.zeros((p, p))
+    F[0], Q[0, 0] = a, q
+    return stationary(F, Q)
 
 
 def _real_signal(
