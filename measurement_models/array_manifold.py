@@ -136,9 +136,10 @@ class ArrayManifold(MeasurementModel):
         >>> wide.doa(wide.phases(0.8) + turns).round(6)
         np.float64(0.8)
         """
-        d = 2 * np.pi * self.distances
-        phi = np.moveaxis(np.asarray(phases, dtype=np.float64), -1, 0)
-        shaped("phases of one direction", phi[(slice(None), *([0] * (phi.ndim - 1)))], len(d))
+        d, given = 2 * np.pi * self.distances, np.asarray(phases, dtype=np.float64)
+        if given.shape[-1:] != d.shape:
+            raise ValueError(f"phases must have shape (..., {len(d)}); got {given.shape}")
+        phi = np.moveaxis(given, -1, 0)
         num, den = d[0] * phi[0], d[0] ** 2  # equal noise in all phases: weights d²
         for d_m, phi_m in zip(d[1:], phi[1:], strict=True):
             turns = np.rint((d_m * num / den - phi_m) / (2 * np.pi))

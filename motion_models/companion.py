@@ -24,6 +24,8 @@ class Blocks:
         Places of all lags; the source's last one stands in for those that it does not have.
     used : ndarray of bool, shape (n_sources, P)
         Which coefficients a source has.
+    columns : ndarray of int, shape (n_sources, P + 1)
+        `lags` with the current sample last: what a regression predicts from what.
     shift : ndarray, shape (dim, dim)
         What moves every lag on by one.
     order : ndarray of int, shape (dim,)
@@ -34,6 +36,7 @@ class Blocks:
     first: Int
     lags: Int
     used: Bool
+    columns: Int
     shift: Float
     order: Int
 
@@ -83,9 +86,10 @@ def blocks(orders: tuple[int, ...], lag_by_lag: bool = False) -> Blocks:
     used = places[:, 1:] >= 0
     shift = np.zeros((len(source), len(source)))
     shift[places[:, 1:][used], places[:, :-1][used]] = 1.0
-    for array in (lags, used, shift, order):
+    columns = np.roll(lags, -1, axis=1)
+    for array in (lags, used, columns, shift, order):
         array.setflags(write=False)
-    return Blocks(orders, lags[:, 0], lags, used, shift, order)
+    return Blocks(orders, lags[:, 0], lags, used, columns, shift, order)
 
 
 def radius(coefficients: Float) -> Float:

@@ -19,6 +19,7 @@ from arrivals.typing import Bool, Float
 
 FLOOR = 1e-4  # of a source's power: the least driving noise
 LEAST_NOISE = 1e-8  # of the largest source's power: the least measurement noise
+TINY = np.finfo(np.float64).tiny
 
 
 @dataclass(frozen=True, eq=False)
@@ -251,10 +252,8 @@ def covariance_rows(heard: Heard, k: int, centre: int) -> Float:
 
 def root(C: Float) -> Float:
     """Return a matrix L with L Lᵀ = C, made a little more than positive semidefinite."""
-    n = C.shape[-1]
-    trace = np.trace(C, axis1=-2, axis2=-1)[..., None, None]
-    tiny = np.finfo(np.float64).tiny
-    return np.asarray(np.linalg.cholesky(C + (1e-12 * trace / n + tiny) * np.eye(n)))
+    eye = np.eye(C.shape[-1])
+    return np.asarray(np.linalg.cholesky(C * (1 + 1e-12 * eye) + TINY * eye))
 
 
 # -- AR models (sec. 4) ----------------------------------------------------------------------------
@@ -266,13 +265,14 @@ def autoregression(
     """Return factors and weight of the AR regressions, coefficients, and driving variances."""
     p = blocks.used.shape[-1]
     parts = s.x.shape[-2]
-    present = np.concatenate([blocks.used, np.ones((len(blocks.used), 1))], axis=-1)
     w = np.repeat(heard.ar_weights, parts, axis=-1)[..., None, None]
     samples = lagged(s, heard.X, blocks, o.correction)
-    data = np.swapaxes(w * present * samples, -3, -2)
+    if not blocks.used.all():
+        samples = samples * present(blocks)
+    data = np.swapaxes(w * samples, -3, -2)
     stack = [np.sqrt(heard.ar_kept)[..., None, None, None] * s.models, data]
     if o.correction:
-        stack.append(transposed(root(lag_covariance(heard.ar_cov, blocks, present))))
+        stack.append(transposed(root(lag_covariance(heard.ar_cov, blocks))))
     ridge = o.ar_ridge * (1 - heard.ar_kept)[..., None, None] * s.power[..., None]
     ridge = np.broadcast_to(ridge, now.a.shape)
     models = folded(*stack, ridge_rows(ridge, now.a[..., None]))
@@ -280,7 +280,7 @@ def autoregression(
     a = stabilised(solution(models, p)[..., 0])
     if not o.adapt_drive:
         return models, weight, a, now.q
-    q = models[..., -1, -1] ** 2 / np.maximum(weight, np.finfo(np.float64).tiny)[..., None]
+    q = models[..., -1, -1] ** 2 / np.maximum(weight, TINY)[..., None]
     return models, weight, a, np.maximum(q, FLOOR * s.power)
 
 
@@ -290,18 +290,25 @@ def lagged(s: Sources, X: Float, blocks: Blocks, same: bool) -> Float:
     All as believed after sample j; or, without the correction, the lags as before it.
     """
     if same:
-        return X[..., np.roll(blocks.lags, -1, axis=-1)]
+        return X[..., blocks.columns]
     before = np.concatenate([s.x, X[..., : -s.x.shape[-2], :]], axis=-2)
     lags, now = before[..., blocks.lags[:, :-1]], X[..., blocks.lags[:, :1]]
     return np.concatenate([lags, now], axis=-1)
 
 
-def lag_covariance(P: Float, blocks: Blocks, present: Float) -> Float:
-    """Return the covariances of the columns of `lagged`, (..., n_sources, p + 1, p + 1)."""
-    places = np.roll(blocks.lags, -1, axis=-1)
-    C = P[..., places[:, :, None], places[:, None, :]]
-    if present.all():
+def lag_covariance(P: Float, blocks: Blocks) -> Float:
+    """Return the covariances of the columns of `lagged`, (..., n_sources, p + 1, p + 1).
+
+    A lag that a source does not have is 1 by itself.
+    """
+    C = P[..., blocks.columns[:, :, None], blocks.columns[:, None, :]]
+    if blocks.used.all():
         return C
-    return C * present[:, :, None] * present[:, None, :] + np.eye(present.shape[-1]) * (
-        1 - present[:, :, None]
-    )
+    there = present(blocks)
+    both = there[:, :, None] * there[:, None, :]
+    return np.asarray(C * both + np.eye(there.shape[-1]) * (1 - both))
+
+
+def present(blocks: Blocks) -> Float:
+    """Return 1 for the columns of `lagged` that a source has, 0 for others."""
+    return np.concatenate([blocks.used, np.ones((len(blocks.used), 1))], axis=-1)

@@ -11,7 +11,7 @@ import numpy as np
 
 from arrivals.typing import Float
 
-TOLERANCE, MOST_STEPS, STRIDE = 1e-6, 240, 4
+TOLERANCE, MOST_STEPS, STRIDE = 1e-4, 240, 4  # of what a stride changes; less is left
 
 
 def transposed(A: Float) -> Float:
