@@ -54,9 +54,9 @@ def past_step(W: Complex, P: Complex, y: Complex, beta: ArrayLike) -> tuple[Comp
     h = P @ z
     hH = h.conj().swapaxes(-1, -2)
     gH = hH / (beta + (hH @ z).real)
-    P = (P - h @ gH) / beta
-    P = (P + P.conj().swapaxes(-1, -2)) / 2  # rounding would grow as β⁻ⁿ
-    return W + (y - W @ z) @ gH, P
+    P = (P - h * gH) / (2 * beta)
+    P = P + P.conj().swapaxes(-1, -2)  # the Hermitian part: rounding would grow as β⁻ⁿ
+    return W + (y - W @ z) * gH, P
 
 
 @register("past")
@@ -181,9 +181,9 @@ class PAST(SubspaceTracker[Finder]):
         if self.energy == 0:
             return np.zeros(n), np.eye(n, dtype=np.complex128)
         Q, R = np.linalg.qr(self.W[live], mode="complete")
-        S = R[:L] @ np.linalg.solve(self.inverse, R[:L].conj().T) / self.total
+        S = R[:L] @ np.linalg.solve(self.inverse, R[:L].conj().T)
         values, turn = np.linalg.eigh((S + S.conj().T) / 2)
-        noise = (self.energy / self.total - values.sum()) / max(n - L, 1)
+        noise = (self.energy - values.sum()) / max(n - L, 1)
         values = np.concatenate([values[::-1], np.full(n - L, max(noise, 0.0))])
         return values, np.concatenate([Q[:, :L] @ turn[:, ::-1], Q[:, L:]], axis=1)
 

@@ -173,6 +173,8 @@ class Recorder:
     def _room(self, name: str, value: NDArray[Any]) -> NDArray[Any]:
         """Return the column, enlarged if it is too short in time or too narrow in slots."""
         column = self._columns.get(name)
+        if column is not None and self._n < len(column) and column.shape[1:] == value.shape:
+            return column  # the usual case
         wanted = (self._n + 1, *value.shape)
         if column is None:
             column = self._columns[name] = self._fresh(name, (16, *value.shape), value.dtype)
