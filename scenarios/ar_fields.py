@@ -144,7 +144,7 @@ class AutoregressiveField(SourceField):
         """Draw one trial."""
         motion = self.motion
         signals = ar_signals(
-            motion.coefficients, motion.noise, self.n_intervals * self.interval, rng,
+            list(motion.coefficients), motion.noise, self.n_intervals * self.interval, rng,
             complex_valued=not self.real_valued,
         )  # fmt: skip
         return self.heard(signals, motion, rng)

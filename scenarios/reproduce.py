@@ -21,6 +21,7 @@ QUICK = 10  # runs of a study that is only looked at
 
 # Where each study lives: a function of the number of runs and the seed. A new one gets its line.
 STUDIES: dict[str, str] = {
+    "ar-kf": "arrivals.scenarios.reproduce_ar:ar_kf",
     "interpolation-table1": "arrivals.scenarios.reproduce_interpolation:table1",
     "interpolation-convergence": "arrivals.scenarios.reproduce_interpolation:convergence",
     "interpolation-rmse": "arrivals.scenarios.reproduce_interpolation:rmse_study",

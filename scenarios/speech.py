@@ -74,9 +74,11 @@ class SpeechField(SourceField):
     @property
     def signals(self) -> Float:
         """The sources, (n_steps, n_sources)."""
-        own = [voice(name) for name in SHIPPED] if self.recordings is None else [
-            normalised(path) for path in self.recordings
-        ]  # fmt: skip
+        own: list[Float] = (
+            [voice(name) for name in SHIPPED]
+            if self.recordings is None
+            else [normalised(path) for path in self.recordings]
+        )
         shortest = min(map(len, own))
         return np.stack([signal[:shortest] for signal in own], axis=-1)
 
@@ -84,9 +86,8 @@ class SpeechField(SourceField):
     def motion(self) -> AutoregressiveSources:
         """The models that Yule and Walker's equations give."""
         fits = [yule_walker(signal, self.order) for signal in self.signals.T]
-        return AutoregressiveSources(
-            [a.tolist() for a, _ in fits], [q for _, q in fits], real_valued=True
-        )
+        coefficients = np.array([a for a, _ in fits])
+        return AutoregressiveSources(coefficients, [q for _, q in fits], real_valued=True)
 
     def sample(self, rng: np.random.Generator) -> Trial:
         """Draw the noise."""
