@@ -86,8 +86,8 @@ class SpeechField(SourceField):
     def motion(self) -> AutoregressiveSources:
         """The models that Yule and Walker's equations give."""
         fits = [yule_walker(signal, self.order) for signal in self.signals.T]
-        coefficients = np.array([a for a, _ in fits])
-        return AutoregressiveSources(coefficients, [q for _, q in fits], real_valued=True)
+        coefficients, noise = (np.array(each) for each in zip(*fits, strict=True))
+        return AutoregressiveSources(coefficients, noise, real_valued=True)
 
     def sample(self, rng: np.random.Generator) -> Trial:
         """Draw the noise."""
