@@ -55,8 +55,9 @@ class ARKalmanQRDRLS(Tracker):
     measurement : ArraySnapshot
         A line, symmetric about a centre sensor; its noise is where the estimate of it starts.
     motion : AutoregressiveSources
-        Where the estimates of the AR models start; its powers are those that the sources are
-        expected to have. Real-valued sources are heard with half of the noise.
+        Where the estimates of the AR models start; its powers, those that the sources are
+        expected to have over a long time, should be right within 10 dB. Real-valued sources are
+        heard with half of the noise.
     doa : sequence of float, optional
         Directions to start from, one a source, rad: nearer to their own source than to the next.
         If None, the likeliest places on a grid for the first 60 snapshots or so.
@@ -74,12 +75,13 @@ class ARKalmanQRDRLS(Tracker):
         Whether the covariance of the estimated samples enters the regressions. Without it, the
         plain regression of the report, directions are biased where there is noise.
     adapt_drive, adapt_noise : bool
-        Whether to estimate the driving and the measurement noise.
+        Whether to estimate the driving and the measurement noise. A driving noise that is not
+        estimated keeps its relation to the source's long-term power, as is right for speech.
     r_start, tau : float
         Noise at the start in terms of the sources' mean power, and in how many intervals it falls
         by e, where acquisition needs it: many sources, or little noise. 0: none.
     memory : float
-        Intervals that a source's long-term power is the mean of.
+        Intervals that a source's long-term power is the mean of, pauses included.
 
     Attributes
     ----------
@@ -146,7 +148,7 @@ class ARKalmanQRDRLS(Tracker):
         adapt_noise: bool = True,
         r_start: float = 0.0,
         tau: float = 25.0,
-        memory: float = 200.0,
+        memory: float = 1000.0,
     ) -> None:
         self.measurement = instance("measurement", measurement, ArraySnapshot)
         self.motion = instance("motion", motion, AutoregressiveSources)
@@ -340,7 +342,7 @@ class ARKalmanQRDRLS(Tracker):
     def _heard(self, s: Sources | None, z: Complex, end: int, history: History) -> Sources | None:
         """Work off the intervals that snapshots consist of, the first once they tell where."""
         parts, places = self.motion.n_parts, blocks(self.motion.orders, lag_by_lag=True)
-        manifold, options = self._manifold, self._options
+        manifold, options = self.manifold, self._options
         y = measured(z, manifold, parts)
         s = self._begun(y) if s is None else s
         if s is None:
@@ -357,8 +359,8 @@ class ARKalmanQRDRLS(Tracker):
         parts, n_sources = self.motion.n_parts, self.motion.n_sources
         if s is None or z.shape[1] == 0:
             return np.full((*z.shape[:2], n_sources), NOTHING)
-        y = measured(z, self._manifold, parts)
-        A = transposed(self._manifold.real_steering(s.doa))
+        y = measured(z, self.manifold, parts)
+        A = transposed(self.manifold.real_steering(s.doa))
         places = blocks(self.motion.orders, lag_by_lag=True)
         return joined(filtered(s, s, y, A, places, self._options).X, parts, n_sources)
 
@@ -370,10 +372,10 @@ class ARKalmanQRDRLS(Tracker):
             whole = [one[np.isfinite(one).all(axis=-1)] for one in y]
             if not all(len(one) for one in whole):
                 return None
-            doa = np.array([acquired(one, self.motion, self._manifold) for one in whole])
+            doa = np.array([acquired(one, self.motion, self.manifold) for one in whole])
         x, P = inside(self.x, self.P, self.motion)
         x, P = (np.repeat(value[None], len(y), axis=0) for value in (x, P))
-        return beginning(doa, x, P, self.motion, self._manifold, self._options)
+        return beginning(doa, x, P, self.motion, self.manifold, self._options)
 
     def _now(self, n: int) -> Sources | None:
         """Return the present belief n times, with `x` and `P` if they were assigned."""
@@ -399,7 +401,8 @@ class ARKalmanQRDRLS(Tracker):
         self.n_pending = len(rest)
 
     @property
-    def _manifold(self) -> ArrayManifold:
+    def manifold(self) -> ArrayManifold:
+        """The real response of the array."""
         return _manifold(self.measurement)
 
     @property

@@ -19,6 +19,8 @@ from arrivals.typing import Bool, Float
 
 FLOOR = 1e-4  # of a source's power: the least driving noise
 LEAST_NOISE = 1e-8  # of the largest source's power: the least measurement noise
+AUDIBLE = 0.5  # of the noise: a source below the gate's part of that is silent in any case
+PRIOR = 20.0
 TINY = np.finfo(np.float64).tiny
 
 
@@ -92,11 +94,11 @@ def interval(
 def settled(s: Sources, new: Sources, heard: Heard, o: Options) -> Sources:
     """Take over the state, hold those sources that are silent, and learn noise and powers."""
     loud = sounding(heard.X, s.doa.shape[-1], s.x.shape[-2])
-    active = loud > o.gate * s.power
-    if o.gate == 0:
-        active = np.ones_like(active)
-    anyone = active.any(axis=-1) & (heard.kept < 1)
-    active &= anyone[..., None]
+    something = np.asarray(heard.kept < 1)[..., None]
+    least = o.gate * np.maximum(s.power, AUDIBLE * s.r[..., None])
+    active = np.logical_and((loud > least) | (o.gate == 0), something)
+    anyone = np.asarray(active.any(axis=-1))
+    power = np.where(something, learned_power(s, loud, o), s.power)
     return replace(
         new,
         x=heard.X[..., -s.x.shape[-2] :, :],
@@ -104,7 +106,8 @@ def settled(s: Sources, new: Sources, heard: Heard, o: Options) -> Sources:
         doa=np.where(active, new.doa, s.doa),
         rows=np.where(anyone[..., None, None], new.rows, s.rows),
         r=learned_noise(s, heard, o),
-        power=learned_power(s, loud, heard, o),
+        power=power,
+        q=new.q if o.adapt_drive else s.q * power / s.power,
         active=active,
         n=s.n + 1,
     )
@@ -124,9 +127,13 @@ def learned_noise(s: Sources, heard: Heard, o: Options) -> Float:
     return np.asarray(np.maximum(0.9 * s.r + 0.1 * new, LEAST_NOISE * s.power.max(axis=-1)))
 
 
-def learned_power(s: Sources, loud: Float, heard: Heard, o: Options) -> Float:
-    """Return each source's mean power over the last `memory` intervals."""
-    return s.power
+def learned_power(s: Sources, loud: Float, o: Options) -> Float:
+    """Return each source's mean power over the last `memory` intervals, pauses included.
+
+    What is known at the start counts as much as the first `PRIOR` intervals.
+    """
+    share = 1 / np.minimum(s.n + PRIOR, max(o.memory, PRIOR))[..., None]
+    return np.asarray(np.maximum(s.power + share * (loud - s.power), TINY))
 
 
 def noise_now(s: Sources, o: Options) -> Float:
