@@ -19,8 +19,11 @@ from arrivals.scenarios.metrics import Gospa, gospa, mean_gospa, mean_rmse, ospa
 from arrivals.scenarios.plots import plot_array, plot_bearing_time
 from arrivals.scenarios.readers import read
 from arrivals.scenarios.recordings import Recording, Snapshots
+from arrivals.scenarios.swellex96 import TowPastLine
+from arrivals.scenarios.waveguides import BottomLayer, Waveguide
 
 __all__ = [
+    "BottomLayer",
     "Gospa",
     "InterpolationBand",
     "InterpolationCoupled",
@@ -34,7 +37,9 @@ __all__ = [
     "SixStatic",
     "Snapshots",
     "ThreeStatic",
+    "TowPastLine",
     "Trial",
+    "Waveguide",
     "available",
     "create",
     "find",
