@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from arrivals.checks import count, number, positive, real
 from arrivals.scenarios.rays import Fan, floor_reflection, traced
 from arrivals.scenarios.waveguides import Waveguide
-from arrivals.typing import Complex, Float, Int
+from arrivals.typing import Bool, Complex, Float, Int
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +104,11 @@ def eigenrays(
     ValueError
         If a depth does not lie in the water, or a range is not positive.
 
+    Notes
+    -----
+    The fan starts just beside the horizontal: a direct ray along it is not found. A ray near a
+    caustic has too high a level, as ray theory has it.
+
     References
     ----------
     Jensen, Kuperman, Porter and Schmidt, *Computational Ocean Acoustics*, 2nd ed., 2011, sections
@@ -157,21 +162,25 @@ def _path(
     (x_source, t_source), (x_sensor, t_sensor) = fan.at(source_depth), fan.at(depths)
     x = _travelled(name, x_source, x_sensor, fan.whole_range)
     t = _travelled(name, t_source, t_sensor, fan.whole_time)
-    c = np.interp(depths, guide.depths, guide.speeds)[:, None]
-    sine = np.sqrt(np.maximum(1 - (fan.slowness * c) ** 2, 1e-12))
-    slope = np.gradient(x, fan.angle, axis=-1)
-    c_source = np.interp(source_depth, guide.depths, guide.speeds)
-    with np.errstate(invalid="ignore"):
-        spread = c / c_source * np.cos(fan.angle) / (x * (np.abs(slope) + 1e-3) * sine)
-        amplitude = np.sqrt(spread) / (4 * np.pi) * _bounced(name, fan, floor, slope)
-    down = depths > source_depth if name == "D" else np.full(len(depths), name.endswith("S"))
-    doa = np.where(down[:, None], 1, -1) * np.arcsin(sine)
     sensor, ray, step = _crossings(x, ranges)
-    weight = (ranges[step] - x[sensor, ray]) / (x[sensor, ray + 1] - x[sensor, ray])
-    between = [
-        (1 - weight) * y[sensor, ray] + weight * y[sensor, ray + 1] for y in (doa, t, amplitude)
-    ]
-    return (np.full(len(step), name), step, sensor, *between)
+    before, after = x[sensor, ray], x[sensor, ray + 1]
+    r, weight = ranges[step], (ranges[step] - before) / (after - before)
+
+    def between(low: NDArray[Any], high: NDArray[Any]) -> NDArray[Any]:
+        return np.asarray((1 - weight) * low + weight * high)
+
+    angle = between(fan.angle[ray], fan.angle[ray + 1])
+    time = between(t[sensor, ray], t[sensor, ray + 1])
+    reflected = between(floor[ray], floor[ray + 1])
+    slope = (after - before) / (fan.angle[ray + 1] - fan.angle[ray])
+    c_source, c = (np.interp(z, guide.depths, guide.speeds) for z in (source_depth, depths[sensor]))
+    sine = np.sqrt(np.maximum(1 - (np.cos(angle) * c / c_source) ** 2, 1e-9))  # Snell
+    spread = c / c_source * np.cos(angle) / (r * np.maximum(np.abs(slope), 1e-3) * sine)
+    bounced = _bounced(name, fan.turns_above[ray], fan.turns_below[ray], reflected, slope)
+    down = depths[sensor] > source_depth if name == "D" else name.endswith("S")
+    doa = np.where(down, 1, -1) * np.arcsin(sine)
+    path = np.full(len(step), name)
+    return path, step, sensor, doa, time, np.sqrt(spread) / (4 * np.pi) * bounced
 
 
 def _travelled(name: str, source: Float, sensor: Float, whole: Float) -> Float:
@@ -187,19 +196,18 @@ def _travelled(name: str, source: Float, sensor: Float, whole: Float) -> Float:
     return first + (len(name) - 1) * whole + last
 
 
-def _bounced(name: str, fan: Fan, floor: Complex, slope: Float) -> Complex:
-    """Return what bounces and a caustic do to the pressure, (n_sensors, n_rays).
+def _bounced(name: str, above: Bool, below: Bool, floor: Complex, slope: Float) -> Complex:
+    """Return what bounces and a caustic do to the pressure of rays (n_rays,).
 
-    The surface turns the sign. A ray that turns by itself loses nothing. Range falls with growing
-    angle, or grows after an odd number of turning points, until the ray touches a caustic, after
-    which sound that turns as exp(+jωt) is ahead by π/2.
+    The surface turns the sign. A ray that turns by itself, `above` or `below`, loses nothing.
+    Range falls with growing angle, or grows after an odd number of turning points, until the ray
+    touches a caustic, after which sound that turns as exp(+jωt) is ahead by π/2.
     """
     n_surface, n_floor = name.count("S"), name.count("B")
-    surface = np.where(fan.turns_above, 1.0, -1.0) ** n_surface
-    turned = n_surface * fan.turns_above + n_floor * fan.turns_below
-    touched = (slope > 0) != (turned % 2 == 1)
+    turned = n_surface * above + n_floor * below
+    caustic = np.where((slope > 0) == (turned % 2 == 1), 1.0, 1j)
     return np.asarray(
-        surface * np.where(fan.turns_below, 1.0, floor) ** n_floor * np.where(touched, 1j, 1.0)
+        caustic * np.where(above, 1.0, -1.0) ** n_surface * np.where(below, 1.0, floor) ** n_floor
     )
 
 

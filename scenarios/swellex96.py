@@ -134,7 +134,8 @@ class TowPastLine(Scenario):
     missing: Sequence[int] = (43,)
 
     def __post_init__(self) -> None:
-        number("snr_db", self.snr_db)
+        if not np.isfinite(number("snr_db", self.snr_db)):
+            raise ValueError(f"snr_db must be finite; got {self.snr_db} (field() has no noise)")
         positive("frequency", self.frequency)
         environment().in_water("source_depth", positive("source_depth", self.source_depth))
         one_of("model", self.model, ("modes", "rays"))
