@@ -224,8 +224,11 @@ def speed(runs: int = 100) -> None:
           "times faster than filterpy | RMSE |\n|---|---|---|---|")  # fmt: skip
     for name, (ms, error) in timed.items():
         print(f"| {name} | {ms:.2f} | {reference / ms:.1f} | {error:.2f} |")
-    made.set_params(each_sensor=False)
-    print(f"\nArray calls per snapshot, whatever the batch: {array_calls(made, samples)}.")
+    for each_sensor in (False, True):
+        made.set_params(each_sensor=each_sensor)
+        form = "sensor" if each_sensor else "snapshot"
+        calls = array_calls(made, samples)
+        print(f"\nArray calls a snapshot, coefficients at every {form}: {calls}, for any batch.")
 
 
 def run_once(made: InterpolationEKF, sequence: Float) -> float:

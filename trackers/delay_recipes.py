@@ -37,13 +37,14 @@ class Recipe:
     both_ways: bool = False
     joint: Literal["delay_line", "phasor"] | None = None
     acquire: bool = False
+    each_sensor: bool = False
 
 
 VARIANTS: dict[str, Recipe] = {
-    "B": Recipe(offsets=(0, 1), loading=0.0),
-    "Bw": Recipe(offsets=(0, 1)),
+    "B": Recipe(offsets=(0, 1), loading=0.0, each_sensor=True),
+    "Bw": Recipe(offsets=(0, 1), each_sensor=True),
     "C": Recipe(both_ways=True),
-    "D": Recipe(baselines=(1, 2, 4, 7)),
+    "D": Recipe(baselines=(1, 2, 4, 7), each_sensor=True),
     "E": Recipe(joint="delay_line"),
     "E2": Recipe(both_ways=True, joint="delay_line", acquire=True),
     "phasor": Recipe(joint="phasor"),
@@ -115,7 +116,6 @@ def assembled(
     measurement: ArraySamples,
     motion: MotionModel,
     recipe: Recipe,
-    each_sensor: bool,
     aligned: bool,
     drive: float | None,
     acquisition: int,
@@ -126,7 +126,7 @@ def assembled(
     kappa, n_places = measurement.kappa, measurement.n_places
     line = _line(measurement, recipe, drive)
     looks, highest = _looks(measurement, recipe, extrapolate), measurement.correlation.highest
-    neighbours = Neighbours(looks, kappa, highest, each_sensor, aligned, gate)
+    neighbours = Neighbours(looks, kappa, highest, recipe.each_sensor, aligned, gate)
     if line is None:
         return Parts(motion, None, neighbours, kappa, n_places, acquisition)
     both = Stacked(motion, LinearMotion(line.transition, line.innovation))

@@ -49,11 +49,11 @@ class InterpolationEKF(KalmanType):
         at most 0.12 in sin β.
     rate_std : float
         Standard deviation of the direction's rate at the start, rad per snapshot.
-    offsets, loading, baselines, both_ways : optional
+    offsets, loading, baselines, both_ways, each_sensor : optional
         In place of the variant's own: taps (of baseline 1), ε_c, distances in sensors between
-        which is interpolated, and whether backwards too.
-    each_sensor : bool
-        Take new coefficients at every sensor instead of at every snapshot.
+        which is interpolated, whether backwards too, and whether coefficients are taken anew at
+        every sensor ("B", "Bw" and "D") or once a snapshot (the others). The former costs some
+        nine times the array calls and finds the source from farther off; see Notes.
     aligned : bool
         All baselines treat the same snapshot, which makes the longer ones no later than the
         others, and all of them as late as the longest.
@@ -98,6 +98,10 @@ class InterpolationEKF(KalmanType):
     `std` is the filter's own: 1.2 to 1.6 times too large for "B" and "C", whose residuals share
     noise; about right for "D" and "E".
 
+    Of 400 trials of a tone at 60° and 5 dB that start at 0°, those that end within 3° are 64 %
+    with coefficients at every sensor and 6 % with those once a snapshot for "B", 89 and 67 % for
+    "D", 87 and 94 % for "C". From 20° all but 5 % do, with any.
+
     The index of the paper's (3) and (11) is one sample off (4); offsets (0, 1) follow (4).
 
     References
@@ -132,7 +136,7 @@ class InterpolationEKF(KalmanType):
         loading: float | None = None,
         baselines: Sequence[int] | None = None,
         both_ways: bool | None = None,
-        each_sensor: bool = False,
+        each_sensor: bool | None = None,
         aligned: bool = False,
         drive: float | None = None,
         acquisition: int = 25,
@@ -308,13 +312,14 @@ class InterpolationEKF(KalmanType):
             loading=own.loading if self.loading is None else self.loading,
             baselines=own.baselines if self.baselines is None else tuple(self.baselines),
             both_ways=own.both_ways if self.both_ways is None else self.both_ways,
+            each_sensor=own.each_sensor if self.each_sensor is None else self.each_sensor,
         )
 
     @property
     def _parts(self) -> Parts:
         """The models that do the work; the same ones as long as no parameter changes."""
         return assembled(
-            self.measurement, self.motion, self.recipe, self.each_sensor, self.aligned,
+            self.measurement, self.motion, self.recipe, self.aligned,
             self.drive, self.acquisition, self.gate, self.extrapolate,
         )  # fmt: skip
 
