@@ -175,12 +175,13 @@ def _path(
     slope = (after - before) / (fan.angle[ray + 1] - fan.angle[ray])
     c_source, c = (np.interp(z, guide.depths, guide.speeds) for z in (source_depth, depths[sensor]))
     sine = np.sqrt(np.maximum(1 - (np.cos(angle) * c / c_source) ** 2, 1e-9))  # Snell
-    spread = c / c_source * np.cos(angle) / (r * np.maximum(np.abs(slope), 1e-3) * sine)
-    bounced = _bounced(name, fan.turns_above[ray], fan.turns_below[ray], reflected, slope)
     down = depths[sensor] > source_depth if name == "D" else name.endswith("S")
     doa = np.where(down, 1, -1) * np.arcsin(sine)
-    path = np.full(len(step), name)
-    return path, step, sensor, doa, time, np.sqrt(spread) / (4 * np.pi) * bounced
+    # a tube of rays keeps its power
+    spread = c / c_source * np.cos(angle) / (r * np.maximum(np.abs(slope), 1e-3) * sine)
+    bounced = _bounced(name, fan.turns_above[ray], fan.turns_below[ray], reflected, slope)
+    amplitude = np.sqrt(spread) / (4 * np.pi) * bounced
+    return np.full(len(step), name), step, sensor, doa, time, amplitude
 
 
 def _travelled(name: str, source: Float, sensor: Float, whole: Float) -> Float:

@@ -91,23 +91,23 @@ def modes(
     omega = 2 * np.pi * positive("frequency", frequency)
     depth, density, loss = _cells(guide, positive("step", step))
     h = np.diff(depth)
-    quarter = [depth[:-1] + h / 4, depth[1:] - h / 4]
-    k2 = (omega / guide.speed(quarter)) ** 2
-    mass, stiffness = _nodes(h / density / 2), _nodes(h / density / 2, k2)
+    k_water = omega / guide.speed([depth[:-1] + h / 4, depth[1:] - h / 4])  # of half cells
+    mass = _nodes(h / density / 2)
     spring = 1 / (density * h)
-    diagonal = (stiffness - _nodes(spring)) / mass
+    diagonal = (_nodes(h / density / 2, k_water**2) - _nodes(spring)) / mass
     off = spring / np.sqrt(mass[:-1] * mass[1:])
-    inner = slice(1, None if guide.rigid else -1)
+    inner = slice(1, None if guide.rigid else -1)  # ψ = 0 at the other nodes
     fastest = _fastest(guide) if steepest is None else positive("steepest", steepest)
-    window = ((omega / fastest) ** 2, (omega / guide.speed(depth).min()) ** 2)
-    off = off[1:] if guide.rigid else off[1:-1]
-    k_squared, u = eigh_tridiagonal(diagonal[inner], off, select="v", select_range=window)
-    if len(k_squared) == 0:
+    k2, u = eigh_tridiagonal(
+        diagonal[inner], off[inner], select="v",
+        select_range=((omega / fastest) ** 2, k_water.max() ** 2),
+    )  # fmt: skip
+    if len(k2) == 0:
         raise ValueError(f"no mode propagates at {frequency} Hz below {fastest} m/s")
-    k = np.sqrt(k_squared[::-1])
+    k = np.sqrt(k2[::-1])
     shape = np.zeros((len(k), len(depth)))
     shape[:, inner] = u.T[::-1] / np.sqrt(mass[inner])
-    alpha = _nodes(nepers(loss, frequency) * h / density / 2, np.sqrt(k2))
+    alpha = _nodes(nepers(loss, frequency) * h / density / 2, k_water)
     return Modes(k - 1j * (shape**2 @ alpha) / k, depth, shape)
 
 
