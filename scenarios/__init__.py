@@ -52,6 +52,11 @@ __all__ = [
     "ThreeOnThree",
     "SpeechField",
     "SpeechOfOrderTwo",
+from arrivals.scenarios.swellex96 import TowPastLine
+from arrivals.scenarios.waveguides import BottomLayer, Waveguide
+
+__all__ = [
+    "BottomLayer",
     "Gospa",
     "InterpolationBand",
     "InterpolationCoupled",
@@ -65,8 +70,10 @@ __all__ = [
     "SixStatic",
     "Snapshots",
     "ThreeStatic",
+    "TowPastLine",
     "Trial",
     "ar_signals",
+    "Waveguide",
     "available",
     "best_assignment_rmse",
     "create",

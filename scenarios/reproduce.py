@@ -26,7 +26,10 @@ STUDIES: dict[str, str] = {
     "interpolation-convergence": "arrivals.scenarios.reproduce_interpolation:convergence",
     "interpolation-rmse": "arrivals.scenarios.reproduce_interpolation:rmse_study",
     "interpolation-moving": "arrivals.scenarios.reproduce_interpolation:moving",
+    "swellex96": "arrivals.scenarios.reproduce_swellex:swellex96",
 }
+# Runs of a study, and of a quick look at it, where they are not 100 and `QUICK`.
+RUNS: dict[str, tuple[int, int]] = {"swellex96": (4, 1)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +126,7 @@ def reproduce(
     out : path
         Folder; it is made if it is not there.
     runs : int, optional
-        Trials of each case; 100, or 10 if `quick`.
+        Trials of each case; 100, or 10 if `quick`, or what `RUNS` says.
     seed : int
     quick : bool
     jobs : int
@@ -150,7 +153,8 @@ def reproduce(
     if jobs != -1:
         count("jobs", jobs)
     module, _, function = STUDIES[one_of("name", name, tuple(STUDIES))].partition(":")
-    n_runs = (QUICK if quick else 100) if runs is None else count("runs", runs, least=2)
+    many, few = RUNS.get(name, (100, QUICK))
+    n_runs = (few if quick else many) if runs is None else count("runs", runs, least=min(few, 2))
     study: Callable[[int, int], Report] = getattr(importlib.import_module(module), function)
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
