@@ -83,9 +83,9 @@ def levels(
     theta: Float,
     sensors: Float,
     alpha: float,
-    log_noise: ArrayLike,
+    log_noise: float | Float,
     r_min: float,
-    log_gain: ArrayLike = 0.0,
+    log_gain: float | Float = 0.0,
 ) -> Levels:
     """Return log σ_y = ½ log(Σ e^{2u} R^-α + σ_n²) and the shares λ, by softmax.
 
@@ -125,7 +125,7 @@ def levels(
     """
     seen = offsets(theta, sensors, r_min)
     power = 2 * (u[..., None] + log_gain) - 0.5 * alpha * np.log(seen.square)
-    noise = 2 * np.asarray(log_noise)
+    noise: Float = 2.0 * np.asarray(log_noise)
     top = np.maximum(power.max(axis=-2, initial=-np.inf), noise)
     top = np.where(np.isneginf(top), 0.0, top)
     shares = np.exp(power - top[..., None, :])  # the logarithms are never exponentiated first
@@ -157,9 +157,7 @@ class Field(NamedTuple):
 
     def levels(self, u: Float, theta: Float) -> Levels:
         """Return log σ_y and shares of sources (..., n_sources), (..., n_sources, 2)."""
-        return levels(
-            u, theta, self.sensors, self.alpha, self.log_noise, self.r_min, self.log_gain
-        )
+        return levels(u, theta, self.sensors, self.alpha, self.log_noise, self.r_min, self.log_gain)
 
     def offsets(self, theta: Float) -> Offsets:
         """Return what positions (..., n_sources, 2) look like from the sensors."""

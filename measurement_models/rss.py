@@ -135,7 +135,7 @@ class LogNormalRSS(MeasurementModel):
         }
         own["position"], own["amplitude"] = _entries(position, amplitude)
         if own["sigma"] is not None and not np.all(np.asarray(own["sigma"]) > 0):
-            raise ValueError(f"sigma must be positive; got {sigma}")
+            raise ValueError(f"sigma must be positive; got {sigma!r}")
         own["_noise"] = -np.inf if own["log_noise"] is None else own["log_noise"]
         own["_bias"], own["_variance"] = _moments(
             own["sigma"], own["n_snapshots"], own["exact_moments"], n
@@ -263,9 +263,7 @@ class LogNormalRSS(MeasurementModel):
 
     def _content(self) -> tuple[object, ...]:
         params = self.get_params(deep=False).values()
-        return tuple(
-            (v.shape, v.tobytes()) if isinstance(v, np.ndarray) else v for v in params
-        )
+        return tuple((v.shape, v.tobytes()) if isinstance(v, np.ndarray) else v for v in params)
 
 
 def per_sensor(name: str, value: ArrayLike, n: int) -> float | Float:

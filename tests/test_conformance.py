@@ -8,6 +8,7 @@ import pytest
 from delay_trackers import TRACKERS as DELAY_TRACKERS
 from kalman_trackers import TRACKERS as KALMAN_TRACKERS
 from numpy.typing import ArrayLike
+from rss_trackers import TRACKERS as RSS_TRACKERS
 
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.motion_models import BernoulliVonMises
@@ -51,7 +52,7 @@ GRIDLESS: list[tuple[str, MakeTracker, Measurements]] = [
     ),
 ]
 # A new tracker gets its line here, or in the list that is about its kind.
-TRACKERS = [*GRIDLESS, *KALMAN_TRACKERS, *DELAY_TRACKERS]
+TRACKERS = [*GRIDLESS, *KALMAN_TRACKERS, *DELAY_TRACKERS, *RSS_TRACKERS]
 IDS = [f"{name}-{n}" for n, (name, _, _) in enumerate(TRACKERS)]
 
 every_check = pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
