@@ -19,14 +19,19 @@ class Offsets(NamedTuple):
         Source minus sensor, m.
     square : ndarray
         R², not below R_min², m².
-    inverse : ndarray
-        1/R², 0 where the floor acts and the level has no slope.
+    floor : float
+        R_min², m².
     """
 
     dx: Float
     dy: Float
     square: Float
-    inverse: Float
+    floor: float
+
+    @property
+    def inverse(self) -> Float:
+        """1/R², 0 where the floor acts and the level has no slope."""
+        return np.asarray((self.square > self.floor) / self.square)
 
     @property
     def log_range(self) -> Float:
@@ -56,9 +61,9 @@ def offsets(theta: Float, sensors: Float, r_min: float) -> Offsets:
     dy = theta[..., 1, None] - sensors[..., None, :, 1]
     square = dx * dx
     square += dy * dy
-    inside = square <= r_min**2
-    square = np.maximum(square, r_min**2)
-    return Offsets(dx, dy, square, np.where(inside, 0.0, 1 / square))
+    floor = r_min * r_min
+    np.maximum(square, floor, out=square)
+    return Offsets(dx, dy, square, floor)
 
 
 class Levels(NamedTuple):

@@ -1,5 +1,7 @@
 """The trackers of signal strength, for `test_conformance`."""
 
+from typing import Any
+
 import numpy as np
 
 from arrivals.measurement_models import LogNormalRSS, db_to_neper
@@ -27,7 +29,7 @@ def readings(model: LogNormalRSS) -> Measurements:
 
 
 WALK, DRIVE = RandomWalk(q=1.0), ConstantVelocity(q=0.1)
-START = {"x0": TRUTH + 4.0, "P0": 50.0 * np.eye(2)}
+START: dict[str, Any] = {"x0": TRUTH + 4.0, "P0": 50.0 * np.eye(2)}
 X5 = np.insert(X4, 4, 0.01, axis=1)
 
 TRACKERS: list[tuple[str, MakeTracker, Measurements]] = [

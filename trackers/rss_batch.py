@@ -18,7 +18,7 @@ from arrivals.typing import Float, Int
 if TYPE_CHECKING:
     from arrivals.trackers.rss_tracker import RSSTracker
 
-AT_ONCE = 10_000  # readings side by side: what stays in the cache
+AT_ONCE = 20_000  # readings side by side: what stays in the cache
 
 
 def run_in_chunks(tracker: RSSTracker, xi: Float, dt: float) -> list[Run]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from arrivals.measurement_models.path_loss import Levels, Offsets
 from arrivals.trackers.rss_problem import Problem, symmetric_2x2
-from arrivals.typing import Float
+from arrivals.typing import Bool, Float, Int
 
 HALVINGS = 12  # of a Newton step that makes φ rise
 LOWEST = 1e-3  # of the Gauss-Newton trace: below, the curvature is not trusted
@@ -71,12 +71,12 @@ def gauss_seidel(
         r = r - lam[:, j] * (new - u[:, j])[:, None]
         u[:, j] = new
     c = 0.5 * problem.field.alpha * lam
-    log_range = 0.5 * np.log(found.offsets.square)
+    log_range = found.offsets.log_range
     for j in range(u.shape[-1]):
         one = slice(j, j + 1)
-        bowl = Bowl(problem, c[:, one], r[:, None] - c[:, one] * log_range[:, one], one)
-        theta[:, one], P[:, one], there = newton(bowl, theta[:, one], newton_steps, tolerance)
-        r = bowl.residual(there)[:, 0]
+        bowl = bowl_of(problem, c[:, one], r[:, None], log_range[:, one], one)
+        theta[:, one], P[:, one], rho = newton(bowl, theta[:, one], newton_steps, tolerance)
+        r = rho[:, 0]
     return Factors(u, w, theta, P)
 
 
@@ -92,9 +92,15 @@ def jacobi(
     pull = dot(problem.W[:, None] * lam, r[:, None] + lam * u[..., None])
     new = (problem.prior.w * problem.prior.mu + pull) / w  # (10)
     c = 0.5 * problem.field.alpha * lam
-    base = r[:, None] - c * (0.5 * np.log(found.offsets.square))
-    theta, P, _ = newton(Bowl(problem, c, base, slice(None)), theta, newton_steps, tolerance)
+    bowl = bowl_of(problem, c, r[:, None], found.offsets.log_range, slice(None))
+    theta, P, _ = newton(bowl, theta, newton_steps, tolerance)
     return Factors(new, w, theta, P)
+
+
+class _Look(NamedTuple):
+    seen: Offsets
+    rho: Float
+    phi: Float
 
 
 class Bowl(NamedTuple):
@@ -103,8 +109,8 @@ class Bowl(NamedTuple):
     Parameters
     ----------
     problem : Problem
-    c : ndarray, shape (n_batch, n, n_sensors)
-        ½αλ of some sources.
+    c, half : ndarray, shape (n_batch, n, n_sensors)
+        ½αλ of some sources, and half of it.
     base : ndarray, shape (n_batch, n, n_sensors)
         r - c log R̄.
     which : slice
@@ -113,16 +119,26 @@ class Bowl(NamedTuple):
 
     problem: Problem
     c: Float
+    half: Float
     base: Float
     which: slice
 
-    def residual(self, seen: Offsets) -> Float:
-        """Return ρ, (n_batch, n, n_sensors)."""
-        log_square = np.log(seen.square)
-        log_square *= self.c
-        log_square *= 0.5
-        log_square += self.base
-        return log_square
+    def look(self, theta: Float) -> _Look:
+        """Return offsets, ρ and φ at positions (n_batch, n, 2)."""
+        seen = self.problem.field.offsets(theta)
+        rho = np.log(seen.square)
+        rho *= self.half
+        rho += self.base
+        step, pull = self.step(theta)
+        W = self.problem.W[:, None]
+        phi = 0.5 * (dot(W * rho, rho) + (step * pull).sum(axis=-1))
+        return _Look(seen, rho, phi)
+
+    def take(self, rows: Int) -> Bowl:
+        """Return some of the batch."""
+        return Bowl(
+            self.problem.take(rows), self.c[rows], self.half[rows], self.base[rows], self.which
+        )
 
     def step(self, theta: Float) -> tuple[Float, Float]:
         """Return θ - θ₀ and Σ₀⁻¹(θ - θ₀)."""
@@ -130,19 +146,15 @@ class Bowl(NamedTuple):
         P = self.problem.prior.P[:, self.which]
         return step, (P * step[..., None, :]).sum(axis=-1)
 
-    def value(self, theta: Float, rho: Float) -> Float:
-        """Return φ at positions (n_batch, n, 2)."""
-        step, pull = self.step(theta)
-        W = self.problem.W[:, None]
-        return np.asarray(0.5 * (dot(W * rho, rho) + (step * pull).sum(axis=-1)))
-
-    def slopes(self, theta: Float, seen: Offsets, rho: Float) -> tuple[Float, Float]:
+    def slopes(self, theta: Float, look: _Look) -> tuple[Float, Float]:
         """Return gradient (n_batch, n, 2) and a positive Hessian (n_batch, n, 2, 2) of φ.
 
         Where the curvature is not clearly positive, it is Gauss and Newton's.
         """
         W, P0 = self.problem.W[:, None], self.problem.prior.P[:, self.which]
-        ex, ey = seen.dx * seen.inverse, seen.dy * seen.inverse
+        seen, rho = look.seen, look.rho
+        inverse = seen.inverse
+        ex, ey = seen.dx * inverse, seen.dy * inverse
         s = W * self.c
         t = s * rho
         s = s * self.c
@@ -151,7 +163,7 @@ class Bowl(NamedTuple):
         sx, sy = s * ex, s * ey
         a, b, c = dot(sx, ex), dot(sx, ey), dot(sy, ey)
         tx, ty = t * ex, t * ey
-        bend = dot(t, seen.inverse)
+        bend = dot(t, inverse)
         full = (
             a + bend - 2 * dot(tx, ex) + P0[..., 0, 0],
             b - 2 * dot(tx, ey) + P0[..., 0, 1],
@@ -164,45 +176,51 @@ class Bowl(NamedTuple):
         )
 
 
-def newton(bowl: Bowl, theta: Float, steps: int, tolerance: float) -> tuple[Float, Float, Offsets]:
-    """Return the modes of φ, its Hessians there, and what they look like from the sensors.
+def bowl_of(problem: Problem, c: Float, r: Float, log_range: Float, which: slice) -> Bowl:
+    """Return the bowl of sources from the residuals r and log ranges at the expansion point."""
+    return Bowl(problem, c, 0.5 * c, r - c * log_range, which)
+
+
+def newton(bowl: Bowl, theta: Float, steps: int, tolerance: float) -> tuple[Float, Float, Float]:
+    """Return the modes of φ, its Hessians there, and ρ there.
 
     Each position stops by itself, when its step is shorter than `tolerance`, m.
     """
-    field = bowl.problem.field
-    seen = field.offsets(theta)
-    rho = bowl.residual(seen)
-    phi = bowl.value(theta, rho)
-    moving = np.ones(phi.shape, dtype=np.bool_)
+    look = bowl.look(theta)
+    moving = np.ones(look.phi.shape, dtype=np.bool_)
     for _ in range(steps):
-        gradient, H = bowl.slopes(theta, seen, rho)
+        gradient, H = bowl.slopes(theta, look)
         step = np.where(moving[..., None], -solve_2x2(H, gradient), 0.0)
         moving = moving & (np.hypot(step[..., 0], step[..., 1]) > tolerance)
-        theta, seen, rho, phi = _descended(bowl, theta, step, (seen, rho, phi))
+        theta, look = _descended(bowl, theta, step, look)
         if not moving.any():
             break
-    _, H = bowl.slopes(theta, seen, rho)
-    return theta, H, seen
+    _, H = bowl.slopes(theta, look)
+    return theta, H, look.rho
 
 
-def _descended(
-    bowl: Bowl, theta: Float, step: Float, before: tuple[Offsets, Float, Float]
-) -> tuple[Float, Offsets, Float, Float]:
-    """Return positions after a step, halved until φ does not rise, with offsets, ρ and φ there."""
-    for _ in range(HALVINGS + 1):
-        to = theta + step
-        seen = bowl.problem.field.offsets(to)
-        rho = bowl.residual(seen)
-        phi = bowl.value(to, rho)
-        rises = ~(phi <= before[2] + 1e-12 * np.abs(before[2])) & step.any(axis=-1)
-        if not rises.any():
-            return to, seen, rho, phi
-        step = np.where(rises[..., None], 0.5 * step, step)
-    step = np.where(rises[..., None], 0.0, step)
+def _descended(bowl: Bowl, theta: Float, step: Float, before: _Look) -> tuple[Float, _Look]:
+    """Return positions after a step, halved until φ does not rise, and the look from there."""
     to = theta + step
-    seen = bowl.problem.field.offsets(to)
-    rho = bowl.residual(seen)
-    return to, seen, rho, bowl.value(to, rho)
+    look = bowl.look(to)
+    rows = np.flatnonzero(_rises(look.phi, before.phi, step).any(axis=-1))
+    if len(rows) == 0:
+        return to, look
+    few, step = bowl.take(rows), step[rows]
+    for halving in range(HALVINGS):
+        now = few.look(theta[rows] + step)
+        rises = _rises(now.phi, before.phi[rows], step)
+        if not rises.any():
+            break
+        shorter = 0.0 if halving == HALVINGS - 1 else 0.5
+        step = np.where(rises[..., None], shorter * step, step)
+    to[rows] = theta[rows] + step
+    return to, bowl.look(to)
+
+
+def _rises(phi: Float, before: Float, step: Float) -> Bool:
+    higher = ~(phi <= before + 1e-12 * np.abs(before))
+    return np.asarray(higher & step.any(axis=-1))
 
 
 def dot(a: Float, b: Float) -> Float:

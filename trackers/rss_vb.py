@@ -102,9 +102,8 @@ class RSSVB(RSSTracker):
     >>> tracker = RSSVB(RandomWalk(q=1.0), heard, truth + 5.0, 100.0 * np.eye(2))
     >>> tracker.predict()
     >>> tracker.update(heard.draw([9.2, 9.0], truth, rng))
-    >>> tracker.estimate.position.round(0)
-    array([[-25.,  10.],
-           [ 31.,  -5.]])
+    >>> bool(np.abs(tracker.estimate.position - truth).max() < 2)
+    True
     """
 
     def __init__(
