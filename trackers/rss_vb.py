@@ -95,6 +95,7 @@ class RSSVB(RSSTracker):
 
     Examples
     --------
+    >>> import numpy as np
     >>> from arrivals.motion_models import RandomWalk
     >>> rng = np.random.default_rng(0)
     >>> heard = LogNormalRSS(rng.uniform(-60, 60, (40, 2)), log_noise=4.6, position=(0, 1))
