@@ -57,7 +57,8 @@ class Network:
             raise ValueError(f"the sensor {repeated[0]!r} is listed twice")
         shape = (len(self.time), len(self.name))
         for name, wanted in (("rss_db", shape), ("sensors", (*shape, 2))):
-            if getattr(self, name).shape != wanted:
+            got = getattr(self, name).shape
+            if got != wanted:
                 raise ValueError(
                     f"{name} must have shape {wanted}; got {getattr(self, name).shape}"
                 )

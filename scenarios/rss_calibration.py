@@ -9,7 +9,7 @@ import numpy as np
 from arrivals.checks import positive
 from arrivals.measurement_models import LogNormalRSS, db_to_neper
 from arrivals.scenarios.networks import Network
-from arrivals.typing import Float
+from arrivals.typing import Float, Int
 
 ROUNDS = 3  # of scale and fit
 
@@ -39,7 +39,7 @@ class Calibration:
     log_amplitude: float
     offsets: Float
     sigma: float
-    n_readings: Float
+    n_readings: Int
     r_min: float
     offset_std: float
 
@@ -102,6 +102,7 @@ def calibrate(
 
     Examples
     --------
+    >>> from arrivals.measurement_models import neper_to_db
     >>> rng = np.random.default_rng(0)
     >>> places, truth = rng.uniform(-500, 500, (8, 2)), rng.uniform(-500, 500, (200, 1, 2))
     >>> far = np.hypot(*np.moveaxis(truth - places, -1, 0))
@@ -130,7 +131,7 @@ def calibrate(
 
 
 def _regression(
-    xi: Float, log_range: Float, sensor: Float, n_sensors: int, ridge: float
+    xi: Float, log_range: Float, sensor: Int, n_sensors: int, ridge: float
 ) -> tuple[Float, float]:
     """Return u, α and the offsets, and the deviation of what is left."""
     from scipy.optimize import least_squares
@@ -149,9 +150,9 @@ def _regression(
         B = vstack([A / sigma, hold / ridge]).tocsr()
         y = np.concatenate([xi / sigma, np.zeros(n_sensors)])
         x = least_squares(
-            lambda x, B=B, y=y: B @ x - y, x, lambda x, B=B: B.toarray(), loss="huber",
-            f_scale=1.345, x_scale="jac",
+            lambda x, B=B, y=y: B @ x - y, x, lambda x, B=B: B, loss="huber",
+            f_scale=1.345, tr_solver="lsmr",
         ).x  # fmt: skip
         left = xi - A @ x
         sigma = float(np.median(np.abs(left - np.median(left)))) / 0.6745
-    return x, float(np.std(np.clip(left, -3 * sigma, 3 * sigma)))
+    return x, float(np.std(left))

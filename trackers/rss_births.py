@@ -9,8 +9,8 @@ import numpy as np
 
 from arrivals.trackers.rss_belief import Sources
 from arrivals.trackers.rss_found import Found, found_of, in_batch
-from arrivals.trackers.rss_problem import Problem
-from arrivals.trackers.rss_start import Fit
+from arrivals.trackers.rss_problem import Marginals, Problem
+from arrivals.trackers.rss_start import Fit, Newcomers
 from arrivals.typing import Bool, Float, Int
 
 if TYPE_CHECKING:
@@ -68,13 +68,20 @@ class Census:
         odds = np.clip(odds, -SURE, SURE)
         return replace(self, odds=odds, confirmed=self.confirmed | (odds >= SURE - 1e-9))
 
-    def with_newborn(self) -> Census:
-        """Return the census with one more, about whom nothing is sure but that it is unlikely."""
+    def with_newborn(self, gains: list[float], confirm: int) -> Census:
+        """Return the census with some more, of whom nothing is sure but a first step's evidence."""
+        n = len(gains)
+        fresh = Census(
+            self.next_label + np.arange(n),
+            np.full(n, -SURE),
+            np.zeros(n, dtype=np.bool_),
+            self.next_label + n,
+        ).weighed(np.array(gains), confirm)
         return Census(
-            np.append(self.label, self.next_label),
-            np.append(self.odds, -SURE),
-            np.append(self.confirmed, False),
-            self.next_label + 1,
+            np.append(self.label, fresh.label),
+            np.append(self.odds, fresh.odds),
+            np.append(self.confirmed, fresh.confirmed),
+            fresh.next_label,
         )
 
 
@@ -104,34 +111,55 @@ def counted(tracker: RSSTracker, sources: Sources, census: Census, xi: Float, W:
     xi, W : ndarray, shape (n_sensors,)
         Readings and weights.
     """
-    whole = Fit(
-        Problem(tracker.measurement.field, xi, W, sources.prior(tracker.xy)),
-        sources.u,
-        sources.x[:, tracker.xy],
-    )
-    fit, heard, evidence = spoken_for(tracker, whole)
+    problem = Problem(tracker.measurement.field, xi, W, sources.prior(tracker.xy))
+    expected = Fit(problem, sources.u, sources.x[:, tracker.xy])
+    fit, heard, evidence = spoken_for(tracker, expected)
     census = census.weighed(evidence, tracker.confirm)
+    room = tracker.max_sources - len(sources.u)
+    fit, gains = with_newborn(fit, expected.part(heard), tracker.newcomers(W > 0), room)
     found = found_of(fit)
+    K = len(heard)
+    old = Marginals(found.marginals.v[0, :K], found.marginals.Sigma[0, :K])
     moved = sources.take(heard).corrected(
-        fit.u, fit.theta, type(found.marginals)(*(part[0] for part in found.marginals)),
-        tracker.xy, tracker.motion.angles,
-    )  # fmt: skip
+        fit.u[:K], fit.theta[:K], old, tracker.xy, tracker.motion.angles
+    )
     sources = Sources(*(part.copy() for part in sources))
     for part, new in zip(sources, moved, strict=True):
         part[heard] = new
     alive = census.odds > -SURE + 1e-9
-    sources, census = sources.take(alive), census.take(alive)
-    if len(sources.u) < tracker.max_sources:
-        larger = fit.enlarged(tracker.newcomers(W > 0))
+    sources = sources.take(alive).joined(tracker.fresh(fit).take(slice(K, None)))
+    return Counted(sources, census.take(alive).with_newborn(gains, tracker.confirm), fit, found)
+
+
+def with_newborn(fit: Fit, expected: Fit, new: Newcomers, room: int) -> tuple[Fit, list[float]]:
+    """Return a fit enlarged as long as each more source raises the evidence enough, and the gains.
+
+    Sources that have just appeared pull the known ones off their places, so the newborn are also
+    looked for from where those were expected.
+
+    Parameters
+    ----------
+    fit : Fit
+        Of the sources that are known.
+    expected : Fit
+        The same sources as predicted.
+    new : Newcomers
+    room : int
+        Sources that may be added.
+    """
+    gains: list[float] = []
+    while len(gains) < room:
+        both = [fit.enlarged(new)]
+        if len(expected.u):
+            expected = expected.enlarged(new)
+            both.append(expected)
+        larger = max(both, key=lambda other: other.log_evidence)
         gain = larger.log_evidence - fit.log_evidence
-        if gain > SURE:
-            newborn = tracker.fresh(larger).take(slice(-1, None))
-            sources = sources.joined(newborn)
-            born = census.with_newborn()
-            speaks = np.append(np.zeros(len(census.odds)), gain)
-            census = born.weighed(speaks, tracker.confirm)
-            fit, found = larger, found_of(larger)
-    return Counted(sources, census, fit, found)
+        if not gain > SURE:
+            break
+        gains.append(gain)
+        fit = larger
+    return fit, gains
 
 
 def spoken_for(tracker: RSSTracker, whole: Fit) -> tuple[Fit, Int, Float]:

@@ -139,11 +139,14 @@ class Fit:
         found = maximum(self.problem, self.u, self.theta)
         return Fit(self.problem, found.u, found.theta)
 
+    def part(self, rows: Int) -> Fit:
+        """Return some of the sources, as they are."""
+        problem = self.problem._replace(prior=self.problem.prior.take(rows))
+        return Fit(problem, self.u[rows], self.theta[rows])
+
     def without(self, j: int) -> Fit:
         """Return the fit without one source, the others refitted."""
-        rest = np.delete(np.arange(len(self.u)), j)
-        problem = self.problem._replace(prior=self.problem.prior.take(rest))
-        return Fit(problem, self.u[rest], self.theta[rest]).refitted()
+        return self.part(np.delete(np.arange(len(self.u)), j)).refitted()
 
     def enlarged(self, new: Newcomers) -> Fit:
         """Return the fit with the source added that lowers Σ W r² most, all refitted.
