@@ -14,7 +14,7 @@ from arrivals.measurement_models.envelope import sample_log_envelope
 from arrivals.measurement_models.path_loss import Field
 from arrivals.scenarios.rss import FixedSources, in_disc
 from arrivals.trackers.rss_cycles import Cycling, Solution, solve
-from arrivals.trackers.rss_map import maximum
+from arrivals.trackers.rss_map import Method, maximum
 from arrivals.trackers.rss_problem import Marginals, Prior, Problem, marginals
 from arrivals.trackers.rss_start import Newcomers, grown, refined
 from arrivals.typing import Float
@@ -120,12 +120,11 @@ def _cycled(name: str, problem: Problem, cycles: int | None) -> Answers:
     return Answers(found.u, found.theta, 0.0, found)
 
 
-def _searched(name: str, problem: Problem, cycles: int | None) -> Answers:
+def _searched(name: Method, problem: Problem, cycles: int | None) -> Answers:
     each = []
     for b in range(len(problem.xi)):
         one = one_of_batch(problem, b)
-        method = "bfgs" if name == "bfgs" else "lm"
-        each.append(maximum(one, one.prior.mu, one.prior.theta, method))
+        each.append(maximum(one, one.prior.mu, one.prior.theta, name))
     return Answers(np.array([m.u for m in each]), np.array([m.theta for m in each]), 0.0)
 
 
