@@ -14,6 +14,7 @@ from arrivals.typing import Bool, Float, Int
 
 Sweep = Literal["gauss-seidel", "jacobi"]
 Refresh = Literal["point", "literal"]
+ROUNDING = 1e-12  # relative, of L
 SHORTEST = 2.0**-6  # share of a step, below which it is taken as it is
 
 
@@ -140,7 +141,7 @@ def _moved(problem: Problem, point: _Point, factors: Factors, how: Cycling) -> _
         u, theta = point.u + s[:, None] * du, point.theta + s[:, None, None] * dtheta
         found = problem.field.levels(u, theta)
         L = problem.log_posterior(u, theta, found)
-        lower = (L < point.L) & (s > SHORTEST)
+        lower = (point.L - ROUNDING * np.abs(point.L) > L) & (s > SHORTEST)
         if not how.guard or how.refresh == "literal" or not lower.any():
             return _Point(u, theta, found, L)
         s = np.where(lower, s / 2, s)

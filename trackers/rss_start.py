@@ -121,9 +121,17 @@ class Fit:
         # the 2π of the densities and of Laplace's integral cancel
         return float(-0.5 * (q + square) + normal - 0.5 * np.linalg.slogdet(J)[1])
 
-    @property
+    @cached_property
     def log_evidence_of_set(self) -> float:
-        """The same with log K!: sources that nothing tells apart may be numbered in any order."""
+        """The same with log K!: sources that nothing tells apart may be numbered in any order.
+
+        -inf if two are nearer to each other than the least range. Such a pair is one source; its
+        readings say nothing, to second order, of how far apart the two are, and Laplace's
+        Gaussian would take that for knowledge not needed.
+        """
+        _, nearest = neighbours(self.theta)
+        if (nearest < self.problem.field.r_min).any():
+            return -np.inf
         return self.log_evidence + lgamma(len(self.u) + 1)
 
     @property
@@ -281,16 +289,23 @@ def changes(fit: Fit, new: Newcomers, same_number: bool) -> Iterator[Fit]:
     fewer = [fit.without(j) for j in range(len(fit.u))]
     if not same_number:
         yield from sorted(fewer, key=lambda other: -other.log_evidence_of_set)
-    for j, k in _neighbours(fit.theta):
+    near, _ = neighbours(fit.theta)
+    for j, k in sorted({(min(j, k), max(j, k)) for j, k in enumerate(near.tolist())}):
         merged = fewer[k].without(j).enlarged(new)
         yield merged.enlarged(new) if same_number else merged
     yield from (other.enlarged(new) for other in fewer)
 
 
-def _neighbours(theta: Float) -> list[tuple[int, int]]:
-    """Return the pairs of each source and the one nearest to it, lower number first."""
+def neighbours(theta: Float) -> tuple[Int, Float]:
+    """Return for each of some places, (n, 2), the number and distance of the nearest other one.
+
+    Examples
+    --------
+    >>> neighbours(np.array([[0.0, 0.0], [3.0, 4.0], [3.0, 5.0]]))
+    (array([1, 2, 1]), array([5., 1., 1.]))
+    """
     if len(theta) < 2:
-        return []
+        return np.zeros(0, dtype=np.int64), np.zeros(0)
     apart = np.linalg.norm(theta[:, None] - theta, axis=-1)
-    near = (apart + np.diag(np.full(len(apart), np.inf))).argmin(axis=1)
-    return sorted({(min(j, k), max(j, k)) for j, k in enumerate(near.tolist())})
+    np.fill_diagonal(apart, np.inf)
+    return apart.argmin(axis=1), np.asarray(apart.min(axis=1))
