@@ -10,10 +10,20 @@ from arrivals.measurement_models.correlation import (
     SourceCorrelation,
     Tones,
 )
+from arrivals.measurement_models.decibels import (
+    db_to_neper,
+    dbm_to_neper,
+    neper_to_db,
+    neper_to_dbm,
+    watt_to_neper,
+)
 from arrivals.measurement_models.delay_line import DelayLine, Phasor
+from arrivals.measurement_models.envelope import envelope_moments, log_envelope_moments
 from arrivals.measurement_models.interpolation import DelayInterpolator, InterpolationDelay
 from arrivals.measurement_models.linear import LinearMeasurement
 from arrivals.measurement_models.manifolds import GridLine, Manifold
+from arrivals.measurement_models.path_loss import doppler_log_gain
+from arrivals.measurement_models.rss import LogNormalRSS
 from arrivals.measurement_models.samples import ArraySamples
 from arrivals.measurement_models.snapshots import ArraySnapshot, composite
 
@@ -29,6 +39,7 @@ __all__ = [
     "GridLine",
     "InterpolationDelay",
     "LinearMeasurement",
+    "LogNormalRSS",
     "Manifold",
     "MeasurementModel",
     "Phasor",
@@ -36,6 +47,14 @@ __all__ = [
     "SourceCorrelation",
     "Tones",
     "composite",
+    "db_to_neper",
+    "dbm_to_neper",
     "direction",
+    "doppler_log_gain",
+    "envelope_moments",
+    "log_envelope_moments",
+    "neper_to_db",
+    "neper_to_dbm",
     "steering_vector",
+    "watt_to_neper",
 ]

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from arrivals.measurement_models import ArraySamples, ArraySnapshot
+from arrivals.measurement_models import ArraySamples, ArraySnapshot, LogNormalRSS
 from arrivals.motion_models import MotionModel
 from arrivals.params import Model
 from arrivals.trackers import Tracker, find
@@ -24,10 +24,10 @@ class Trial:
     Parameters
     ----------
     measurements : ndarray, shape (n_steps, n_sensors)
-        Complex for an `ArraySnapshot`, real for `ArraySamples`.
-    truth : ndarray, shape (n_steps, n_sources)
-        Directions, rad; NaN while a source is off.
-    measurement : ArraySnapshot or ArraySamples
+        Complex for an `ArraySnapshot`, real for the others.
+    truth : ndarray, shape (n_steps, n_sources) or (n_steps, n_sources, 2)
+        Directions, rad, or positions, m; NaN while a source is off.
+    measurement : ArraySnapshot, ArraySamples or LogNormalRSS
     motion : MotionModel
     signals : ndarray, shape (n_steps, n_sources), optional
         What the sources send, where it is their own: complex or real.
@@ -35,7 +35,7 @@ class Trial:
 
     measurements: Complex | Float
     truth: Float
-    measurement: ArraySnapshot | ArraySamples
+    measurement: ArraySnapshot | ArraySamples | LogNormalRSS
     motion: MotionModel
     signals: Complex | Float | None = None
 
@@ -51,9 +51,12 @@ class Trial:
         """
         kind = find(name)
         wanted = inspect.signature(kind).parameters
-        models = {"measurement": self.measurement, "motion": self.motion}
-        fitting = {key: model for key, model in models.items() if key in wanted}
+        fitting = {key: value for key, value in self.known().items() if key in wanted}
         return kind(**fitting | params)
+
+    def known(self) -> dict[str, Any]:
+        """Return what a tracker may be told, by the names of its parameters."""
+        return {"measurement": self.measurement, "motion": self.motion}
 
 
 class Scenario(Model, ABC):

@@ -10,6 +10,7 @@ from delay_trackers import TRACKERS as DELAY_TRACKERS
 from kalman_trackers import TRACKERS as KALMAN_TRACKERS
 from numpy.typing import ArrayLike
 from subspace_trackers import TRACKERS as SUBSPACE_TRACKERS
+from rss_trackers import TRACKERS as RSS_TRACKERS
 
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.motion_models import BernoulliVonMises
@@ -60,6 +61,7 @@ TRACKERS = [
     *AR_TRACKERS,
     *SUBSPACE_TRACKERS,
 ]
+TRACKERS = [*GRIDLESS, *KALMAN_TRACKERS, *DELAY_TRACKERS, *RSS_TRACKERS]
 IDS = [f"{name}-{n}" for n, (name, _, _) in enumerate(TRACKERS)]
 
 every_check = pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)

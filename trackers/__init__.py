@@ -25,6 +25,8 @@ from arrivals.trackers.qrd_rls import QRDRLS
 from arrivals.trackers.recorder import Run
 from arrivals.trackers.registry import available, create, find, register
 from arrivals.trackers.root_music import RootMUSIC
+from arrivals.trackers.rss_ml import RSSML
+from arrivals.trackers.rss_vb import RSSVB
 from arrivals.trackers.svalse import SVALSE
 from arrivals.trackers.ukf import UKF
 from arrivals.trackers.valse import VALSE
@@ -39,6 +41,8 @@ __all__ = [
     "MVDR",
     "QRDRLS",
     "PAST",
+    "RSSML",
+    "RSSVB",
     "SVALSE",
     "UKF",
     "VALSE",

@@ -136,6 +136,15 @@ class PositionEstimate(Estimate):
         Stays with a source while it is tracked; -1 from methods that do not track.
     converged : bool
         False if an iterative method stopped before it met its tolerance.
+    iterations : int
+        Iterations that this step took; 0 for a method without.
+    fit : float
+        Probability of a larger misfit than this step's, if the solution is right; NaN where the
+        method gives none.
+    poor_fit : bool
+        The misfit is too large for the solution, or the model, to be right.
+    diverged : bool
+        The solution is not to be believed at all.
     """
 
     position: Float
@@ -144,6 +153,10 @@ class PositionEstimate(Estimate):
     existence: Float
     label: Int
     converged: bool = True
+    iterations: int = 0
+    fit: float = np.nan
+    poor_fit: bool = False
+    diverged: bool = False
 
     per_source: ClassVar[dict[str, Any]] = {
         "position": np.nan,

@@ -1,0 +1,250 @@
+"""Levels that several sources of power falling as R^-α make at sensors: kernels on arrays."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from arrivals.typing import Float
+
+
+class Offsets(NamedTuple):
+    """Where sources lie, seen from the sensors; all (..., n_sources, n_sensors).
+
+    Parameters
+    ----------
+    dx, dy : ndarray
+        Source minus sensor, m.
+    square : ndarray
+        R², not below R_min², m².
+    floor : float
+        R_min², m².
+    """
+
+    dx: Float
+    dy: Float
+    square: Float
+    floor: float
+
+    @property
+    def inverse(self) -> Float:
+        """1/R², 0 where the floor acts and the level has no slope."""
+        return np.asarray((self.square > self.floor) / self.square)
+
+    @property
+    def log_range(self) -> Float:
+        """Natural logarithm of the floored range."""
+        return np.asarray(0.5 * np.log(self.square))
+
+
+def offsets(theta: Float, sensors: Float, r_min: float) -> Offsets:
+    """Return what positions look like from sensors.
+
+    Parameters
+    ----------
+    theta : ndarray, shape (..., n_sources, 2)
+        Positions of sources, m.
+    sensors : ndarray, shape (..., n_sensors, 2)
+        Positions of sensors, m.
+    r_min : float
+        Floor of the range, m.
+
+    Examples
+    --------
+    >>> seen = offsets(np.array([[3.0, 4.0]]), np.array([[0.0, 0.0], [3.0, 4.0]]), 1.0)
+    >>> seen.square, seen.inverse
+    (array([[25.,  1.]]), array([[0.04, 0.  ]]))
+    """
+    dx = theta[..., 0, None] - sensors[..., None, :, 0]
+    dy = theta[..., 1, None] - sensors[..., None, :, 1]
+    square = dx * dx
+    square += dy * dy
+    floor = r_min * r_min
+    np.maximum(square, floor, out=square)
+    return Offsets(dx, dy, square, floor)
+
+
+class Levels(NamedTuple):
+    """Levels at sensors and who makes them.
+
+    Parameters
+    ----------
+    log_sigma : ndarray, shape (..., n_sensors)
+        log σ_y, Np.
+    shares : ndarray, shape (..., n_sources, n_sensors)
+        λ: the part of each source in the power at each sensor.
+    offsets : Offsets
+    """
+
+    log_sigma: Float
+    shares: Float
+    offsets: Offsets
+
+
+def levels(
+    u: Float,
+    theta: Float,
+    sensors: Float,
+    alpha: float,
+    log_noise: float | Float,
+    r_min: float,
+    log_gain: float | Float = 0.0,
+) -> Levels:
+    """Return log σ_y = ½ log(Σ e^{2u} R^-α + σ_n²) and the shares λ, by softmax.
+
+    Parameters
+    ----------
+    u : ndarray, shape (..., n_sources)
+        Log amplitudes at 1 m, Np.
+    theta : ndarray, shape (..., n_sources, 2)
+        Positions, m.
+    sensors : ndarray, shape (..., n_sensors, 2)
+        m.
+    alpha : float
+        Loss exponent of the power.
+    log_noise : float or ndarray, shape (..., n_sensors)
+        Log amplitude of the noise, Np; -inf for none.
+    r_min : float
+        Floor of the range, m.
+    log_gain : float or ndarray, shape (n_sensors,) or (n_sources, n_sensors)
+        Known log gains, such as Doppler's, Np.
+
+    Returns
+    -------
+    Levels
+        Without sources and noise, levels are -inf.
+
+    References
+    ----------
+    Cevher, Sankaranarayanan, Chellappa, ICASSP 2008, (1), (9).
+
+    Examples
+    --------
+    Two equal sources at 2 m, without noise: half each, and 3 dB more than one.
+
+    >>> two = levels(np.zeros(2), np.array([[2.0, 0], [0, 2]]), np.zeros((1, 2)), 2.0, -np.inf, 1.0)
+    >>> two.shares.round(6).ravel(), float((two.log_sigma[0] + np.log(2)) / np.log(2))
+    (array([0.5, 0.5]), 0.5)
+    """
+    seen = offsets(theta, sensors, r_min)
+    power = 2 * (u[..., None] + log_gain) - 0.5 * alpha * np.log(seen.square)
+    noise: Float = 2.0 * np.asarray(log_noise)
+    top = np.maximum(power.max(axis=-2, initial=-np.inf), noise)
+    top = np.where(np.isneginf(top), 0.0, top)
+    shares = np.exp(power - top[..., None, :])  # the logarithms are never exponentiated first
+    total = shares.sum(axis=-2) + np.exp(noise - top)
+    shares /= np.maximum(total, np.finfo(np.float64).tiny)[..., None, :]
+    with np.errstate(divide="ignore"):
+        log_sigma = 0.5 * (top + np.log(total))
+    return Levels(log_sigma, shares, seen)
+
+
+class Field(NamedTuple):
+    """Sensors and what is known of the way to them, for `levels`.
+
+    Parameters
+    ----------
+    sensors : ndarray, shape (..., n_sensors, 2)
+    alpha : float
+    log_noise : float or ndarray, shape (..., n_sensors)
+    r_min : float
+    log_gain : float or ndarray
+        As in `levels`. Leading axes are those of a batch that has its own sensors each.
+    """
+
+    sensors: Float
+    alpha: float = 2.0
+    log_noise: float | Float = -np.inf
+    r_min: float = 1.0
+    log_gain: float | Float = 0.0
+
+    def levels(self, u: Float, theta: Float) -> Levels:
+        """Return log σ_y and shares of sources (..., n_sources), (..., n_sources, 2)."""
+        return levels(u, theta, self.sensors, self.alpha, self.log_noise, self.r_min, self.log_gain)
+
+    def offsets(self, theta: Float) -> Offsets:
+        """Return what positions (..., n_sources, 2) look like from the sensors."""
+        return offsets(theta, self.sensors, self.r_min)
+
+    def take(self, rows: Any) -> Field:
+        """Return the field of some of a batch."""
+        noise = np.asarray(self.log_noise)
+        return self._replace(
+            sensors=self.sensors[rows] if self.sensors.ndim > 2 else self.sensors,
+            log_noise=noise[rows] if noise.ndim > 1 else self.log_noise,
+        )
+
+
+def slopes(found: Levels, alpha: float) -> Float:
+    """Return the gradients of log σ_y: λ with respect to u, -½αλ d/R² to positions.
+
+    Returns
+    -------
+    ndarray, shape (..., n_sensors, 3 n_sources)
+        In the order u₁..u_K, x₁, y₁, .. x_K, y_K.
+
+    References
+    ----------
+    The same, gradient of (1).
+
+    Examples
+    --------
+    >>> one = levels(np.zeros(1), np.array([[2.0, 0.0]]), np.zeros((1, 2)), 3.0, -np.inf, 1.0)
+    >>> slopes(one, alpha=3.0)
+    array([[ 1.  , -0.75, -0.  ]])
+    """
+    lam, seen = found.shares, found.offsets
+    *lead, K, M = lam.shape
+    slope = -0.5 * alpha * lam * seen.inverse
+    G = np.empty((*lead, 3 * K, M))
+    G[..., :K, :] = lam
+    G[..., K::2, :] = slope * seen.dx
+    G[..., K + 1 :: 2, :] = slope * seen.dy
+    return np.swapaxes(G, -1, -2)
+
+
+def doppler_log_gain(
+    velocity: ArrayLike, theta: ArrayLike, sensors: ArrayLike, speed: float
+) -> Float:
+    """Return the log gains of moving monopoles: -2 log(1 - (v/c) cos ψ), Np.
+
+    Parameters
+    ----------
+    velocity, theta : array_like, shape (..., 2)
+        Velocities, m/s, and positions, m, of sources.
+    sensors : array_like, shape (n_sensors, 2)
+        m.
+    speed : float
+        Speed c of the waves, m/s.
+
+    Returns
+    -------
+    ndarray, shape (..., n_sensors)
+        For `log_gain` of `LogNormalRSS`.
+
+    Raises
+    ------
+    ValueError
+        If a source is not slower than the waves.
+
+    References
+    ----------
+    Morse and Ingard, *Theoretical Acoustics*, 1968, sec. 11.2; the paper leaves it out.
+
+    Examples
+    --------
+    Straight at the sensor, and away from it, at 5 m/s in air:
+
+    >>> gain = doppler_log_gain([[5.0, 0.0]], [[0.0, 0.0]], [[50.0, 0.0], [-50.0, 0.0]], 340.0)
+    >>> (gain / np.log(10) * 20).round(2)
+    array([[ 0.26, -0.25]])
+    """
+    v, places = np.asarray(velocity, dtype=np.float64), np.asarray(sensors, dtype=np.float64)
+    way = places - np.asarray(theta, dtype=np.float64)[..., None, :]
+    far = np.maximum(np.linalg.norm(way, axis=-1), np.finfo(np.float64).tiny)
+    towards = (way * v[..., None, :]).sum(axis=-1) / far
+    if not np.linalg.norm(v, axis=-1).max(initial=0.0) < speed:
+        raise ValueError(f"sources must be slower than the waves, {speed} m/s; got {v.tolist()}")
+    return np.asarray(-2 * np.log1p(-towards / speed))

@@ -1,0 +1,117 @@
+"""How likely a sensor, or a field of sensors, is to notice sources in noise."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from arrivals.typing import Float
+
+
+def exact_detection(false_alarm: ArrayLike, n_snapshots: ArrayLike, snr: ArrayLike) -> Float:
+    """Return the probability of detection of one sensor, exactly.
+
+    N e²/σ² is a Gamma variable of shape N: P_D = Q_Γ(N, Q_Γ⁻¹(N, P_FA) / (1 + SNR)), with the
+    regularised upper incomplete gamma function. Thresholds are to be set by this one.
+
+    Parameters
+    ----------
+    false_alarm : array_like
+        P_FA.
+    n_snapshots : array_like
+        N.
+    snr : array_like
+        Power of the sources over that of the noise, at the sensor.
+
+    References
+    ----------
+    Kay, *Fundamentals of Statistical Signal Processing II: Detection Theory*, 1998, sec. 5.3.
+
+    Examples
+    --------
+    >>> float(exact_detection(0.01, 50, 10 ** (-3 / 10)).round(3))
+    0.742
+    """
+    from scipy.special import gammaincc, gammainccinv
+
+    return np.asarray(
+        gammaincc(n_snapshots, gammainccinv(n_snapshots, false_alarm) / (1 + np.asarray(snr)))
+    )
+
+
+def log_gaussian_detection(false_alarm: ArrayLike, n_snapshots: ArrayLike, snr: ArrayLike) -> Float:
+    """Return the same with ξ Gaussian: P_D = Q(Q⁻¹(P_FA) - √N ln(1 + SNR)); poor in the tails.
+
+    Parameters are those of `exact_detection`.
+
+    Examples
+    --------
+    >>> float(log_gaussian_detection(0.01, 50, 10 ** (-3 / 10)).round(3))
+    0.708
+    """
+    from scipy.special import ndtr, ndtri
+
+    shift = np.sqrt(n_snapshots) * np.log1p(snr)
+    return np.asarray(ndtr(shift + ndtri(false_alarm)))
+
+
+def amplitude_gaussian_detection(
+    false_alarm: ArrayLike, n_snapshots: ArrayLike, snr: ArrayLike
+) -> Float:
+    """Return the same with e Gaussian: γ = 1 + Q⁻¹(P_FA)/2√N, P_D = Q(2√N (γ/√(1+SNR) - 1)).
+
+    Parameters are those of `exact_detection`.
+
+    Examples
+    --------
+    >>> float(amplitude_gaussian_detection(0.01, 50, 10 ** (-3 / 10)).round(3))
+    0.758
+    """
+    from scipy.special import ndtr, ndtri
+
+    root = 2 * np.sqrt(n_snapshots)
+    threshold = 1 - ndtri(false_alarm) / root
+    return np.asarray(ndtr(-root * (threshold / np.sqrt(1 + np.asarray(snr)) - 1)))
+
+
+def true_false_alarm(false_alarm: ArrayLike, n_snapshots: ArrayLike) -> tuple[Float, Float]:
+    """Return the false alarms that the two Gaussian thresholds really give.
+
+    Returns
+    -------
+    log, amplitude : ndarray
+        Of the thresholds on ξ and on e.
+
+    Examples
+    --------
+    >>> [round(float(p), 4) for p in true_false_alarm(0.01, 50)]
+    [0.0061, 0.0103]
+    """
+    from scipy.special import gammaincc, ndtri
+
+    N = np.asarray(n_snapshots, dtype=np.float64)
+    margin = -ndtri(false_alarm) / (2 * np.sqrt(N))
+    log = gammaincc(N, N * np.exp(2 * margin))
+    return np.asarray(log), np.asarray(gammaincc(N, N * (1 + margin) ** 2))
+
+
+def network_detection(false_alarm: ArrayLike, weights: ArrayLike, snr: ArrayLike) -> Float:
+    """Return the probability of detection of known sources by a whole field of sensors.
+
+    P_D ≈ Q(Q⁻¹(P_FA) - δ), δ² = Σ W (½ ln(1 + SNR))².
+
+    Parameters
+    ----------
+    false_alarm : float
+    weights, snr : array_like, shape (..., n_sensors)
+        W = 1/r and the SNR of each sensor.
+
+    Examples
+    --------
+    >>> float(network_detection(0.01, np.full(100, 200.0), 10 ** (-13 / 10)).round(2))
+    0.87
+    """
+    from scipy.special import ndtr, ndtri
+
+    delta = np.sqrt((np.asarray(weights) * (0.5 * np.log1p(snr)) ** 2).sum(axis=-1))
+    return np.asarray(ndtr(delta + ndtri(false_alarm)))
