@@ -27,62 +27,37 @@ from arrivals.scenarios.line_arrays import (
     SixStatic,
     ThreeStatic,
 )
-from arrivals.scenarios.metrics import (
-    Gospa,
-    gospa,
-    mean_gospa,
-    mean_rmse,
-    ospa,
-    rmse,
-)
-from arrivals.scenarios.plots import plot_array, plot_bearing_time
-from arrivals.scenarios.readers import read
-from arrivals.scenarios.recordings import Recording, Snapshots
-from arrivals.scenarios.separation import nmse, sdr
-from arrivals.scenarios.speech import SpeechField, SpeechOfOrderTwo
-from arrivals.scenarios.unlabelled import best_assignment_rmse
-
-__all__ = [
-    "AutoregressiveField",
-    "FastSource",
-    "FourOnThree",
-    "MoreSensors",
-    "MovingSource",
-    "NoisySources",
-    "ThirdOrder",
-    "ThreeOnThree",
-    "SpeechField",
-    "SpeechOfOrderTwo",
-from arrivals.scenarios.swellex96 import TowPastLine
-from arrivals.scenarios.waveguides import BottomLayer, Waveguide
-
-__all__ = [
-    "BottomLayer",
 from arrivals.scenarios.metrics import Gospa, gospa, mean_gospa, mean_rmse, ospa, rmse
 from arrivals.scenarios.networks import Network, read_network
 from arrivals.scenarios.plots import plot_array, plot_bearing_time
 from arrivals.scenarios.readers import read
 from arrivals.scenarios.recordings import Recording, Snapshots
-from arrivals.scenarios.rss import (
-    BirthsAndDeaths,
-    CrossingSources,
-    RSSTrial,
-    Table1K3,
-    Table1K7,
-)
+from arrivals.scenarios.rss import BirthsAndDeaths, CrossingSources, RSSTrial, Table1K3, Table1K7
 from arrivals.scenarios.rss_bounds import rss_bound
 from arrivals.scenarios.rss_calibration import Calibration, calibrate
 from arrivals.scenarios.rss_metrics import huber, scores
+from arrivals.scenarios.separation import nmse, sdr
+from arrivals.scenarios.speech import SpeechField, SpeechOfOrderTwo
+from arrivals.scenarios.swellex96 import TowPastLine
+from arrivals.scenarios.unlabelled import best_assignment_rmse
+from arrivals.scenarios.waveguides import BottomLayer, Waveguide
 
 __all__ = [
+    "AutoregressiveField",
     "BirthsAndDeaths",
+    "BottomLayer",
     "Calibration",
     "CrossingSources",
+    "FastSource",
+    "FourOnThree",
     "Gospa",
     "InterpolationBand",
     "InterpolationCoupled",
     "InterpolationTone",
+    "MoreSensors",
+    "MovingSource",
     "Network",
+    "NoisySources",
     "OnePairOff",
     "PairsInTurn",
     "RSSTrial",
@@ -92,13 +67,17 @@ __all__ = [
     "SixSources",
     "SixStatic",
     "Snapshots",
+    "SpeechField",
+    "SpeechOfOrderTwo",
     "Table1K3",
     "Table1K7",
+    "ThirdOrder",
+    "ThreeOnThree",
     "ThreeStatic",
     "TowPastLine",
     "Trial",
-    "ar_signals",
     "Waveguide",
+    "ar_signals",
     "available",
     "best_assignment_rmse",
     "calibrate",
@@ -109,8 +88,8 @@ __all__ = [
     "huber",
     "mean_gospa",
     "mean_rmse",
-    "nmse",
     "network_detection",
+    "nmse",
     "ospa",
     "plot_array",
     "plot_bearing_time",
@@ -118,7 +97,7 @@ __all__ = [
     "read_network",
     "register",
     "rmse",
-    "sdr",
     "rss_bound",
     "scores",
+    "sdr",
 ]

@@ -87,7 +87,7 @@ class SourceField(Scenario):
     ) -> Trial:
         """Return a trial of given source signals, (n_steps, n_sources), of power 1."""
         model, truth = self.measurement, self.truth(len(signals))
-        return Trial(model.simulate(truth, signals, rng), truth, model, motion, signals)
+        return Trial(model.simulate(truth, signals, rng), truth, model, motion, signals=signals)
 
 
 @register("ar_fig1")

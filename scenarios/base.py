@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -37,7 +37,7 @@ class Trial:
     truth: Float
     measurement: ArraySnapshot | ArraySamples | LogNormalRSS
     motion: MotionModel
-    signals: Complex | Float | None = None
+    signals: Complex | Float | None = field(default=None, kw_only=True)
 
     def tracker(self, name: str, **params: Any) -> Tracker:
         """Make the tracker of that name with as many of the trial's models as it takes.

@@ -9,8 +9,8 @@ from ar_trackers import TRACKERS as AR_TRACKERS
 from delay_trackers import TRACKERS as DELAY_TRACKERS
 from kalman_trackers import TRACKERS as KALMAN_TRACKERS
 from numpy.typing import ArrayLike
-from subspace_trackers import TRACKERS as SUBSPACE_TRACKERS
 from rss_trackers import TRACKERS as RSS_TRACKERS
+from subspace_trackers import TRACKERS as SUBSPACE_TRACKERS
 
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.motion_models import BernoulliVonMises
@@ -60,8 +60,8 @@ TRACKERS = [
     *DELAY_TRACKERS,
     *AR_TRACKERS,
     *SUBSPACE_TRACKERS,
+    *RSS_TRACKERS,
 ]
-TRACKERS = [*GRIDLESS, *KALMAN_TRACKERS, *DELAY_TRACKERS, *RSS_TRACKERS]
 IDS = [f"{name}-{n}" for n, (name, _, _) in enumerate(TRACKERS)]
 
 every_check = pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)

@@ -41,7 +41,7 @@ def test_noise_lies_so_many_db_below_the_field_at_the_median_step() -> None:
 def test_the_same_draw_with_and_without_element_43() -> None:
     scenario = TowPastLine(ranges=WAY[:3])
     most, whole = scenario.sample(rng()), scenario.replace(missing=()).sample(rng())
-    assert (most.measurement.array.n_sensors, whole.measurement.array.n_sensors) == (63, 64)
+    assert (most.measurements.shape[1], whole.measurements.shape[1]) == (63, 64)
     np.testing.assert_array_equal(most.measurements, np.delete(whole.measurements, 42, axis=1))
     np.testing.assert_array_equal(most.truth, whole.truth)
     np.testing.assert_array_equal(most.measurements, scenario.sample(rng()).measurements)
