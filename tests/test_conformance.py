@@ -12,7 +12,18 @@ from numpy.typing import ArrayLike
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.motion_models import BernoulliVonMises
 from arrivals.params import Model
-from arrivals.trackers import CBF, SVALSE, VALSE, DirectionEstimate, Run, Tracker, available, find
+from arrivals.trackers import (
+    CBF,
+    SBL,
+    SSBL,
+    SVALSE,
+    VALSE,
+    DirectionEstimate,
+    Run,
+    Tracker,
+    available,
+    find,
+)
 from arrivals.trackers.conformance import (
     CHECKS,
     Check,
@@ -42,6 +53,10 @@ GRIDLESS: list[tuple[str, MakeTracker, Measurements]] = [
     ("cbf", lambda: CBF(CIRCLE, n_directions=90, max_sources=2), two_sources(CIRCLE)),
     ("valse", lambda: VALSE(LINE), two_sources(LINE)),
     ("valse", lambda: VALSE(GAPS, max_components=3), two_sources(GAPS)),
+    ("sbl", lambda: SBL(LINE, n_directions=91), two_sources(LINE)),
+    ("sbl", lambda: SBL(CIRCLE, n_directions=90, max_sources=2), two_sources(CIRCLE)),
+    ("ssbl", lambda: SSBL(GAPS, n_directions=91), two_sources(GAPS)),
+    ("ssbl", lambda: SSBL(CIRCLE, n_directions=90, reach=1), two_sources(CIRCLE)),
     ("svalse", lambda: SVALSE(LINE), two_sources(LINE)),
     ("svalse", lambda: SVALSE(GAPS, BernoulliVonMises(kappa=50.0)), two_sources(GAPS)),
     (

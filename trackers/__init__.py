@@ -13,6 +13,8 @@ from arrivals.trackers.mvdr import MVDR
 from arrivals.trackers.particle import Particle
 from arrivals.trackers.recorder import Run
 from arrivals.trackers.registry import available, create, find, register
+from arrivals.trackers.sbl import SBL
+from arrivals.trackers.ssbl import SSBL
 from arrivals.trackers.svalse import SVALSE
 from arrivals.trackers.ukf import UKF
 from arrivals.trackers.valse import VALSE
@@ -22,6 +24,8 @@ __all__ = [
     "EKF",
     "IMM",
     "MVDR",
+    "SBL",
+    "SSBL",
     "SVALSE",
     "UKF",
     "VALSE",
