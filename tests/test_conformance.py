@@ -19,6 +19,7 @@ from arrivals.trackers import (
     SVALSE,
     VALSE,
     DirectionEstimate,
+    PeaksGNN,
     Run,
     Tracker,
     available,
@@ -57,6 +58,9 @@ GRIDLESS: list[tuple[str, MakeTracker, Measurements]] = [
     ("sbl", lambda: SBL(CIRCLE, n_directions=90, max_sources=2), two_sources(CIRCLE)),
     ("ssbl", lambda: SSBL(GAPS, n_directions=91), two_sources(GAPS)),
     ("ssbl", lambda: SSBL(CIRCLE, n_directions=90, reach=1), two_sources(CIRCLE)),
+    ("peaks_gnn", lambda: PeaksGNN(LINE), two_sources(LINE)),
+    ("peaks_gnn", lambda: PeaksGNN(CIRCLE, detector="mvdr", confirm=1), two_sources(CIRCLE)),
+    ("peaks_gnn", lambda: PeaksGNN(LINE, detector=CBF(LINE, threshold_db=6.0)), two_sources(LINE)),
     ("svalse", lambda: SVALSE(LINE), two_sources(LINE)),
     ("svalse", lambda: SVALSE(GAPS, BernoulliVonMises(kappa=50.0)), two_sources(GAPS)),
     (

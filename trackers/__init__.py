@@ -11,6 +11,7 @@ from arrivals.trackers.kalman import Kalman
 from arrivals.trackers.kalman_type import KalmanType
 from arrivals.trackers.mvdr import MVDR
 from arrivals.trackers.particle import Particle
+from arrivals.trackers.peaks_gnn import PeaksGNN
 from arrivals.trackers.recorder import Run
 from arrivals.trackers.registry import available, create, find, register
 from arrivals.trackers.sbl import SBL
@@ -36,6 +37,7 @@ __all__ = [
     "Kalman",
     "KalmanType",
     "Particle",
+    "PeaksGNN",
     "PositionEstimate",
     "Run",
     "StateEstimate",
