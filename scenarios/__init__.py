@@ -15,16 +15,20 @@ from arrivals.scenarios.line_arrays import (
     SixStatic,
     ThreeStatic,
 )
+from arrivals.scenarios.methods import Method, grid
 from arrivals.scenarios.metrics import Gospa, gospa, mean_gospa, mean_rmse, ospa, rmse
+from arrivals.scenarios.monte_carlo import monte_carlo
 from arrivals.scenarios.plots import plot_array, plot_bearing_time
 from arrivals.scenarios.readers import read
 from arrivals.scenarios.recordings import Recording, Snapshots
+from arrivals.scenarios.study import Study
 
 __all__ = [
     "Gospa",
     "InterpolationBand",
     "InterpolationCoupled",
     "InterpolationTone",
+    "Method",
     "OnePairOff",
     "PairsInTurn",
     "RandomPairsOff",
@@ -33,14 +37,17 @@ __all__ = [
     "SixSources",
     "SixStatic",
     "Snapshots",
+    "Study",
     "ThreeStatic",
     "Trial",
     "available",
     "create",
     "find",
     "gospa",
+    "grid",
     "mean_gospa",
     "mean_rmse",
+    "monte_carlo",
     "ospa",
     "plot_array",
     "plot_bearing_time",
