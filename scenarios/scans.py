@@ -39,8 +39,8 @@ def scan(
     loading : float, optional
         Of MVDR, in mean powers of a sensor: 0.01 for a tone, 0.3 for a band if None.
     refine : bool
-        Look again between the half degrees. Without it, a truth on the grid gives errors of
-        exactly zero, which say nothing about the method.
+        Look everywhere. If false, only at whole degrees: a truth that is one of them then gives
+        errors of exactly zero, which say nothing about the method.
 
     Raises
     ------
@@ -68,10 +68,11 @@ def scan(
     narrow = isinstance(measurement.correlation, Tones) and measurement.correlation.order == 2
     kind = Narrowband if narrow else Broadband
     beams = kind(samples, measurement, method, loading)
+    if not refine:
+        degrees = np.deg2rad(np.arange(-90.0, 91.0))
+        return float(degrees[_highest(beams.power(degrees))[0]])
     grid = look_directions(measurement.array, N_DIRECTIONS)
     top = _highest(beams.power(grid))
-    if not refine:
-        return float(grid[top[0]])
     step = grid[1] - grid[0]
     fine = np.clip(grid[top] + step * np.linspace(-1, 1, 101), -np.pi / 2, np.pi / 2)
     power = beams.power(fine)
