@@ -36,8 +36,8 @@ class Trial:
     measurement: ArraySnapshot | ArraySamples
     motion: MotionModel
 
-    def tracker(self, name: str, **params: Any) -> Tracker:
-        """Make the tracker of that name with as many of the trial's models as it takes.
+    def tracker(self, name: str | type[Tracker], **params: Any) -> Tracker:
+        """Make the tracker of that name, or class, with as many of the trial's models as it takes.
 
         Examples
         --------
@@ -46,7 +46,7 @@ class Trial:
         >>> trial.tracker("svalse", snr_db=10.0).motion.p_activate
         0.1
         """
-        kind = find(name)
+        kind = find(name) if isinstance(name, str) else name
         wanted = inspect.signature(kind).parameters
         models = {"measurement": self.measurement, "motion": self.motion}
         fitting = {key: model for key, model in models.items() if key in wanted}

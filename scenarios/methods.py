@@ -42,9 +42,11 @@ class Method:
     tracker: str
     params: Mapping[str, Any] = field(default_factory=dict)
     label: str = ""
+    kind: type[Tracker] = field(init=False, repr=False)  # goes along to other processes
 
     def __post_init__(self) -> None:
-        known = inspect.signature(find(self.tracker)).parameters
+        object.__setattr__(self, "kind", find(self.tracker))
+        known = inspect.signature(self.kind).parameters
         for name in self.params:
             if name.partition("__")[0] not in known:
                 raise ValueError(
@@ -57,7 +59,7 @@ class Method:
 
     def make(self, trial: Trial, chance: np.random.SeedSequence) -> Tracker:
         """Make the tracker for a trial; one that takes an `rng` draws from `chance`."""
-        known = inspect.signature(find(self.tracker)).parameters
+        known = inspect.signature(self.kind).parameters
         plain = {name: value for name, value in self.params.items() if name in known}
         nested = {name: value for name, value in self.params.items() if name not in known}
         if "rng" in known and "rng" not in plain:
@@ -65,7 +67,7 @@ class Method:
                 chance.entropy, spawn_key=(*chance.spawn_key, zlib.crc32(self.label.encode()))
             )
             plain["rng"] = np.random.default_rng(own)
-        made = trial.tracker(self.tracker, **plain)
+        made = trial.tracker(self.kind, **plain)
         if not nested:
             return made
         return type(made)(**made.set_params(**nested).get_params(deep=False))
