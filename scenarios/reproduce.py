@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 QUICK = 10  # runs of a study that is only looked at
 
-# Where each study lives: a function of the number of runs and the seed. A new one gets its line.
+# Where each study lives: a function of the number of runs and the seed, and if it likes of `out`, a
+# folder for its runs, and of `quick`. A new one gets its line.
 STUDIES: dict[str, str] = {
     "interpolation-table1": "arrivals.scenarios.reproduce_interpolation:table1",
     "interpolation-convergence": "arrivals.scenarios.reproduce_interpolation:convergence",
@@ -177,7 +178,7 @@ def reproduce(
     reports, written = [], []
     for one in tuple(STUDIES) if name == "all" else (name,):
         n_runs = _runs(one, quick) if runs is None else runs
-        report = _report(one, folder, n_runs, seed, jobs)
+        report = _report(one, folder, n_runs, seed, jobs, quick)
         written += _write(one, report, folder, f"{one}, seed {seed}, {n_runs} runs")
         reports.append(report)
     if name == "all" or page is not None:
@@ -192,14 +193,15 @@ def _runs(name: str, quick: bool) -> int:
     return RUNS.get(name, (100, QUICK))[quick]
 
 
-def _report(name: str, folder: Path, runs: int, seed: int, jobs: int) -> Report:
+def _report(name: str, folder: Path, runs: int, seed: int, jobs: int, quick: bool) -> Report:
     from joblib import parallel_config
 
     module, _, function = STUDIES[name].partition(":")
     study: Callable[..., Report] = getattr(importlib.import_module(module), function)
-    keeps = {"out": folder / "runs"} if "out" in inspect.signature(study).parameters else {}
+    offered = {"out": folder / "runs", "quick": quick}
+    asked = inspect.signature(study).parameters
     with parallel_config(n_jobs=jobs):
-        return study(runs, seed, **keeps)
+        return study(runs, seed, **{name: offered[name] for name in offered if name in asked})
 
 
 def _write(name: str, report: Report, folder: Path, origin: str) -> list[Path]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from arrivals.scenarios.base import create
 from arrivals.scenarios.monte_carlo import monte_carlo
 from arrivals.scenarios.reproduce import Report
-from arrivals.scenarios.reproduce_svalse import COMPARED, NAN, _figure, batch_of, holds
+from arrivals.scenarios.reproduce_svalse import NAN, _figure, batch_of, compared, holds, plain
 from arrivals.scenarios.snapshot_bounds import LineBound, line_bound
 from arrivals.scenarios.study import Study
 from arrivals.scenarios.study_plots import plot_metric
@@ -24,27 +24,27 @@ MEASURED = ("gospa", "distance", "missed", "false", "rmse", "converged")
 
 
 @lru_cache(maxsize=2)  # Fig. 10 looks at what Figs 8 and 9 have computed
-def sweep(name: str, runs: int, seed: int, out: Path | None) -> Study:
+def sweep(name: str, runs: int, seed: int, out: Path | None, quick: bool) -> Study:
     """Run all methods on a scene at every SNR; the cases are the SNRs."""
     cases = {f"{snr:g}": create(name, snr_db=snr) for snr in SNR_DB}
-    return monte_carlo(cases, COMPARED, runs, seed, metrics=MEASURED, out=out,
+    return monte_carlo(cases, compared(quick), runs, seed, metrics=MEASURED, out=out,
                        batch=batch_of(runs))  # fmt: skip
 
 
-def fig8(runs: int, seed: int, out: Path | None = None) -> Report:
+def fig8(runs: int, seed: int, out: Path | None = None, quick: bool = False) -> Report:
     """GOSPA and its parts against the SNR, three static sources (scenario 1)."""
-    return parts("svalse_scenario1", "Fig. 8", runs, seed, out)
+    return parts("svalse_scenario1", "Fig. 8", runs, seed, out, quick)
 
 
-def fig9(runs: int, seed: int, out: Path | None = None) -> Report:
+def fig9(runs: int, seed: int, out: Path | None = None, quick: bool = False) -> Report:
     """GOSPA and its parts against the SNR, six static sources (scenario 2)."""
-    return parts("svalse_scenario2", "Fig. 9", runs, seed, out)
+    return parts("svalse_scenario2", "Fig. 9", runs, seed, out, quick)
 
 
-def parts(name: str, figure: str, runs: int, seed: int, out: Path | None) -> Report:
+def parts(name: str, figure: str, runs: int, seed: int, out: Path | None, quick: bool) -> Report:
     """Tabulate and draw one sweep."""
-    study = sweep(name, runs, seed, out)
-    rows = [_row(study, name, snr, method) for snr in SNR_DB for method in COMPARED]
+    study = sweep(name, runs, seed, out, quick)
+    rows = [_row(study, name, snr, method) for snr in SNR_DB for method in study.methods]
     columns = ("snr_db", "method", "GOSPA", "std of runs", "distance", "missed", "false", "RMSE",
                "rebuilt", "rebuilt RMSE")  # fmt: skip
     remarks = [*_claims(study, name), BOUND]
@@ -67,7 +67,7 @@ def _bounds(name: str, runs: int, seed: int) -> dict[str, LineBound]:
 def _row(study: Study, name: str, snr: float, method: str) -> tuple[Any, ...]:
     case = f"{snr:g}"
     means = [study.mean(m, method, case) for m in ("distance", "missed", "false", "rmse")]
-    known = SWEEP[name][snr][SWEPT.index(method)] if method in SWEPT else (NAN, NAN)
+    known = SWEEP[name][snr][SWEPT.index(plain(method))] if plain(method) in SWEPT else (NAN, NAN)
     gospa, spread = study.mean("gospa", method, case), study.spread("gospa", method, case)
     return (snr, method, gospa, spread, *means, *known)
 
@@ -115,18 +115,18 @@ def _draw_parts(study: Study, bounds: dict[str, LineBound]) -> Figure:
     return figure
 
 
-def fig10(runs: int, seed: int, out: Path | None = None) -> Report:
+def fig10(runs: int, seed: int, out: Path | None = None, quick: bool = False) -> Report:
     """RMSE against the SNR, both scenarios."""
     rows: list[tuple[Any, ...]] = []
     figure, axes = _figure(1, 2, (11.0, 4.2))
-    for ax, name in zip(axes, SCENES, strict=True):
-        study, bounds = sweep(name, runs, seed, out), _bounds(name, runs, seed)
+    for ax, name in zip(axes, SCENES, strict=False):
+        study, bounds = sweep(name, runs, seed, out, quick), _bounds(name, runs, seed)
         plot_metric(study, "rmse", x="snr_db", ax=ax,
                     bound={case: one.rmse for case, one in bounds.items()})  # fmt: skip
         ax.set(xlabel="SNR, dB", ylabel="RMSE, degrees", yscale="log", title=SCENES[name])
         for snr in SNR_DB:
             rows += [(name, *_rmse_row(study, name, snr, method), bounds[f"{snr:g}"].rmse)
-                     for method in COMPARED]  # fmt: skip
+                     for method in study.methods]  # fmt: skip
     columns = ("scenario", "snr_db", "method", "RMSE", "std of runs", "rebuilt", "bound")
     title = f"Fig. 10: RMSE against the SNR, {runs} runs, degrees"
     return Report(title, columns, rows, (BOUND,), {"rmse": figure})
@@ -134,5 +134,5 @@ def fig10(runs: int, seed: int, out: Path | None = None) -> Report:
 
 def _rmse_row(study: Study, name: str, snr: float, method: str) -> tuple[Any, ...]:
     case = f"{snr:g}"
-    known = SWEEP[name][snr][SWEPT.index(method)][1] if method in SWEPT else NAN
+    known = SWEEP[name][snr][SWEPT.index(plain(method))][1] if plain(method) in SWEPT else NAN
     return snr, method, study.mean("rmse", method, case), study.spread("rmse", method, case), known
