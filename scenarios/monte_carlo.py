@@ -77,9 +77,10 @@ def monte_carlo(
 
     Examples
     --------
-    >>> study = monte_carlo("svalse_fig6", ["cbf", "sbl"], runs=3, metrics=["gospa", "rmse"])
+    >>> scenario = create("svalse_fig6", n_steps=5)
+    >>> study = monte_carlo(scenario, ["cbf", "sbl"], runs=3, metrics=["gospa", "rmse"])
     >>> study.cases, study.methods, study.runs
-    (['svalse_fig6'], ['cbf', 'sbl'], [0, 1, 2])
+    (['PairsInTurn'], ['cbf', 'sbl'], [0, 1, 2])
     >>> study.mean("gospa", "sbl") < study.mean("gospa", "cbf")
     True
     """

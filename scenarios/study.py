@@ -48,8 +48,9 @@ class Study:
 
     Examples
     --------
-    >>> from arrivals.scenarios import monte_carlo
-    >>> study = monte_carlo("svalse_fig6", ["cbf", "sbl"], runs=3, metrics=["gospa"])
+    >>> from arrivals.scenarios import create, monte_carlo
+    >>> scenario = create("svalse_fig6", n_steps=5)
+    >>> study = monte_carlo(scenario, ["cbf", "sbl"], runs=3, metrics=["gospa"])
     >>> study.paired("gospa", "sbl", "cbf").n_below
     3
     """

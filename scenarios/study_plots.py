@@ -57,7 +57,7 @@ def plot_metric(
     Examples
     --------
     >>> from arrivals.scenarios import create, monte_carlo
-    >>> cases = {f"{snr:g} dB": create("svalse_fig6", snr_db=snr) for snr in (10.0, 20.0)}
+    >>> cases = {f"{snr}": create("svalse_fig6", n_steps=5, snr_db=snr) for snr in (10.0, 20.0)}
     >>> ax = plot_metric(monte_carlo(cases, ["cbf"], runs=2), "gospa", x="snr_db")
     >>> ax.get_xlabel(), ax.get_ylabel()
     ('snr_db', 'gospa')
