@@ -27,7 +27,9 @@ from arrivals.scenarios.line_arrays import (
     SixStatic,
     ThreeStatic,
 )
+from arrivals.scenarios.methods import Method, grid
 from arrivals.scenarios.metrics import Gospa, gospa, mean_gospa, mean_rmse, ospa, rmse
+from arrivals.scenarios.monte_carlo import monte_carlo
 from arrivals.scenarios.networks import Network, read_network
 from arrivals.scenarios.plots import plot_array, plot_bearing_time
 from arrivals.scenarios.readers import read
@@ -38,6 +40,7 @@ from arrivals.scenarios.rss_calibration import Calibration, calibrate
 from arrivals.scenarios.rss_metrics import huber, scores
 from arrivals.scenarios.separation import nmse, sdr
 from arrivals.scenarios.speech import SpeechField, SpeechOfOrderTwo
+from arrivals.scenarios.study import Study
 from arrivals.scenarios.swellex96 import TowPastLine
 from arrivals.scenarios.unlabelled import best_assignment_rmse
 from arrivals.scenarios.waveguides import BottomLayer, Waveguide
@@ -54,6 +57,7 @@ __all__ = [
     "InterpolationBand",
     "InterpolationCoupled",
     "InterpolationTone",
+    "Method",
     "MoreSensors",
     "MovingSource",
     "Network",
@@ -69,6 +73,7 @@ __all__ = [
     "Snapshots",
     "SpeechField",
     "SpeechOfOrderTwo",
+    "Study",
     "Table1K3",
     "Table1K7",
     "ThirdOrder",
@@ -85,9 +90,11 @@ __all__ = [
     "exact_detection",
     "find",
     "gospa",
+    "grid",
     "huber",
     "mean_gospa",
     "mean_rmse",
+    "monte_carlo",
     "network_detection",
     "nmse",
     "ospa",

@@ -39,8 +39,8 @@ class Trial:
     motion: MotionModel
     signals: Complex | Float | None = field(default=None, kw_only=True)
 
-    def tracker(self, name: str, **params: Any) -> Tracker:
-        """Make the tracker of that name with as many of the trial's models as it takes.
+    def tracker(self, name: str | type[Tracker], **params: Any) -> Tracker:
+        """Make the tracker of that name, or class, with as many of the trial's models as it takes.
 
         Examples
         --------
@@ -49,7 +49,7 @@ class Trial:
         >>> trial.tracker("svalse", snr_db=10.0).motion.p_activate
         0.1
         """
-        kind = find(name)
+        kind = find(name) if isinstance(name, str) else name
         wanted = inspect.signature(kind).parameters
         fitting = {key: value for key, value in self.known().items() if key in wanted}
         return kind(**fitting | params)

@@ -55,15 +55,20 @@ class LineScenario(Scenario):
         """Draw complex amplitudes α ~ CN(0, 1), (n_steps, n_sources), for unit-norm steering."""
         return complex_normal(rng, self.doa_deg().shape)
 
-    def sample(self, rng: np.random.Generator) -> Trial:
-        """Draw one trial."""
+    def signals(self, rng: np.random.Generator) -> tuple[Float, Complex, Float]:
+        """Draw what there is to hear: directions, amplitudes at a sensor, noise variances."""
         active = self.active(rng)
         alpha = np.where(active, self.amplitudes(rng), 0)
         truth = np.where(active, np.deg2rad(self.doa_deg()), np.nan)
         power = (np.abs(alpha) ** 2).sum(axis=1) / self.n_sensors
         noise = 10 ** (-self.snr_db / 10) * power
+        return truth, alpha / np.sqrt(self.n_sensors), noise
+
+    def sample(self, rng: np.random.Generator) -> Trial:
+        """Draw one trial."""
+        truth, amplitude, noise = self.signals(rng)
         model = self.measurement
-        waves = model.wave(truth, alpha / np.sqrt(self.n_sensors))
+        waves = model.wave(truth, amplitude)
         u = np.sqrt(noise)[:, None] * complex_normal(rng, waves.shape)
         return Trial(waves + u, truth, model, BernoulliVonMises())
 

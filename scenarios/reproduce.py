@@ -5,11 +5,13 @@ from __future__ import annotations
 import argparse
 import csv
 import importlib
+import inspect
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+import arrivals
 from arrivals.checks import count, one_of
 from arrivals.trackers.recorder import replacing, text
 
@@ -19,17 +21,34 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 QUICK = 10  # runs of a study that is only looked at
 
-# Where each study lives: a function of the number of runs and the seed. A new one gets its line.
+# Where each study lives: a function of the number of runs and the seed, and if it likes of `out`, a
+# folder for its runs, and of `quick`. A new one gets its line.
 STUDIES: dict[str, str] = {
     "ar-kf": "arrivals.scenarios.reproduce_ar:ar_kf",
     "interpolation-table1": "arrivals.scenarios.reproduce_interpolation:table1",
     "interpolation-convergence": "arrivals.scenarios.reproduce_interpolation:convergence",
     "interpolation-rmse": "arrivals.scenarios.reproduce_interpolation:rmse_study",
     "interpolation-moving": "arrivals.scenarios.reproduce_interpolation:moving",
+    "svalse-fig4": "arrivals.scenarios.reproduce_svalse:fig4",
+    "svalse-fig5": "arrivals.scenarios.reproduce_svalse:fig5",
+    "svalse-fig6": "arrivals.scenarios.reproduce_svalse:fig6",
+    "svalse-fig7": "arrivals.scenarios.reproduce_svalse:fig7",
+    "svalse-fig8": "arrivals.scenarios.reproduce_svalse_snr:fig8",
+    "svalse-fig9": "arrivals.scenarios.reproduce_svalse_snr:fig9",
+    "svalse-fig10": "arrivals.scenarios.reproduce_svalse_snr:fig10",
     "swellex96": "arrivals.scenarios.reproduce_swellex:swellex96",
 }
-# Runs of a study, and of a quick look at it, where they are not 100 and `QUICK`.
-RUNS: dict[str, tuple[int, int]] = {"swellex96": (4, 1)}
+# Runs of a study that wants others than 100, and QUICK if it is only looked at.
+RUNS: dict[str, tuple[int, int]] = {
+    "svalse-fig4": (20, 4),
+    "svalse-fig5": (20, 4),
+    "svalse-fig6": (20, 4),
+    "svalse-fig7": (6, 2),
+    "svalse-fig8": (20, 2),
+    "svalse-fig9": (20, 2),
+    "svalse-fig10": (20, 2),
+    "swellex96": (4, 1),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,21 +135,25 @@ def reproduce(
     seed: int = 0,
     quick: bool = False,
     jobs: int = 1,
+    page: str | Path | None = None,
 ) -> list[Path]:
     """Run a study, and write NAME.csv, its pictures as NAME-*.png, and NAME.md.
 
     Parameters
     ----------
     name : str
-        One of `STUDIES`.
+        One of `STUDIES`, or "all".
     out : path
-        Folder; it is made if it is not there.
+        Folder; it is made if it is not there. Studies of many runs keep theirs in its folder
+        "runs", and go on from there if they were stopped.
     runs : int, optional
-        Trials of each case; 100, or 10 if `quick`, or what `RUNS` says.
+        Trials of each case; if None what `RUNS` says, else 100, or 10 if `quick`.
     seed : int
     quick : bool
     jobs : int
         Processes to use, -1 for one a core; the numbers are the same with any.
+    page : path, optional
+        Where to write the tables of all studies on one page; OUT/results.md for "all" if None.
 
     Returns
     -------
@@ -146,27 +169,65 @@ def reproduce(
     --------
     >>> reproduce("interpolation-table9", "out")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
-    ValueError: name must be one of 'interpolation-table1', ...; got 'interpolation-table9'
+    ValueError: name must be one of 'all', 'interpolation-table1', ...; got 'interpolation-table9'
     """
-    from joblib import parallel_config
-
+    one_of("name", name, ("all", *STUDIES))
     if jobs != -1:
         count("jobs", jobs)
-    module, _, function = STUDIES[one_of("name", name, tuple(STUDIES))].partition(":")
-    many, few = RUNS.get(name, (100, QUICK))
-    n_runs = (few if quick else many) if runs is None else count("runs", runs, least=min(few, 2))
-    study: Callable[[int, int], Report] = getattr(importlib.import_module(module), function)
+    if runs is not None:
+        count("runs", runs, least=min(2, _runs(name, quick=True)))
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
+    reports, written = [], []
+    for one in tuple(STUDIES) if name == "all" else (name,):
+        n_runs = _runs(one, quick) if runs is None else runs
+        report = _report(one, folder, n_runs, seed, jobs, quick)
+        written += _write(one, report, folder, f"{one}, seed {seed}, {n_runs} runs")
+        reports.append(report)
+    if name == "all" or page is not None:
+        target = folder / "results.md" if page is None else Path(page)
+        options = " --quick" if quick else f" --runs {runs}" if runs is not None else ""
+        _write_page(target, reports, f"arrivals reproduce {name}{options} --seed {seed}")
+        written.append(target)
+    return written
+
+
+def _runs(name: str, quick: bool) -> int:
+    return RUNS.get(name, (100, QUICK))[quick]
+
+
+def _report(name: str, folder: Path, runs: int, seed: int, jobs: int, quick: bool) -> Report:
+    from joblib import parallel_config
+
+    module, _, function = STUDIES[name].partition(":")
+    study: Callable[..., Report] = getattr(importlib.import_module(module), function)
+    offered = {"out": folder / "runs", "quick": quick}
+    asked = inspect.signature(study).parameters
     with parallel_config(n_jobs=jobs):
-        report = study(n_runs, seed)
+        return study(runs, seed, **{name: offered[name] for name in offered if name in asked})
+
+
+def _write(name: str, report: Report, folder: Path, origin: str) -> list[Path]:
+    """Write a report's table, page and pictures; each picture says where it comes from."""
     report.to_csv(folder / f"{name}.csv")
     pictures = [f"{name}-{key}.png" for key in report.figures]
     for picture, figure in zip(pictures, report.figures.values(), strict=True):
+        stamp = f"{report.title} · {origin} · arrivals {arrivals.__version__}"
+        figure.supxlabel(stamp, x=0.995, ha="right", fontsize=6, color="0.4")
         figure.savefig(folder / picture, dpi=130)
     with replacing(folder / f"{name}.md") as file:
         file.write(report.markdown(pictures))
     return [folder / part for part in (f"{name}.csv", f"{name}.md", *pictures)]
+
+
+def _write_page(path: Path, reports: Sequence[Report], command: str) -> None:
+    """Write all tables on one page."""
+    head = (
+        "# Results\n\nOur numbers beside the papers', and a line on each claim. Written by\n\n"
+        f"    {command} --page {path.name}\n\nwith arrivals {arrivals.__version__}.\n\n"
+    )
+    with replacing(path) as file:
+        file.write(head + "\n".join(f"#{report.markdown()}" for report in reports))
 
 
 def add_reproduce(commands: Any) -> None:
@@ -177,12 +238,14 @@ def add_reproduce(commands: Any) -> None:
         description="Run a paper's experiment again. Writes NAME.csv, NAME.md and pictures.",
         allow_abbrev=False,
     )
-    add.add_argument("name", metavar="NAME", help=", ".join(STUDIES))
+    add.add_argument("name", metavar="NAME", help=f"all, {', '.join(STUDIES)}")
     add.add_argument("--out", default="arrivals-reproduced", metavar="DIR",
                      help="(arrivals-reproduced)")  # fmt: skip
-    add.add_argument("--runs", type=int, metavar="N", help="trials of each case (100)")
+    add.add_argument("--page", metavar="FILE", help="tables of all on one page (DIR/results.md)")
+    add.add_argument("--runs", type=int, metavar="N",
+                     help="trials of each case (100; fewer where a trial is long)")  # fmt: skip
     add.add_argument("--seed", type=int, default=0, metavar="N", help="(0)")
-    add.add_argument("--quick", action="store_true", help=f"{QUICK} trials of each case")
+    add.add_argument("--quick", action="store_true", help=f"at most {QUICK} trials of each case")
     add.add_argument("--jobs", type=int, default=1, metavar="N",
                      help="processes, -1 for one a core (1)")  # fmt: skip
     add.set_defaults(command=_reproduce)
@@ -191,7 +254,7 @@ def add_reproduce(commands: Any) -> None:
 def _reproduce(arguments: argparse.Namespace) -> None:
     written = reproduce(
         arguments.name, arguments.out, arguments.runs, arguments.seed, arguments.quick,
-        arguments.jobs,
+        arguments.jobs, arguments.page,
     )  # fmt: skip
     for path in written:
         print(path)

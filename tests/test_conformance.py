@@ -15,7 +15,19 @@ from subspace_trackers import TRACKERS as SUBSPACE_TRACKERS
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.motion_models import BernoulliVonMises
 from arrivals.params import Model
-from arrivals.trackers import CBF, SVALSE, VALSE, DirectionEstimate, Run, Tracker, available, find
+from arrivals.trackers import (
+    CBF,
+    SBL,
+    SSBL,
+    SVALSE,
+    VALSE,
+    DirectionEstimate,
+    PeaksGNN,
+    Run,
+    Tracker,
+    available,
+    find,
+)
 from arrivals.trackers.conformance import (
     CHECKS,
     Check,
@@ -45,6 +57,13 @@ GRIDLESS: list[tuple[str, MakeTracker, Measurements]] = [
     ("cbf", lambda: CBF(CIRCLE, n_directions=90, max_sources=2), two_sources(CIRCLE)),
     ("valse", lambda: VALSE(LINE), two_sources(LINE)),
     ("valse", lambda: VALSE(GAPS, max_components=3), two_sources(GAPS)),
+    ("sbl", lambda: SBL(LINE, n_directions=91), two_sources(LINE)),
+    ("sbl", lambda: SBL(CIRCLE, n_directions=90, max_sources=2), two_sources(CIRCLE)),
+    ("ssbl", lambda: SSBL(GAPS, n_directions=91), two_sources(GAPS)),
+    ("ssbl", lambda: SSBL(CIRCLE, n_directions=90, reach=1), two_sources(CIRCLE)),
+    ("peaks_gnn", lambda: PeaksGNN(LINE), two_sources(LINE)),
+    ("peaks_gnn", lambda: PeaksGNN(CIRCLE, detector="mvdr", confirm=1), two_sources(CIRCLE)),
+    ("peaks_gnn", lambda: PeaksGNN(LINE, detector=CBF(LINE, threshold_db=6.0)), two_sources(LINE)),
     ("svalse", lambda: SVALSE(LINE), two_sources(LINE)),
     ("svalse", lambda: SVALSE(GAPS, BernoulliVonMises(kappa=50.0)), two_sources(GAPS)),
     (

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from arrivals.measurement_models import ArraySnapshot, Manifold, SensorArray
+from arrivals.trackers import SBL, SSBL, SVALSE
 from arrivals.trackers.coordinate_ascent import Ascent, CoordinateAscent
 from arrivals.trackers.line_spectrum import Prediction
 from arrivals.typing import Complex, Float, Int
@@ -102,11 +103,27 @@ def test_direct_quadrature(
 @pytest.mark.parametrize("name", ["fig4_001", "fig6_001"])
 def test_free_running_mixture_keeps_the_recorded_number_of_sources(name: str) -> None:
     """The tracker itself, in the paper's form, without the slip: K as recorded in most steps."""
-    from arrivals.trackers import SVALSE
-
     z = np.load(Path(FOLDER or "") / "svalse" / f"{name}.npz")
     tracker = SVALSE(
         LINE, reference="first", posterior="mixture", tolerance=1e-6, max_iterations=5000
     )
     run = tracker.run(z["y"].T)
     assert (run.n_found == z["svalse_K"]).mean() >= 0.85
+
+
+@pytest.mark.parametrize("name", ["fig4_001", "fig6_001"])
+@pytest.mark.parametrize(("method", "kind"), [("sbl", SBL), ("ssbl", SSBL)])
+def test_free_running_sbl_follows_the_program(name: str, method: str, kind: type[SBL]) -> None:
+    z = np.load(Path(FOLDER or "") / "svalse" / f"{name}.npz")
+    tracker = kind(LINE)
+    for t, y in enumerate(z["y"].T):
+        tracker.predict()
+        tracker.update(y)
+        recorded, gamma = z[f"{method}_doa_deg"][t], z[f"{method}_gamma"][:, t]
+        np.testing.assert_allclose(
+            np.rad2deg(tracker.estimate.doa), recorded[~np.isnan(recorded)], atol=1e-9
+        )
+        np.testing.assert_allclose(tracker.gamma, gamma, atol=1e-6 * gamma.max())
+        if tracker.estimate.converged:  # else the program gives the last σ² with the best γ
+            assert tracker.noise == pytest.approx(z[f"{method}_sigma2"][t], rel=1e-6)
+        assert tracker.estimate.iterations == z[f"{method}_iterations"][t]

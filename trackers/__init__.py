@@ -21,12 +21,15 @@ from arrivals.trackers.music import MUSIC
 from arrivals.trackers.mvdr import MVDR
 from arrivals.trackers.particle import Particle
 from arrivals.trackers.past import PAST
+from arrivals.trackers.peaks_gnn import PeaksGNN
 from arrivals.trackers.qrd_rls import QRDRLS
 from arrivals.trackers.recorder import Run
 from arrivals.trackers.registry import available, create, find, register
 from arrivals.trackers.root_music import RootMUSIC
 from arrivals.trackers.rss_ml import RSSML
 from arrivals.trackers.rss_vb import RSSVB
+from arrivals.trackers.sbl import SBL
+from arrivals.trackers.ssbl import SSBL
 from arrivals.trackers.svalse import SVALSE
 from arrivals.trackers.ukf import UKF
 from arrivals.trackers.valse import VALSE
@@ -47,12 +50,15 @@ __all__ = [
     "MVDR",
     "PAST",
     "Particle",
+    "PeaksGNN",
     "PositionEstimate",
     "QRDRLS",
     "RSSML",
     "RSSVB",
     "RootMUSIC",
     "Run",
+    "SBL",
+    "SSBL",
     "SVALSE",
     "SourceEstimate",
     "StateEstimate",
