@@ -74,12 +74,14 @@ def _add_track(commands: Any) -> None:
     option("--array", required=True, metavar="TOML", help="array file")
     option("--frequency", type=float, metavar="HZ", help="of the snapshots")
     option("--band", nargs=2, type=float, metavar=("F1", "F2"),
-           help="band of the source, Hz, for a tracker of real samples")  # fmt: skip
+           help="band of the sources, Hz, for a tracker of real samples")  # fmt: skip
     option("--snr", type=float, default=0.0, metavar="DB", help="expected in the band (0)")
     option("--tracker", default="svalse", metavar="NAME", help="see `arrivals list` (svalse)")
     option("--set", action="append", default=[], type=_setting, metavar="NAME=VALUE",
            help="parameter of the tracker, such as motion__kappa=300; may be repeated")  # fmt: skip
     option("--out", metavar="CSV", help="tracks file (standard output)")
+    option("--signals", metavar="WAV",
+           help="the separated sources, WAV or npy, of a tracker that tells them")  # fmt: skip
     option("--plot", metavar="PNG", help="picture of the tracks over the beam power")
     option("--rate", type=float, metavar="HZ", help="samples per second, if the file has none")
     option("--window", type=int, metavar="N", help="samples of a snapshot's window")

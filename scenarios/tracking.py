@@ -20,6 +20,7 @@ from arrivals.measurement_models import ArraySamples, ArraySnapshot, SensorArray
 from arrivals.scenarios.live import live_snapshots, track_live
 from arrivals.scenarios.readers import read
 from arrivals.scenarios.sampled import band_samples, live_samples, track_samples
+from arrivals.scenarios.separated import check_suffix
 from arrivals.trackers import Tracker, find
 from arrivals.trackers.recorder import Run, header, text
 from arrivals.typing import Complex, Float
@@ -45,23 +46,27 @@ def track(arguments: argparse.Namespace, bar: Bar) -> None:
     """
     from threadpoolctl import threadpool_limits
 
+    from arrivals.scenarios.track_sources import separates, track_sources
+
     array = SensorArray.from_toml(arguments.array)
     _check_outputs(arguments)
     with threadpool_limits(1, "blas"):  # the matrices are small: more threads only wait
-        if arguments.band:
+        if separates(arguments):
+            track_sources(arguments, array, bar)
+        elif arguments.band:
             _track_band(arguments, array, bar)
         else:
             _track_snapshots(arguments, array, bar)
 
 
 def _track_snapshots(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -> None:
-    measurement = _measurement(array, arguments)
-    tracker = _tracker(arguments.tracker, measurement, dict(arguments.set))
+    model = measurement(array, arguments)
+    tracker = _tracker(arguments.tracker, model, dict(arguments.set))
     job = _track_stream if arguments.file == "-" else _track_file
-    job(arguments, tracker, measurement, bar)
+    job(arguments, tracker, model, bar)
 
 
-def _measurement(array: SensorArray, arguments: argparse.Namespace) -> ArraySnapshot:
+def measurement(array: SensorArray, arguments: argparse.Namespace) -> ArraySnapshot:
     """Return the array at the frequency, which must be unambiguous."""
     if arguments.frequency is None:
         raise ValueError("give --frequency, or --band for a tracker of real samples")
@@ -106,11 +111,11 @@ def _check_outputs(arguments: argparse.Namespace) -> None:
     """Refuse, before the work begins, what could not be written at its end."""
     from arrivals.scenarios.plots import picture_format
 
-    files = [name for name in (arguments.array, arguments.file, arguments.out, arguments.plot)
-             if name and name != "-"]  # fmt: skip
+    outputs = arguments.out, arguments.plot, arguments.signals
+    files = [name for name in (arguments.array, arguments.file, *outputs) if name and name != "-"]
     if len({Path(name).resolve() for name in files}) < len(files):
-        raise ValueError("FILE, --array, --out and --plot must be different files")
-    for name in filter(None, (arguments.out, arguments.plot)):
+        raise ValueError("FILE, --array, --out, --plot and --signals must be different files")
+    for name in filter(None, outputs):
         folder = Path(name).parent
         if not folder.is_dir():
             raise FileNotFoundError(2, "the folder does not exist", str(folder))
@@ -120,9 +125,12 @@ def _check_outputs(arguments: argparse.Namespace) -> None:
             raise PermissionError(13, "the folder may not be written to", str(folder))
     if arguments.plot:
         picture_format(arguments.plot)
+    if arguments.signals:
+        check_suffix(arguments.signals)
 
 
-def _refuse(arguments: argparse.Namespace, names: Iterable[str], reason: str) -> None:
+def refuse(arguments: argparse.Namespace, names: Iterable[str], reason: str) -> None:
+    """Raise a ValueError if one of these arguments was given."""
     for name in names:
         if getattr(arguments, name):
             raise ValueError(f"--{name} {reason}")
@@ -150,19 +158,20 @@ def _heard(arguments: argparse.Namespace, array: SensorArray) -> _Heard:
 def _track_file(
     arguments: argparse.Namespace, tracker: Tracker, measurement: ArraySnapshot, bar: Bar
 ) -> None:
-    _refuse(arguments, ("dtype", "channels"), "goes with samples from standard input")
+    refuse(arguments, ("dtype", "channels"), "goes with samples from standard input")
     heard = _heard(arguments, measurement.array)
     result = tracker.run(bar(heard.values, desc=arguments.tracker))
     result = result if heard.time is None else result.at(heard.time)
     if arguments.out:
         result.to_csv(arguments.out)
     else:
-        _print_rows(result)
+        print_rows(result)
     if arguments.plot:
         _plot(arguments.plot, result, heard, measurement)
 
 
-def _print_rows(result: Run) -> None:
+def print_rows(result: Run) -> None:
+    """Print the tracks file."""
     sys.stdout.write(",".join(header(result.kind)) + "\n")
     for row in result.rows():
         sys.stdout.write(",".join(text(row)) + "\n")
@@ -178,7 +187,7 @@ def _plot(path: str, result: Run, heard: _Heard, measurement: ArraySnapshot) -> 
 def _track_stream(
     arguments: argparse.Namespace, tracker: Tracker, measurement: ArraySnapshot, bar: Bar
 ) -> None:
-    _refuse(arguments, ("plot", "variable", "transpose"), "goes with a file, not with a stream")
+    refuse(arguments, ("plot", "variable", "transpose"), "goes with a file, not with a stream")
     array = measurement.array
     snapshots = live_snapshots(
         sys.stdin.buffer, _stream_channels(arguments.channels, array),
@@ -192,11 +201,11 @@ def _track_stream(
 
 def _track_band(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -> None:
     """Track by a tracker that takes real samples one by one, from a recording or a stream."""
-    _refuse(arguments, ("frequency", "window"), "goes with snapshots, not with --band")
+    refuse(arguments, ("frequency", "window"), "goes with snapshots, not with --band")
     if arguments.file == "-":
         _track_band_stream(arguments, array, bar)
         return
-    _refuse(arguments, ("dtype", "channels"), "goes with samples from standard input")
+    refuse(arguments, ("dtype", "channels"), "goes with samples from standard input")
     recording = read(arguments.file, rate=arguments.rate, variable=arguments.variable,
                      transpose=arguments.transpose, array=array)  # fmt: skip
     if recording.is_narrowband:
@@ -207,7 +216,7 @@ def _track_band(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -> 
     if arguments.out:
         result.to_csv(arguments.out)
     else:
-        _print_rows(result)
+        print_rows(result)
     if arguments.plot:
         from arrivals.scenarios.plots import plot_bearing_time, save
 
@@ -215,7 +224,7 @@ def _track_band(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -> 
 
 
 def _track_band_stream(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -> None:
-    _refuse(arguments, ("plot", "variable", "transpose"), "goes with a file, not with a stream")
+    refuse(arguments, ("plot", "variable", "transpose"), "goes with a file, not with a stream")
     tracker, rate = _band_tracker(arguments, array, arguments.rate)
     n_channels = _stream_channels(arguments.channels, array)
     frames = live_samples(sys.stdin.buffer, n_channels, dtype=arguments.dtype or "int16")

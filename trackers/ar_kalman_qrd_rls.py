@@ -193,8 +193,8 @@ class ARKalmanQRDRLS(Tracker):
         self._close_if_full()
         self.frames = np.concatenate([self.frames[1:], frame[None]])
         self.n_pending += 1
-        if closes(frame):
-            self._close_if_full()
+        if self._full() and closes(frame):
+            self._close()
 
     @property
     def estimate(self) -> SourceEstimate:
@@ -316,9 +316,16 @@ class ARKalmanQRDRLS(Tracker):
 
     # -- intervals ---------------------------------------------------------------------------------
 
+    def _full(self) -> bool:
+        return self.n_pending == _wanted(self._sources, self.interval)
+
+    def _close(self) -> None:
+        """Work off the snapshots that are pending."""
+        self._history(self._pending()[None], move=True, closing=True)
+
     def _close_if_full(self) -> None:
-        if self.n_pending == _wanted(self._sources, self.interval):
-            self._history(self._pending()[None], move=True, closing=True)
+        if self._full():
+            self._close()
 
     def _history(self, z: Complex, move: bool = False, closing: bool = False) -> History:
         """Work off snapshots, (n_sequences, n_snapshots, n_sensors), from the present belief.

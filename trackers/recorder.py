@@ -126,8 +126,8 @@ def text(row: tuple[Any, ...]) -> list[str]:
 
 
 @contextmanager
-def replacing(path: str | os.PathLike[str]) -> Iterator[IO[str]]:
-    """Open a text file beside `path` that takes its name only if all goes well.
+def replacing(path: str | os.PathLike[str], *, binary: bool = False) -> Iterator[IO[Any]]:
+    """Open a text or binary file beside `path` that takes its name only if all goes well.
 
     Examples
     --------
@@ -141,7 +141,8 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[IO[str]]:
         raise FileNotFoundError(2, f"the folder {target.parent} does not exist")
     part = target.with_name(f".{target.name}.{os.getpid()}.part")
     try:
-        with open(part, "w", newline="", encoding="utf-8") as file:
+        text_mode: dict[str, Any] = {} if binary else {"newline": "", "encoding": "utf-8"}
+        with open(part, "wb" if binary else "w", **text_mode) as file:
             yield file
         os.replace(part, target)
     except BaseException:

@@ -243,7 +243,19 @@ def directions(
     factor = folded(*parts_of_stack, ridge_rows(ridge, target))[..., :k, :]
     W = solution(factor, k)
     M = manifold.n_pairs
-    return factor, manifold.doa(np.arctan2(W[..., M:], W[..., :M]))
+    doa = manifold.doa(np.arctan2(W[..., M:], W[..., :M]))
+    return factor, cautious(s.doa, doa, float(manifold.distances[-1]))
+
+
+def cautious(before: Float, after: Float, widest: float) -> Float:
+    """Keep sin β from moving by more than half a turn of the outermost pair's phase.
+
+    More is a leap to where the outer pairs are ambiguous, as a poor start may suggest.
+    """
+    if widest <= 0.25:
+        return after
+    u, most = np.sin(before), 0.5 / widest
+    return np.asarray(np.arcsin(np.clip(np.sin(after), u - most, u + most)))
 
 
 def covariance_rows(heard: Heard, k: int, centre: int) -> Float:

@@ -11,7 +11,8 @@ import numpy as np
 
 from arrivals.typing import Float
 
-TOLERANCE, MOST_STEPS, STRIDE = 1e-4, 240, 4  # of what a stride changes; less is left
+TOLERANCE = 1e-4  # of what the last step changed, where the gain counts as steady
+MOST_STEPS, STRIDE = 240, 4
 
 
 def transposed(A: Float) -> Float:
@@ -68,12 +69,12 @@ def steady_state(P: Float, F: Float, Q: Float, A: Float, r: Float) -> tuple[Floa
     for _ in range(MOST_STEPS // STRIDE):
         new = P
         for _ in range(STRIDE):
-            new = F @ new @ Ft + Q
+            old, new = new, F @ new @ Ft + Q
             seen = new[..., :k]
             gain = np.linalg.solve(AtA @ seen[..., :k, :] + R, AtA)
             new = new - seen @ gain @ transposed(seen)
         new = (new + transposed(new)) / 2
-        change = np.abs(new - P).max(axis=(-1, -2), keepdims=True)
+        change = np.abs(new - old).max(axis=(-1, -2), keepdims=True)
         small = change <= TOLERANCE * np.abs(new).max(axis=(-1, -2), keepdims=True)
         P = np.where(done, P, new)
         done = done | small
