@@ -161,6 +161,7 @@ class ARKalmanQRDRLS(Tracker):
         self.correction, self.adapt_drive, self.adapt_noise = correction, adapt_drive, adapt_noise
         self.r_start, self.tau = not_negative("r_start", r_start), positive("tau", tau)
         self.memory = positive("memory", memory)
+        _manifold(measurement)  # refuses an array that does not fit
         for name in ("forgetting", "ar_forgetting"):
             if not 0 < positive(name, getattr(self, name)) < 1:
                 raise ValueError(f"{name} must lie in (0, 1); got {getattr(self, name)}")
