@@ -57,7 +57,7 @@ class AutoregressiveSources(MotionModel):
     array([0.9 , 1.  , 1.37, 1.  , 0.  ])
     """
 
-    coefficients: Sequence[Sequence[float]] | Float
+    coefficients: Sequence[Sequence[float] | Float] | Float
     noise: float | Sequence[float] | Float = 1.0
     real_valued: bool = False
 

@@ -28,8 +28,8 @@ class Blocks:
         `lags` with the current sample last: what a regression predicts from what.
     shift : ndarray, shape (dim, dim)
         What moves every lag on by one.
-    order : ndarray of int, shape (dim,)
-        Number, source by source, of the lag at each place.
+    order, back : ndarray of int, shape (dim,)
+        Number, source by source, of the lag at each place; and the place of each number.
     """
 
     orders: tuple[int, ...]
@@ -39,6 +39,7 @@ class Blocks:
     columns: Int
     shift: Float
     order: Int
+    back: Int
 
     @property
     def dim(self) -> int:
@@ -87,9 +88,10 @@ def blocks(orders: tuple[int, ...], lag_by_lag: bool = False) -> Blocks:
     shift = np.zeros((len(source), len(source)))
     shift[places[:, 1:][used], places[:, :-1][used]] = 1.0
     columns = np.roll(lags, -1, axis=1)
-    for array in (lags, used, columns, shift, order):
+    back = np.argsort(order)
+    for array in (lags, used, columns, shift, order, back):
         array.setflags(write=False)
-    return Blocks(orders, lags[:, 0], lags, used, columns, shift, order)
+    return Blocks(orders, lags[:, 0], lags, used, columns, shift, order, back)
 
 
 def radius(coefficients: Float) -> Float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -118,13 +119,14 @@ def separator(
     params: Mapping[str, Any], z: Complex, measurement: ArraySnapshot, real_samples: bool
 ) -> ARKalmanQRDRLS:
     """Make the tracker for a recording, with the settings for speech if it holds real samples."""
+    names = inspect.signature(ARKalmanQRDRLS).parameters
+    for name in params:
+        if name.partition("__")[0] == "measurement":
+            raise ValueError(f"--set {name}: the measurement comes from --array and --frequency")
     noisy, motion = for_recording(params, z, measurement, real_samples)
-    defaults = FOR_SPEECH if real_samples else {}
-    plain = {key: value for key, value in params.items() if "__" not in key and key != "motion"}
-    nested = {key: value for key, value in params.items() if key.startswith("motion__")}
-    tracker = ARKalmanQRDRLS(noisy, motion, **defaults | plain)
-    unknown = {key: value for key, value in params.items() if key not in {*plain, *nested}}
-    return tracker.set_params(**nested | unknown)
+    plain = {name: value for name, value in params.items() if name in names and name != "motion"}
+    tracker = ARKalmanQRDRLS(noisy, motion, **(FOR_SPEECH if real_samples else {}) | plain)
+    return tracker.set_params(**{name: params[name] for name in params if name not in names})
 
 
 def thinned(run: Run, every: int) -> Run:

@@ -43,6 +43,8 @@ class KalmanSteps(FilterpyNames):
         self.x, self.P = real("x", x), real("P", P)
         mean, _ = self._belief(fresh=True)
         H, R = measurement.H(mean), measurement.R
+        for name, matrix in (("F", motion.F(mean)), ("Q", motion.Q()), ("H", H), ("R", R)):
+            real(f"{name} of the {'motion' if name in 'FQ' else 'measurement'}", matrix)
         check_shape("H of the measurement", H, (self.dim_z, self.dim_x))
         check_shape("R of the measurement", R, (self.dim_z, self.dim_z))
         self._start()

@@ -14,6 +14,7 @@ from arrivals.measurement_models.array_manifold import ArrayManifold
 from arrivals.measurement_models.snapshots import LARGEST
 from arrivals.motion_models.autoregressive import AutoregressiveSources
 from arrivals.motion_models.companion import blocks
+from arrivals.motion_models.stacked import block_diagonal
 from arrivals.trackers.qrd_rls import ridge_rows
 from arrivals.typing import Bool, Complex, Float, Int
 
@@ -150,20 +151,20 @@ def inside(x: Float, P: Float, motion: AutoregressiveSources) -> tuple[Float, Fl
     parts, places = motion.n_parts, blocks(motion.orders, lag_by_lag=True)
     n, order = places.dim, places.order
     both = sum(P[i * n : (i + 1) * n, i * n : (i + 1) * n] for i in range(parts))
-    return x.reshape(parts, n)[:, order], np.asarray(both)[np.ix_(order, order)]
+    return x.reshape(parts, n)[:, order], np.asarray(both)[order[:, None], order]
 
 
 def outside(x: Float, motion: AutoregressiveSources) -> Float:
     """Return states (..., parts, n), lag by lag, as trackers show them: (..., dim_x)."""
-    back = np.argsort(blocks(motion.orders, lag_by_lag=True).order)
+    back = blocks(motion.orders, lag_by_lag=True).back
     return x[..., back].reshape(*x.shape[:-2], -1)
 
 
 def covariance_outside(P: Float, motion: AutoregressiveSources) -> Float:
     """Return a covariance (n, n), lag by lag, as trackers show it: (dim_x, dim_x)."""
-    back = np.argsort(blocks(motion.orders, lag_by_lag=True).order)
-    each = P[np.ix_(back, back)]
-    return np.asarray(np.kron(np.eye(motion.n_parts) / motion.n_parts, each), dtype=np.float64)
+    back = blocks(motion.orders, lag_by_lag=True).back
+    each = P[back[:, None], back] / motion.n_parts
+    return each if motion.real_valued else block_diagonal(each, each)
 
 
 def joined(X: Float, parts: int, n_sources: int) -> Complex:

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from arrivals.typing import Float
+from arrivals.typing import Bool, Float
 
 TOLERANCE = 1e-4  # of what the last step changed, where the gain counts as steady
-MOST_STEPS, STRIDE = 240, 4
+MOST_STEPS, STRIDE = 250, 5
 
 
 def transposed(A: Float) -> Float:
@@ -64,8 +64,7 @@ def steady_state(P: Float, F: Float, Q: Float, A: Float, r: Float) -> tuple[Floa
     k, Ft = A.shape[-1], transposed(F)
     AtA = transposed(A) @ A
     R = r * np.eye(k)
-    # a batch goes on until its last member is there; the others wait, as if they were alone
-    done = np.zeros((*P.shape[:-2], 1, 1), dtype=np.bool_)
+    done: Bool | None = None
     for _ in range(MOST_STEPS // STRIDE):
         new = P
         for _ in range(STRIDE):
@@ -73,11 +72,11 @@ def steady_state(P: Float, F: Float, Q: Float, A: Float, r: Float) -> tuple[Floa
             seen = new[..., :k]
             gain = np.linalg.solve(AtA @ seen[..., :k, :] + R, AtA)
             new = new - seen @ gain @ transposed(seen)
-        new = (new + transposed(new)) / 2
         change = np.abs(new - old).max(axis=(-1, -2), keepdims=True)
-        small = change <= TOLERANCE * np.abs(new).max(axis=(-1, -2), keepdims=True)
-        P = np.where(done, P, new)
-        done = done | small
+        steady = np.asarray(change <= TOLERANCE * new.max(axis=(-1, -2), keepdims=True))
+        # a batch goes on until its last member is there; the others wait, as if they were alone
+        P = new if done is None else np.where(done, P, new)
+        done = steady if done is None else done | steady
         if done.all():
             break
     return corrected(F @ P @ Ft + Q, A, r)
@@ -103,11 +102,12 @@ def fixed_gain(x: Float, Phi: Float, b: Float, parts: int = 1) -> Float:
     X = b.copy()
     X[..., :parts, :] += x @ Phi
     step = parts
-    while step < X.shape[-2]:
-        X[..., step:, :] = X[..., step:, :] + X[..., :-step, :] @ Phi
-        Phi = Phi @ Phi
+    while True:
+        X[..., step:, :] += X[..., :-step, :] @ Phi
         step *= 2
-    return X
+        if step >= X.shape[-2]:
+            return X
+        Phi = Phi @ Phi
 
 
 def steady_filter(

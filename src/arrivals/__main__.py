@@ -23,7 +23,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     --------
     >>> main(["list"])  # doctest: +ELLIPSIS
     trackers
-      cbf ...
+      ar_kalman_qrd_rls ...
     0
     """
     try:

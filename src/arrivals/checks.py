@@ -145,9 +145,12 @@ def real(name: str, value: ArrayLike) -> Float:
     --------
     >>> real("x", [1 + 2j])
     Traceback (most recent call last):
-    TypeError: x must hold real numbers; got complex128
+    TypeError: x must hold real numbers; got complex128: stack real and imaginary parts, [Re; Im]
     """
     array = np.asarray(value)
+    if array.dtype.kind == "c":
+        cure = "stack real and imaginary parts, [Re; Im]"
+        raise TypeError(f"{name} must hold real numbers; got {array.dtype}: {cure}")
     if array.dtype.kind not in "biuf":
         raise TypeError(f"{name} must hold real numbers; got {array.dtype}")
     return array.astype(np.float64, copy=False)
