@@ -24,6 +24,7 @@ STUDIES: dict[str, str] = {
     "interpolation-convergence": "arrivals.scenarios.reproduce_interpolation:convergence",
     "interpolation-rmse": "arrivals.scenarios.reproduce_interpolation:rmse_study",
     "interpolation-moving": "arrivals.scenarios.reproduce_interpolation:moving",
+    "rss": "arrivals.scenarios.reproduce_rss:table1",
 }
 
 
