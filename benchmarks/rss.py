@@ -47,7 +47,8 @@ from arrivals.scenarios.rss_trials import answers, bounds, draws, one_of_batch
 from arrivals.trackers import Run
 from arrivals.trackers.rss_cycles import Cycling, Sweep, solve
 from arrivals.trackers.rss_map import maximum
-from arrivals.trackers.rss_problem import Prior, Problem
+from arrivals.trackers.rss_problem import Prior, Problem, inverse_2x2, marginals
+from arrivals.trackers.rss_quality import quality
 from arrivals.trackers.rss_start import Newcomers, best, grown
 from arrivals.typing import Float
 
@@ -186,6 +187,32 @@ def single_and_divergence(runs: int) -> None:
         line(f"literal, std after {cycles} cycles over the right one, times √{cycles}",
              f"{ratio * np.sqrt(cycles):.3f}", "1 within 0.05",
              between(ratio * np.sqrt(cycles), 0.95, 1.05))  # fmt: skip
+
+
+def covariances_and_flags(runs: int) -> None:
+    """Print what 95 % ellipses hold, and how many wrong solutions the goodness of fit finds."""
+    heading("Section 7, three sources from the prior")
+    trials = draws(Table1K3(), 6 * runs, 5)
+    problem = trials.problem
+    found = solve(problem, problem.prior.mu, problem.prior.theta, Cycling())
+    J = problem.information(problem.field.levels(found.u, found.theta))
+    joint, factor = marginals(J).Sigma, inverse_2x2(found.P)
+    miss = found.theta - trials.theta
+    for name, Sigma, known in (("joint", joint, "0.89"), ("factor", factor, "0.73")):
+        nees = np.einsum("bki,bkij,bkj->bk", miss, np.linalg.inv(Sigma), miss)
+        line(f"inside the 95 % ellipse, {name}", f"{np.mean(nees < 5.991):.2f}", known)
+    ratio = np.sqrt(np.trace(factor, axis1=-2, axis2=-1) / np.trace(joint, axis1=-2, axis2=-1))
+    line("position std, factor over joint, median", f"{np.median(ratio):.2f}", "0.77")
+    power = np.sqrt(1 / found.w / marginals(J).v)
+    line("power std, factor over joint, median", f"{np.median(power):.2f}", "0.40")
+    judged = quality(problem.misfit(problem.field.levels(found.u, found.theta)),
+                     (problem.W > 0).sum(axis=-1), problem.prior, found.theta,
+                     found.log_posterior, found.start)  # fmt: skip
+    wrong = (np.hypot(miss[..., 0], miss[..., 1]) > 10).any(axis=1)
+    line("wrong solutions (a source more than 10 m off) that are flagged",
+         f"{np.mean(judged.poor_fit[wrong]):.2f}", "0.35..0.88")  # fmt: skip
+    false = float(np.mean(judged.poor_fit[~wrong]))
+    line("right solutions that are flagged", f"{false:.3f}", "at most 0.04", false <= 0.04)
 
 
 def undamped_flagged(scenario: FixedSources, runs: int) -> float:
@@ -503,6 +530,7 @@ def _two(network: Network, single: Network) -> None:
 PARTS: dict[str, Callable[[int], None]] = {
     "table": table,
     "single": single_and_divergence,
+    "covariance": covariances_and_flags,
     "counting": lambda runs: counting(max(24, runs // 2)),
     "crossing": lambda runs: crossing(max(25, runs // 2)),
     "births": lambda runs: births(max(10, runs // 2)),

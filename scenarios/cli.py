@@ -14,6 +14,7 @@ import arrivals
 from arrivals.scenarios import base as scenarios
 from arrivals.scenarios.demo import demo
 from arrivals.scenarios.live import DTYPES
+from arrivals.scenarios.locating import add_locate
 from arrivals.scenarios.reproduce import add_reproduce
 from arrivals.scenarios.tracking import track
 from arrivals.trackers import available, find
@@ -46,13 +47,15 @@ class _Parser(argparse.ArgumentParser):
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(
         prog="arrivals",
-        description="Track directions of arrival from the raw samples or snapshots of an array.",
+        description="Track directions of arrival from the raw samples or snapshots of an array, "
+        "or positions from signal strength.",
         allow_abbrev=False,
     )
     parser.add_argument("--version", action="version", version=f"arrivals {arrivals.__version__}")
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
     _add_track(commands)
     _add_demo(commands)
+    add_locate(commands, _bar)
     add_reproduce(commands)
     listing = commands.add_parser("list", help="list trackers and scenarios")
     listing.set_defaults(command=_list)

@@ -29,6 +29,7 @@ STUDIES: dict[str, str] = {
     "interpolation-convergence": "arrivals.scenarios.reproduce_interpolation:convergence",
     "interpolation-rmse": "arrivals.scenarios.reproduce_interpolation:rmse_study",
     "interpolation-moving": "arrivals.scenarios.reproduce_interpolation:moving",
+    "rss": "arrivals.scenarios.reproduce_rss:table1",
     "svalse-fig4": "arrivals.scenarios.reproduce_svalse:fig4",
     "svalse-fig5": "arrivals.scenarios.reproduce_svalse:fig5",
     "svalse-fig6": "arrivals.scenarios.reproduce_svalse:fig6",
