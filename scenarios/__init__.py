@@ -17,10 +17,10 @@ from arrivals.scenarios.line_arrays import (
 )
 from arrivals.scenarios.methods import Method, grid
 from arrivals.scenarios.metrics import Gospa, gospa, mean_gospa, mean_rmse, ospa, rmse
-from arrivals.scenarios.monte_carlo import monte_carlo
 from arrivals.scenarios.plots import plot_array, plot_bearing_time
 from arrivals.scenarios.readers import read
 from arrivals.scenarios.recordings import Recording, Snapshots
+from arrivals.scenarios.runner import monte_carlo
 from arrivals.scenarios.study import Study
 
 __all__ = [
