@@ -40,6 +40,10 @@ from arrivals.scenarios.rss_calibration import Calibration, calibrate
 from arrivals.scenarios.rss_metrics import huber, scores
 from arrivals.scenarios.separation import nmse, sdr
 from arrivals.scenarios.speech import SpeechField, SpeechOfOrderTwo
+from arrivals.scenarios.plots import plot_array, plot_bearing_time
+from arrivals.scenarios.readers import read
+from arrivals.scenarios.recordings import Recording, Snapshots
+from arrivals.scenarios.runner import monte_carlo
 from arrivals.scenarios.study import Study
 from arrivals.scenarios.swellex96 import TowPastLine
 from arrivals.scenarios.unlabelled import best_assignment_rmse

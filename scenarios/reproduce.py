@@ -225,7 +225,7 @@ def _write_page(path: Path, reports: Sequence[Report], command: str) -> None:
     """Write all tables on one page."""
     head = (
         "# Results\n\nOur numbers beside the papers', and a line on each claim. Written by\n\n"
-        f"    {command} --page {path.name}\n\nwith arrivals {arrivals.__version__}.\n\n"
+        f"    {command} --page {path.as_posix()}\n\nwith arrivals {arrivals.__version__}.\n\n"
     )
     with replacing(path) as file:
         file.write(head + "\n".join(f"#{report.markdown()}" for report in reports))

@@ -10,9 +10,9 @@ import numpy as np
 
 from arrivals.scenarios.base import Scenario, create
 from arrivals.scenarios.methods import Method, methods
-from arrivals.scenarios.monte_carlo import monte_carlo
 from arrivals.scenarios.plots import plot_bearing_time
 from arrivals.scenarios.reproduce import Report
+from arrivals.scenarios.runner import monte_carlo
 from arrivals.scenarios.snapshot_bounds import line_bound
 from arrivals.scenarios.study import Study
 from arrivals.scenarios.svalse_figures import ACTIVATION, PAPER, REBUILT

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from arrivals.scenarios.base import create
-from arrivals.scenarios.monte_carlo import monte_carlo
 from arrivals.scenarios.reproduce import Report
 from arrivals.scenarios.reproduce_svalse import NAN, _figure, batch_of, compared, holds, plain
+from arrivals.scenarios.runner import monte_carlo
 from arrivals.scenarios.snapshot_bounds import LineBound, line_bound
 from arrivals.scenarios.study import Study
 from arrivals.scenarios.study_plots import plot_metric

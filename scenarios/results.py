@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from arrivals import measurement_models, motion_models, trackers
 from arrivals.scenarios.blocks import Row
 from arrivals.trackers.recorder import replacing
 
@@ -28,6 +29,24 @@ def fingerprint(config: Mapping[str, Any]) -> str:
     False
     """
     return hashlib.sha256(_text(config).encode()).hexdigest()[:10]
+
+
+def code_mark(modules: Iterable[str]) -> str:
+    """Return ten letters that differ when trackers, models or the named modules have changed.
+
+    Examples
+    --------
+    >>> code_mark([]) == code_mark(["arrivals.scenarios.line_arrays"])
+    False
+    """
+    packages = (measurement_models, motion_models, trackers)
+    files = {path for package in packages for path in Path(package.__path__[0]).glob("*.py")}
+    named = (getattr(sys.modules.get(name), "__file__", None) for name in modules)
+    files |= {Path(file) for file in named if file}
+    contents = hashlib.sha256()
+    for path in sorted(files):
+        contents.update(path.read_bytes())
+    return contents.hexdigest()[:10]
 
 
 def _text(config: Mapping[str, Any]) -> str:

@@ -131,6 +131,13 @@ def test_changed_configuration_starts_a_new_file(tmp_path: Path) -> None:
     assert len(Study.read(str(a.path)).rows()) == 2
 
 
+def test_changed_code_starts_a_new_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    small(1, out=tmp_path)
+    monkeypatch.setattr("arrivals.scenarios.runner.code_mark", lambda modules: "other")
+    small(1, out=tmp_path)
+    assert len(list(tmp_path.iterdir())) == 2
+
+
 def test_file_that_is_no_study_is_refused_and_kept(tmp_path: Path) -> None:
     notes = tmp_path / "notes.csv"
     notes.write_text("a,b\n1,2\n")

@@ -82,7 +82,8 @@ def test_all_writes_every_study_and_one_page(
         reproduce, "STUDIES", {"one": f"{__name__}:brief", "two": f"{__name__}:brief"}
     )
     monkeypatch.setattr(reproduce, "RUNS", {"two": (30, 3)})
-    page = tmp_path / "page.md"
+    monkeypatch.chdir(tmp_path)
+    page = Path("page.md")
     written = reproduce.reproduce("all", tmp_path / "out", quick=True, seed=7, page=page)
     assert [path.name for path in written] == ["one.csv", "one.md", "two.csv", "two.md", "page.md"]
     text = page.read_text()

@@ -13,7 +13,7 @@ from arrivals.params import _plain
 from arrivals.scenarios.base import Scenario, create
 from arrivals.scenarios.blocks import ERROR, Block, Row
 from arrivals.scenarios.methods import Method, methods
-from arrivals.scenarios.results import Results
+from arrivals.scenarios.results import Results, code_mark
 from arrivals.scenarios.scores import CPU, METRICS, Metric
 from arrivals.scenarios.study import Study
 
@@ -72,7 +72,8 @@ def monte_carlo(
 
     Notes
     -----
-    A run that fails is a row with its error and its seed, and the study goes on. The rows of
+    A configuration is scenarios, trackers, metrics, seed, and the code of all of them. A run that
+    fails is a row with its error and its seed, and the study goes on. The rows of
     "cpu_ms", processor time of a step, are the only ones that differ from call to call.
 
     Examples
@@ -88,6 +89,7 @@ def monte_carlo(
     count("runs", runs)
     config = {
         "version": arrivals.__version__,
+        "code": code_mark({one.__module__ for one in [*cases.values(), *scored.values()]}),
         "seed": count("seed", seed, least=0),
         "scenarios": {name: _plain(one) for name, one in cases.items()},
         "methods": [method.to_dict() for method in compared],
