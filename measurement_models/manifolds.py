@@ -50,8 +50,8 @@ class Manifold(Protocol):
     def steering(self, theta: ArrayLike) -> Complex:
         """Return the responses to angles (n,): (n_nuisance, n_bins, n_sensors, n)."""
 
-    def norm_squared(self) -> float:
-        """Return ‖a(θ)‖²."""
+    def norm_squared(self) -> float | Complex:
+        """Return ‖a(θ)‖², or the (n_nuisance, n_bins, i) cᵢ of its series Re Σ cᵢ exp(jiθ)."""
 
     def to_doa(self, theta: ArrayLike, slack: ArrayLike = 0.0) -> Float:
         """Return directions, rad; NaN where there is none within `slack` of the angle."""
@@ -67,6 +67,9 @@ class Manifold(Protocol):
 
     def without(self, sensors: Sequence[int] | Int) -> Manifold:
         """Return the manifold of the array less some sensors."""
+
+    def only(self, bins: Sequence[int] | Int) -> Manifold:
+        """Return the manifold of some of the bins."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,3 +185,7 @@ class GridLine:
         if len(sensors) == 0:
             return self
         return GridLine(np.delete(self.places, sensors), self.step, self.origin, self.reference)
+
+    def only(self, bins: Sequence[int] | Int) -> GridLine:
+        """Return the same: there is one bin."""
+        return self

@@ -1,5 +1,6 @@
 """What trackers are tried on: simulated truth, recorded data, metrics and plots."""
 
+from arrivals.scenarios.any_arrays import Cardioids, Circle, Grating
 from arrivals.scenarios.base import Scenario, Trial, available, create, register
 from arrivals.scenarios.base import find_scenario as find
 from arrivals.scenarios.interpolation import (
@@ -21,7 +22,10 @@ from arrivals.scenarios.readers import read
 from arrivals.scenarios.recordings import Recording, Snapshots
 
 __all__ = [
+    "Cardioids",
+    "Circle",
     "Gospa",
+    "Grating",
     "InterpolationBand",
     "InterpolationCoupled",
     "InterpolationTone",

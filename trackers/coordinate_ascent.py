@@ -24,6 +24,7 @@ from arrivals.trackers.angle_posteriors import (
     unfold,
 )
 from arrivals.trackers.line_spectrum import Fit, Prediction
+from arrivals.trackers.looks_ascent import LooksAscent
 from arrivals.typing import Complex, Int
 
 PosteriorName = Literal["quadrature", "mixture"]
@@ -44,11 +45,22 @@ class CoordinateAscent:
     merge : float
         Two active components nearer than this, rad of direction, become one; 0 for never.
     snr_db : float or None
-        Signal-to-noise ratio from which the noise starts; None estimates it from the lags.
+        Signal-to-noise ratio from which the noise starts. None estimates it from the lags of a
+        line; elsewhere it is the noise of the last step for several looks, if it is known, or
+        that of 20 dB.
     max_components : int or None
         As many as there are sensors if None.
     descending : bool
         Order of the mixture's factors.
+    temper : float
+        Looks of a step that count as one.
+    power_floor : float or None
+        Power, in units of one look's noise after beamforming, below which nothing is a source;
+        None is 0 for one look and 3 for several.
+    max_snr_db : float or None
+        Signal-to-noise ratio beyond which what is left of the data is laid to the model.
+    n_moments : int
+        Moments of the angles' densities to carry; 0 for von Mises densities.
     """
 
     posterior: PosteriorName = "quadrature"
@@ -58,18 +70,26 @@ class CoordinateAscent:
     snr_db: float | None = 20.0
     max_components: int | None = None
     descending: bool = False
+    temper: float = 1.0
+    power_floor: float | None = None
+    max_snr_db: float | None = None
+    n_moments: int = 0
 
     def fit(self, Y: Complex, manifold: Manifold, prediction: Prediction | None) -> Fit:
-        """Fit one snapshot: start, then iterate (sections III and IV, Fig. 3).
+        """Fit the looks of one step: start, then iterate (sections III and IV, Fig. 3).
 
         Parameters
         ----------
-        Y : ndarray, shape (1, n_sensors, 1)
+        Y : ndarray, shape (n_bins, n_sensors, n_snapshots)
         manifold : Manifold
         prediction : Prediction or None
             None in a first step and in VALSE: nothing is known.
         """
-        step = self.step(Y[0, :, 0], manifold, prediction)
+        step: Ascent | LooksAscent
+        if self._for_a_line(Y, manifold):
+            step = self.step(Y[0, :, 0], manifold, prediction)
+        else:
+            step = LooksAscent(self, Y, manifold, prediction)
         x, converged = step.start(), False
         while not converged and step.iterations < self.max_iterations and not step.cycles():
             step.iterations += 1
@@ -78,9 +98,14 @@ class CoordinateAscent:
             step.refine_angles()
             step.merge()
             x_old, x = x, step.reconstruction()
-            rests = np.linalg.norm(x - x_old) < self.tolerance * np.linalg.norm(x_old)
-            converged = bool(rests or not (x.any() or x_old.any()))
+            converged = step.rests(x, x_old)
         return step.result(converged)
+
+    def _for_a_line(self, Y: Complex, manifold: Manifold) -> bool:
+        """Tell whether the short form for one look of a line on a grid serves."""
+        plain = not self.power_floor and self.max_snr_db is None and self.n_moments == 0
+        line = manifold.coefficients is None and Y.shape[0] == Y.shape[2] == 1
+        return plain and line and self.temper == 1
 
     def step(self, y: Complex, manifold: Manifold, prediction: Prediction | None) -> Ascent:
         """Return the working state for one snapshot."""
@@ -205,6 +230,11 @@ class Ascent(Amplitudes):
     def cycles(self) -> bool:
         """Tell whether the search keeps reviving what merging removes."""
         return bool(self.merged.max() > CYCLE * self.settings.max_iterations)
+
+    def rests(self, x: Complex, x_old: Complex) -> bool:
+        """Tell whether the reconstruction moved by less than the tolerance."""
+        rests = np.linalg.norm(x - x_old) < self.settings.tolerance * np.linalg.norm(x_old)
+        return bool(rests or not (x.any() or x_old.any()))
 
     def result(self, converged: bool) -> Fit:
         """Return the fit."""

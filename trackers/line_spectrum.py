@@ -21,12 +21,21 @@ class Prediction:
         Probability that each is active.
     birth : float
         Probability that a component that was not carried is active.
+    noise : ndarray, shape (n_bins,), optional
+        Noise variances of the last step, NaN where a bin was silent.
+    nuisance : ndarray, shape (n_carried, n_nuisance), optional
+        Densities of the second unknown.
+    moments : ndarray, shape (n_carried, n_moments), optional
+        Whole densities of the angles, ⟨exp(jiθ)⟩, i = 0, 1, ..., in place of `mu` and `kappa`.
     """
 
     mu: Float
     kappa: Float
     existence: Float
     birth: float
+    noise: Float | None = None
+    nuisance: Float | None = None
+    moments: Complex | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,9 +57,11 @@ class Fit:
     evidence : ndarray, shape (n_components,)
         By how much the ELBO would fall if an active component were removed, nats.
     noise, power : float
-        Variances of the noise of a sensor (58) and of an amplitude (59).
+        Variances of the noise of a sensor (58) and of an amplitude (59), means over bins.
     iterations : int
     converged : bool
+    bin_noise, nuisance, moments : ndarray, optional
+        As in `Prediction`, of all components; None from engines for one look of a line.
     """
 
     theta: Float
@@ -63,6 +74,9 @@ class Fit:
     power: float
     iterations: int
     converged: bool
+    bin_noise: Float | None = None
+    nuisance: Float | None = None
+    moments: Complex | None = None
 
 
 class Engine(Protocol):

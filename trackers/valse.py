@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import warnings
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -12,6 +15,7 @@ from arrivals.trackers.base import Tracker, missed
 from arrivals.trackers.coordinate_ascent import CoordinateAscent, PosteriorName
 from arrivals.trackers.estimates import DirectionEstimate
 from arrivals.trackers.line_spectrum import Engine, Fit, Prediction
+from arrivals.trackers.looks import Heard, updated
 from arrivals.trackers.registry import register
 from arrivals.trackers.slots import padded
 from arrivals.typing import Bool, Float, Int
@@ -24,19 +28,31 @@ class VALSE(Tracker):
     Parameters
     ----------
     measurement : ArraySnapshot
-        Its array must be a line on a uniform grid, gaps allowed. Its noise is not used: the
-        method estimates it.
+        Any array, of as many frequencies and snapshots a step as it says. Its noise is not used:
+        the method estimates it.
     reference : {"middle", "first"}
         The sensor at which the amplitudes' phases are counted. "first" is the paper's; with the
         middle one phase and angle are uncorrelated, which saves most of the iterations.
     posterior : {"quadrature", "mixture"}
-        How the angles' densities are integrated; "mixture" is the paper's Heuristic 1.
+        How the angles' densities are integrated; "mixture" is the paper's Heuristic 1, for one
+        look of a line on a uniform grid.
     tolerance : float
         Relative change of the reconstruction at which the iteration rests; the paper's is 1e-6.
     max_iterations : int
         Iterations at most; a step that needs more is reported as not converged.
     max_components : int, optional
         Components that may be used at once; as many as there are sensors if None.
+    temper : float
+        Looks of a step that count as one, at least 1: overlapping windows and neighbouring bins
+        of a recording are not independent, and deviate from a plane wave alike.
+    power_floor : float, optional
+        Power, in units of one look's noise after beamforming, below which nothing is a source. If
+        None, 0 for one look a step, which is the paper's model, and 3 for several.
+    max_snr_db : float, optional
+        Signal-to-noise ratio beyond which what is left of the data is laid to the array's model.
+    merge : float
+        Of two active components nearer than this, rad of direction, the later is switched off;
+        0 for never, as in the paper.
 
     Attributes
     ----------
@@ -77,6 +93,10 @@ class VALSE(Tracker):
         tolerance: float = 1e-4,
         max_iterations: int = 500,
         max_components: int | None = None,
+        temper: float = 1.0,
+        power_floor: float | None = None,
+        max_snr_db: float | None = None,
+        merge: float = 0.0,
     ) -> None:
         self.measurement = instance("measurement", measurement, ArraySnapshot)
         self.reference = one_of("reference", reference, ("middle", "first"))
@@ -86,7 +106,17 @@ class VALSE(Tracker):
         self.max_components = max_components
         if max_components is not None:
             count("max_components", max_components)
-        measurement.manifold(self.reference)  # refuses arrays that have none
+        self.temper = positive("temper", temper)
+        if temper < 1:
+            raise ValueError(f"temper must be at least 1; got {temper}")
+        self.power_floor, self.max_snr_db = power_floor, max_snr_db
+        if power_floor is not None:
+            not_negative("power_floor", power_floor)
+        if max_snr_db is not None:
+            positive("max_snr_db", max_snr_db)
+        self.merge = not_negative("merge", merge)
+        check_directions(measurement, self.reference, self.posterior)
+        self.bin_noise = np.full(measurement.n_bins, np.nan)
         self._nothing()
 
     @property
@@ -96,10 +126,13 @@ class VALSE(Tracker):
             self.posterior,
             self.tolerance,
             self.max_iterations,
-            merge=0.0,
+            merge=self.merge,
             snr_db=None,
             max_components=self.max_components,
             descending=True,
+            temper=self.temper,
+            power_floor=self.power_floor,
+            max_snr_db=self.max_snr_db,
         )
 
     @property
@@ -114,7 +147,7 @@ class VALSE(Tracker):
         self._nothing()
 
     def update(self, z: ArrayLike | None) -> None:
-        """Fit one snapshot, (n_sensors,); sensors that are NaN or infinite are left out."""
+        """Fit one measurement, of the model's `shape`; sensors that are NaN are left out."""
         if missed(z):
             return
         manifold, fit = self._fit(z, None)
@@ -122,12 +155,18 @@ class VALSE(Tracker):
         self._show(described(manifold, fit, found, np.full(found.sum(), -1)))
 
     def _fit(self, z: ArrayLike | None, prediction: Prediction | None) -> tuple[Manifold, Fit]:
-        """Fit the sensors that gave a number; a silent snapshot holds nothing."""
+        """Fit the looks and sensors that gave a number; a silent step holds nothing."""
         Y = self.measurement.looks(np.asarray(z))
-        dead = np.isnan(Y).any(axis=(0, 2))
-        manifold = self.measurement.manifold(self.reference).without(np.flatnonzero(dead))
-        Y = Y[:, ~dead]
-        return manifold, self.engine.fit(Y, manifold, prediction) if Y.any() else SILENCE
+        heard = Heard.of(Y)
+        manifold = self.measurement.manifold(self.reference).only(np.flatnonzero(heard.bins))
+        manifold, Y = manifold.without(np.flatnonzero(~heard.sensors)), heard.block(Y)
+        if not Y.any():
+            return manifold, SILENCE
+        if prediction is not None and prediction.noise is not None:
+            prediction = replace(prediction, noise=prediction.noise[heard.bins])
+        fit = self.engine.fit(Y, manifold, prediction)
+        self.bin_noise = updated(self.bin_noise, heard.bins, fit.bin_noise)
+        return manifold, fit
 
     def _show(self, estimate: DirectionEstimate) -> None:
         self._estimate = estimate
@@ -142,6 +181,33 @@ class VALSE(Tracker):
     def estimate(self) -> DirectionEstimate:
         """The sources found in the last snapshot."""
         return self._estimate
+
+
+def check_directions(
+    measurement: ArraySnapshot, reference: Reference, posterior: PosteriorName
+) -> None:
+    """Refuse arrays that give no directions, and warn of those that give several for one.
+
+    Raises
+    ------
+    ValueError
+        If the measurement has no manifold, or none for the posterior wanted.
+    """
+    manifold = measurement.manifold(reference)
+    if manifold.coefficients is None:
+        if posterior == "mixture" and not measurement.is_single:
+            raise ValueError('posterior "mixture" takes one look a step')
+        return
+    if posterior == "mixture":
+        raise ValueError('posterior "mixture" wants a line on a uniform grid, at one wavelength')
+    if (pair := measurement.ambiguity()) is not None:
+        one, other = np.rad2deg(pair)
+        warnings.warn(
+            f"directions {one:.1f} and {other:.1f} degrees look alike to this array at every "
+            "frequency: sources may be reported at either. Several frequencies, or sensors "
+            "nearer to each other, would tell them apart",
+            stacklevel=4,
+        )
 
 
 SILENCE = Fit(
