@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 from arrivals.measurement_models.manifolds import Manifold
-from arrivals.typing import Bool, Complex, Float
+from arrivals.typing import Bool, Complex, Float, Int
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,12 +22,18 @@ class Prediction:
         Probability that each is active.
     birth : float
         Probability that a component that was not carried is active.
+    age : ndarray of int, shape (n_carried,), optional
+        Steps since each was last active; 0 for all if None.
+    snr_db : float, optional
+        Signal-to-noise ratio of the steps before, where the noise may start.
     """
 
     mu: Float
     kappa: Float
     existence: Float
     birth: float
+    age: Int | None = None
+    snr_db: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,10 +46,12 @@ class Fit:
         Mean angles, rad.
     resultant : ndarray, shape (n_components,)
         Lengths of the mean of exp(jθ): 1 for an angle that is known, 0 for one that is not.
+    kappa : ndarray, shape (n_components,)
+        Concentrations of von Mises densities that stand for those of the angles.
     active : ndarray of bool, shape (n_components,)
         Components in use at the end.
-    was_active : ndarray of bool, shape (n_components,)
-        Components in use at the end of any iteration.
+    age : ndarray of int, shape (n_components,)
+        Steps since each was in use, 0 for those that are; -1 for those to be forgotten.
     amplitude : ndarray, shape (n_components,)
         Posterior means, zero where not active.
     evidence : ndarray, shape (n_components,)
@@ -51,22 +60,34 @@ class Fit:
         Variances of the noise of a sensor (58) and of an amplitude (59).
     iterations : int
     converged : bool
+    snr_db : float, optional
+        Where the noise of the next step may start.
     """
 
     theta: Float
     resultant: Float
+    kappa: Float
     active: Bool
-    was_active: Bool
+    age: Int
     amplitude: Complex
     evidence: Float
     noise: float
     power: float
     iterations: int
     converged: bool
+    snr_db: float | None = None
 
 
 class Engine(Protocol):
     """Maximises the ELBO of one step."""
 
     def fit(self, Y: Complex, manifold: Manifold, prediction: Prediction | None) -> Fit:
-        """Fit data of shape (n_bins, n_sensors, n_snapshots); no prediction: nothing is known."""
+        """Fit data (n_bins, n_sensors, n_snapshots), with what is known of the components."""
+
+    def fit_batch(
+        self,
+        Ys: Sequence[Complex],
+        manifold: Manifold,
+        predictions: Sequence[Prediction | None],
+    ) -> list[Fit]:
+        """Fit independent snapshots of one array."""
