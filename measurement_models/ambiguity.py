@@ -103,8 +103,10 @@ def in_a_line(waves: PlaneWaves) -> float | None:
     >>> round(np.rad2deg(in_a_line(PlaneWaves(row, [1.0]))))
     45
     """
+    if waves.is_line or waves.response is not None:
+        return None
     horizontal = (waves.array.positions - waves.centre)[:, :2]
     _, size, axes = np.linalg.svd(horizontal, full_matrices=False)
-    if waves.is_line or waves.response is not None or size[-1] > 1e-3 * size[0]:
+    if size[-1] > 1e-3 * size[0]:
         return None
     return float(np.arctan2(axes[0, 1], axes[0, 0]) % np.pi)

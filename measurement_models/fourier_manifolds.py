@@ -122,6 +122,10 @@ class FourierManifold:
         """Return the standard deviations as they are: the angle is the direction."""
         return np.array(std, dtype=np.float64)
 
+    def slope(self, theta: ArrayLike) -> Float:
+        """Return 1: the angle is the direction."""
+        return np.ones(np.shape(theta))
+
     def from_doa(self, doa: ArrayLike) -> Float:
         """Return the angles of directions: the same."""
         return np.array(doa, dtype=np.float64)

@@ -59,6 +59,9 @@ class Manifold(Protocol):
     def doa_std(self, theta: ArrayLike, std: ArrayLike) -> Float:
         """Return standard deviations of the directions from those of the angles."""
 
+    def slope(self, theta: ArrayLike) -> Float:
+        """Return how fast angles turn with their directions, |dθ/dβ|, bounded away from 0."""
+
     def from_doa(self, doa: ArrayLike) -> Float:
         """Return the angles of directions, rad."""
 
@@ -170,6 +173,11 @@ class GridLine:
         ends = (inside + np.multiply.outer([-1.0, 1.0], np.asarray(std))) / self.step
         low, high = np.arcsin(np.clip(ends, -1, 1))
         return np.asarray((high - low) / 2)
+
+    def slope(self, theta: ArrayLike) -> Float:
+        """Return dθ/dβ = 2π d/λ cos β, with a cosine of at least 0.1."""
+        sine = np.asarray(theta, dtype=np.float64) / self.step
+        return np.asarray(self.step * np.sqrt(np.maximum(1 - sine * sine, 0.01)))
 
     def from_doa(self, doa: ArrayLike) -> Float:
         """Return electrical angles, rad."""

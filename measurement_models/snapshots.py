@@ -220,7 +220,7 @@ class ArraySnapshot(MeasurementModel):
         if n < least:
             what = "directions" if self.array.dim == 1 else "azimuths"
             raise ValueError(f"{what} want at least {least} sensors; this array has {n}")
-        if (azimuth := in_a_line(self.waves)) is not None:
+        if self.array.dim > 1 and (azimuth := in_a_line(self.waves)) is not None:
             along = np.rad2deg(azimuth)
             one, other = (f"{(along + side) % 360:.0f}" for side in (30, -30))
             raise ValueError(

@@ -117,7 +117,7 @@ class Circle(Scenario):
         """Draw one trial; the motion model expects 3° a step."""
         truth, model = np.deg2rad(self.doa_deg()), self.measurement
         z = observed(model, truth, self.snr_db, rng)
-        return Trial(z, truth, model, BernoulliVonMises(kappa=np.deg2rad(3.0) ** -2))
+        return Trial(z, truth, model, BernoulliVonMises(sigma_doa=np.deg2rad(3.0)))
 
 
 @register("cardioids")
@@ -167,7 +167,7 @@ class Cardioids(Scenario):
         model = self.measurement
         z = observed(model, truth, self.snr_db, rng, received=True)
         known = model if self.known else model.replace(response=None)
-        return Trial(z, truth, known, BernoulliVonMises(kappa=np.deg2rad(3.0) ** -2))
+        return Trial(z, truth, known, BernoulliVonMises(sigma_doa=np.deg2rad(3.0)))
 
 
 @register("grating")
@@ -227,4 +227,4 @@ class Grating(Scenario):
         if self.hopping and self.n_bins > 1:
             heard = rng.integers(self.n_bins, size=self.n_steps)
             z[np.arange(self.n_bins) != heard[:, None]] = complex(np.nan, np.nan)
-        return Trial(z, truth, model, BernoulliVonMises(kappa=np.deg2rad(2.0) ** -2))
+        return Trial(z, truth, model, BernoulliVonMises(sigma_doa=np.deg2rad(2.0)))

@@ -6,6 +6,7 @@ are those of Park, Meyer and Gerstoft, JASA 153(1), 2023.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Literal
@@ -13,7 +14,8 @@ from typing import Literal
 import numpy as np
 
 from arrivals.measurement_models.manifolds import Manifold
-from arrivals.trackers.amplitudes import NOISE_FLOOR, Amplitudes
+from arrivals.motion_models.bessel import inverse_bessel_ratio
+from arrivals.trackers.amplitudes import Amplitudes
 from arrivals.trackers.angle_posteriors import (
     AnglePosterior,
     fold,
@@ -25,6 +27,7 @@ from arrivals.trackers.angle_posteriors import (
 )
 from arrivals.trackers.line_spectrum import Fit, Prediction
 from arrivals.trackers.looks_ascent import LooksAscent
+from arrivals.trackers.noise_start import NOISE_FLOOR, autocorrelation, first_noise
 from arrivals.typing import Complex, Int
 
 PosteriorName = Literal["quadrature", "mixture"]
@@ -85,6 +88,8 @@ class CoordinateAscent:
         prediction : Prediction or None
             None in a first step and in VALSE: nothing is known.
         """
+        if not Y.any():
+            return SILENCE
         step: Ascent | LooksAscent
         if self._for_a_line(Y, manifold):
             step = self.step(Y[0, :, 0], manifold, prediction)
@@ -100,6 +105,15 @@ class CoordinateAscent:
             x_old, x = x, step.reconstruction()
             converged = step.rests(x, x_old)
         return step.result(converged)
+
+    def fit_batch(
+        self,
+        Ys: Sequence[Complex],
+        manifold: Manifold,
+        predictions: Sequence[Prediction | None],
+    ) -> list[Fit]:
+        """Fit independent snapshots of one array, one after the other."""
+        return [self.fit(Y, manifold, known) for Y, known in zip(Ys, predictions, strict=True)]
 
     def _for_a_line(self, Y: Complex, manifold: Manifold) -> bool:
         """Tell whether the short form for one look of a line on a grid serves."""
@@ -134,8 +148,8 @@ class Ascent(Amplitudes):
         L = min(M, settings.max_components or M)
         self.settings, self.manifold, self.k = settings, manifold, manifold.harmonics
         self.degree = max(int(np.abs(self.k).max()), 1)
-        self.learn_rho = prediction is None
-        if prediction is None:
+        self.learn_rho = prediction is None or len(prediction.mu) == 0
+        if prediction is None or self.learn_rho:
             prediction = Prediction(np.zeros(0), np.zeros(0), np.zeros(0), max(L // 2, 1) / L)
         self.n_carried = n = min(len(prediction.mu), L)
         rho = np.concatenate([prediction.existence[:n], np.full(L - n, prediction.birth)])
@@ -238,11 +252,13 @@ class Ascent(Amplitudes):
 
     def result(self, converged: bool) -> Fit:
         """Return the fit."""
+        resultant = np.minimum(np.abs(self.mean), 1 - 1e-15)
         return Fit(
             theta=np.angle(self.mean),
-            resultant=np.minimum(np.abs(self.mean), 1 - 1e-15),
+            resultant=resultant,
+            kappa=inverse_bessel_ratio(resultant),
             active=self.active.copy(),
-            was_active=self.was_active.copy(),
+            age=np.where(self.active, 0, np.where(self.was_active, 1, -1)),
             amplitude=self.w.copy(),
             evidence=self.evidence(),
             noise=self.nu,
@@ -252,37 +268,16 @@ class Ascent(Amplitudes):
         )
 
 
-def first_noise(y: Complex, places: Int, snr_db: float | None) -> float:
-    """Start ν from an expected signal-to-noise ratio; or from the small eigenvalues of the lags.
-
-    Parameters
-    ----------
-    y : ndarray, shape (n_sensors,)
-    places : ndarray of int, shape (n_sensors,)
-        Grid points of the sensors.
-    snr_db : float or None
-        None: the mean of the ⌊M/4⌋ smallest eigenvalues of the Toeplitz matrix of the biased lags.
-    """
-    M, power = len(y), float(np.vdot(y, y).real)
-    if snr_db is not None:
-        return power / M * 10 ** (-snr_db / 10)
-    lags = autocorrelation(y, places) / M
-    apart = np.subtract.outer(places, places)
-    toeplitz = np.where(apart < 0, lags[np.abs(apart)].conj(), lags[np.abs(apart)])
-    smallest = np.linalg.eigvalsh(toeplitz)[: max(M // 4, 1)]
-    return max(float(smallest.mean()), NOISE_FLOOR * power / M)
-
-
-def autocorrelation(z: Complex, places: Int) -> Complex:
-    """Return the lags Rᵢ = Σ z_{k+i} z*_k, i = 0 .. span, of samples at integer places.
-
-    Examples
-    --------
-    >>> autocorrelation(np.array([1, 1j]), np.array([0, 2])).round(6) + 0
-    array([2.+0.j, 0.+0.j, 0.+1.j])
-    """
-    span = int(places.max() - places.min())
-    line = np.zeros(span + 1, dtype=np.complex128)
-    line[places - places.min()] = z
-    spectrum = np.fft.fft(line, 1 << int(np.ceil(np.log2(2 * span + 2))))
-    return np.asarray(np.fft.ifft(spectrum.real**2 + spectrum.imag**2)[: span + 1])
+SILENCE = Fit(
+    theta=np.zeros(0),
+    resultant=np.zeros(0),
+    kappa=np.zeros(0),
+    active=np.zeros(0, dtype=np.bool_),
+    age=np.zeros(0, dtype=np.int64),
+    amplitude=np.zeros(0, dtype=np.complex128),
+    evidence=np.zeros(0),
+    noise=0.0,
+    power=0.0,
+    iterations=0,
+    converged=True,
+)

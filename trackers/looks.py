@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
 
+from arrivals.measurement_models.manifolds import Reference
+from arrivals.measurement_models.snapshots import ArraySnapshot
 from arrivals.typing import Bool, Complex, Float
 
 
@@ -56,6 +59,11 @@ class Heard:
             bins = np.asarray(bins & sounding)
         return cls(bins, sensors, snapshots)
 
+    @property
+    def key(self) -> bytes:
+        """The same for steps of which the same was heard."""
+        return b"".join(each.tobytes() for each in (self.bins, self.sensors, self.snapshots))
+
     def block(self, Y: Complex) -> Complex:
         """Return the looks without gaps."""
         return Y[np.ix_(self.bins, self.sensors, self.snapshots)]
@@ -74,3 +82,28 @@ def updated(known: Float, bins: Bool, values: Float | None) -> Float:
     fresh = known.copy()
     fresh[bins] = values
     return fresh
+
+
+def check_directions(measurement: ArraySnapshot, reference: Reference, *, mixture: bool) -> None:
+    """Refuse arrays that give no directions, and warn of those that give several for one.
+
+    Raises
+    ------
+    ValueError
+        If the measurement has no manifold, or none that the mixture serves.
+    """
+    manifold = measurement.manifold(reference)
+    if manifold.coefficients is None:
+        if mixture and not measurement.is_single:
+            raise ValueError('posterior "mixture" takes one look a step')
+        return
+    if mixture:
+        raise ValueError('posterior "mixture" wants a line on a uniform grid, at one wavelength')
+    if (pair := measurement.ambiguity()) is not None:
+        one, other = np.rad2deg(pair)
+        warnings.warn(
+            f"directions {one:.1f} and {other:.1f} degrees look alike to this array at every "
+            "frequency: sources may be reported at either. Several frequencies, or sensors "
+            "nearer to each other, would tell them apart",
+            stacklevel=4,
+        )

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from arrivals.trackers.amplitudes import NOISE_FLOOR
+from arrivals.trackers.noise_start import NOISE_FLOOR
 from arrivals.typing import Complex, Float, Int
 
 

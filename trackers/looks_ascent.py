@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from arrivals.measurement_models.manifolds import Manifold
+from arrivals.motion_models.bessel import inverse_bessel_ratio
 from arrivals.motion_models.von_mises import wrap
-from arrivals.trackers.amplitudes import NOISE_FLOOR
 from arrivals.trackers.angle_posteriors import fold, quadrature, top_mode, unfold
 from arrivals.trackers.circle_posteriors import (
     CirclePrior,
@@ -23,6 +23,7 @@ from arrivals.trackers.circle_posteriors import (
 )
 from arrivals.trackers.line_spectrum import Fit, Prediction
 from arrivals.trackers.looks_amplitudes import LooksAmplitudes
+from arrivals.trackers.noise_start import NOISE_FLOOR
 from arrivals.typing import Complex, Float
 
 if TYPE_CHECKING:
@@ -56,9 +57,11 @@ class LooksAscent(LooksAmplitudes):
         L = min(M, settings.max_components or M)
         self.settings, self.manifold = settings, manifold
         self._read_manifold()
-        self.learn_rho = prediction is None
-        if prediction is None:
-            prediction = Prediction(np.zeros(0), np.zeros(0), np.zeros(0), max(L // 2, 1) / L)
+        self.learn_rho = prediction is None or len(prediction.mu) == 0
+        if prediction is None or self.learn_rho:
+            known = None if prediction is None else prediction.noise
+            none = np.zeros(0)
+            prediction = Prediction(none, none, none, max(L // 2, 1) / L, noise=known)
         self.n_carried = n = min(len(prediction.mu), L)
         rho = np.concatenate([prediction.existence[:n], np.full(L - n, prediction.birth)])
         self.K0 = max(L // 2, 1) if self.learn_rho else int((rho == rho.max()).sum())
@@ -293,12 +296,14 @@ class LooksAscent(LooksAmplitudes):
     def result(self, converged: bool) -> Fit:
         """Return the fit; the amplitude of several looks is the root of their mean power."""
         single = self.Y.shape[0] == self.Y.shape[2] == 1
+        resultant = np.minimum(np.abs(self.mean), 1 - 1e-15)
         rms = np.sqrt((np.abs(self.W) ** 2).mean(axis=(0, 2))) + 0j
         return Fit(
             theta=np.angle(self.mean),
-            resultant=np.minimum(np.abs(self.mean), 1 - 1e-15),
+            resultant=resultant,
+            kappa=inverse_bessel_ratio(resultant),
             active=self.active.copy(),
-            was_active=self.was_active.copy(),
+            age=np.where(self.active, 0, np.where(self.was_active, 1, -1)),
             amplitude=self.W[0, :, 0].copy() if single else rms,
             evidence=self.evidence(),
             noise=float(self.nu.mean()),
