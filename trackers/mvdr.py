@@ -49,7 +49,7 @@ class MVDR(CBF):
     Parameters
     ----------
     measurement : ArraySnapshot
-        Any array; its noise is not used.
+        Any array of isotropic sensors, one look a step; its noise is not used.
     loading : float
         Added to the diagonal of the covariance, in mean powers of a sensor.
     forgetting : float
@@ -97,6 +97,11 @@ class MVDR(CBF):
         self.loading = positive("loading", loading)
         self.forgetting = probability("forgetting", forgetting)
         n = measurement.array.n_sensors if isinstance(measurement, ArraySnapshot) else 0
+        if n and not (measurement.is_single and measurement.response is None):
+            raise ValueError(
+                "mvdr takes one snapshot a step, at one frequency, of isotropic sensors; this "
+                f"model has measurements of shape {measurement.shape}"
+            )
         self.covariance, self.weight = np.zeros((n, n), dtype=np.complex128), np.zeros((n, n))
         super().__init__(
             measurement,
