@@ -125,6 +125,7 @@ def gains(name: str, seeds: range) -> dict[str, list[float]]:
             tracker.predict()
             if t % 3 == 2:
                 known, Y = tracker._prediction(), y[None, :, None]
+                assert known is not None
                 ours = bound(y, middle, known, JointNewton().fit(Y, middle, known))
                 for reference, manifold in (("first", first), ("middle", middle)):
                     slow.fit(Y, manifold, known)

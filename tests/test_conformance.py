@@ -42,11 +42,15 @@ GRIDLESS: list[tuple[str, MakeTracker, Measurements]] = [
     ("cbf", lambda: CBF(CIRCLE, n_directions=90, max_sources=2), two_sources(CIRCLE)),
     ("valse", lambda: VALSE(LINE), two_sources(LINE)),
     ("valse", lambda: VALSE(GAPS, max_components=3), two_sources(GAPS)),
+    ("valse", lambda: VALSE(LINE, engine="coordinate"), two_sources(LINE)),
     ("svalse", lambda: SVALSE(LINE), two_sources(LINE)),
     ("svalse", lambda: SVALSE(GAPS, BernoulliVonMises(kappa=50.0)), two_sources(GAPS)),
+    ("svalse", lambda: SVALSE(GAPS, engine="coordinate"), two_sources(GAPS)),
     (
         "svalse",
-        lambda: SVALSE(LINE, reference="first", posterior="mixture", tolerance=1e-6),
+        lambda: SVALSE(
+            LINE, engine="coordinate", reference="first", posterior="mixture", tolerance=1e-6
+        ),
         two_sources(LINE, n_steps=3),
     ),
 ]

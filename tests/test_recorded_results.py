@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from arrivals.measurement_models import ArraySnapshot, Manifold, SensorArray
+from arrivals.motion_models import BernoulliVonMises
 from arrivals.trackers.coordinate_ascent import Ascent, CoordinateAscent
 from arrivals.trackers.line_spectrum import Prediction
 from arrivals.typing import Complex, Float, Int
@@ -106,7 +107,13 @@ def test_free_running_mixture_keeps_the_recorded_number_of_sources(name: str) ->
 
     z = np.load(Path(FOLDER or "") / "svalse" / f"{name}.npz")
     tracker = SVALSE(
-        LINE, reference="first", posterior="mixture", tolerance=1e-6, max_iterations=5000
+        LINE,
+        BernoulliVonMises(),
+        engine="coordinate",
+        reference="first",
+        posterior="mixture",
+        tolerance=1e-6,
+        max_iterations=5000,
     )
     run = tracker.run(z["y"].T)
     assert (run.n_found == z["svalse_K"]).mean() >= 0.85
