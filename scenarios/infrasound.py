@@ -35,15 +35,15 @@ def brp2012() -> tuple[ArraySnapshot, Complex, Float]:
     measurement : ArraySnapshot
         Four microphones in Utah; five frequencies from 0.6 to 2.2 Hz, three windows of 5 s a
         step, the slowness unknown between 2 and 5 s/km. Azimuths are clockwise from north.
-    looks : ndarray, shape (239, 5, 3, 4)
-    time : ndarray, shape (239,)
+    looks : ndarray, shape (240, 5, 3, 4)
+    time : ndarray, shape (240,)
         Middles of the steps, s from 18:00 UTC, 9 April 2012.
 
     Examples
     --------
     >>> measurement, steps, time = brp2012()
     >>> steps.shape, measurement.shape, time[:2]
-    ((239, 5, 3, 4), (5, 3, 4), array([5., 10.]))
+    ((240, 5, 3, 4), (5, 3, 4), array([5., 10.]))
     """
     with as_file(files("arrivals.scenarios") / "data" / "brp2012.toml") as path:
         array = SensorArray.from_toml(path)
@@ -54,7 +54,7 @@ def brp2012() -> tuple[ArraySnapshot, Complex, Float]:
         array,
         [array.wavelength(f) for f in FREQUENCIES],
         n_snapshots=3,
-        slowness=SLOWNESS * (array.speed or np.nan),
+        slowness=(SLOWNESS * (array.speed or np.nan)).tolist(),
     )
     return measurement, heard.values, heard.time
 
@@ -90,7 +90,7 @@ def infrasound(
     bar : callable
         Takes the steps and `desc`, gives the steps back, such as tqdm.
     n_steps : int, optional
-        Stop after so many of the 239 steps.
+        Stop after so many of the 240 steps.
     """
     from threadpoolctl import threadpool_limits
 

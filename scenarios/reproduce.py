@@ -25,6 +25,7 @@ STUDIES: dict[str, str] = {
     "interpolation-convergence": "arrivals.scenarios.reproduce_interpolation:convergence",
     "interpolation-rmse": "arrivals.scenarios.reproduce_interpolation:rmse_study",
     "interpolation-moving": "arrivals.scenarios.reproduce_interpolation:moving",
+    "any-array": "arrivals.scenarios.reproduce_any_array:any_array",
 }
 
 
