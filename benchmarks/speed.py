@@ -17,8 +17,18 @@ from arrivals.scenarios import create
 FORMS: list[tuple[str, dict[str, Any]]] = [
     ("svalse", {}),
     ("valse", {}),
-    ("svalse", {"reference": "first", "tolerance": 1e-6, "max_iterations": 5000}),
-    ("svalse", {"posterior": "mixture"}),
+    ("svalse", {"engine": "coordinate"}),
+    ("valse", {"engine": "coordinate"}),
+    (
+        "svalse",
+        {
+            "engine": "coordinate",
+            "reference": "first",
+            "tolerance": 1e-6,
+            "max_iterations": 5000,
+        },
+    ),
+    ("svalse", {"engine": "coordinate", "posterior": "mixture"}),
 ]
 
 

@@ -211,7 +211,7 @@ def music_speed(n_snapshots: int = 50) -> None:
     spectra = np.zeros((15, n_fft // 2 + 1, n_snapshots), dtype=complex)
     bin_ = round(frequency * n_fft / rate)
     spectra[:, bin_] = y.T
-    scan = Scan(array, model.wavelength, 361)
+    scan = Scan(array, c / frequency, 361)
     tracker = MUSIC(model, n_sources=2)
     tracker.run(y)
 

@@ -18,11 +18,14 @@ from arrivals.measurement_models.decibels import (
     watt_to_neper,
 )
 from arrivals.measurement_models.delay_line import DelayLine, Phasor
+from arrivals.measurement_models.element_responses import ElementResponse
 from arrivals.measurement_models.envelope import envelope_moments, log_envelope_moments
+from arrivals.measurement_models.fourier_manifolds import FourierManifold, fourier_manifold
 from arrivals.measurement_models.interpolation import DelayInterpolator, InterpolationDelay
 from arrivals.measurement_models.linear import LinearMeasurement
 from arrivals.measurement_models.manifolds import GridLine, Manifold
 from arrivals.measurement_models.path_loss import doppler_log_gain
+from arrivals.measurement_models.plane_waves import PlaneWaves
 from arrivals.measurement_models.rss import LogNormalRSS
 from arrivals.measurement_models.samples import ArraySamples
 from arrivals.measurement_models.snapshots import ArraySnapshot, composite
@@ -35,7 +38,9 @@ __all__ = [
     "Bearing",
     "DelayInterpolator",
     "DelayLine",
+    "ElementResponse",
     "FlatBand",
+    "FourierManifold",
     "GridLine",
     "InterpolationDelay",
     "LinearMeasurement",
@@ -43,6 +48,7 @@ __all__ = [
     "Manifold",
     "MeasurementModel",
     "Phasor",
+    "PlaneWaves",
     "SensorArray",
     "SourceCorrelation",
     "Tones",
@@ -52,6 +58,7 @@ __all__ = [
     "direction",
     "doppler_log_gain",
     "envelope_moments",
+    "fourier_manifold",
     "log_envelope_moments",
     "neper_to_db",
     "neper_to_dbm",

@@ -50,14 +50,17 @@ class Manifold(Protocol):
     def steering(self, theta: ArrayLike) -> Complex:
         """Return the responses to angles (n,): (n_nuisance, n_bins, n_sensors, n)."""
 
-    def norm_squared(self) -> float:
-        """Return ‖a(θ)‖²."""
+    def norm_squared(self) -> float | Complex:
+        """Return ‖a(θ)‖², or the (n_nuisance, n_bins, i) cᵢ of its series Re Σ cᵢ exp(jiθ)."""
 
     def to_doa(self, theta: ArrayLike, slack: ArrayLike = 0.0) -> Float:
         """Return directions, rad; NaN where there is none within `slack` of the angle."""
 
     def doa_std(self, theta: ArrayLike, std: ArrayLike) -> Float:
         """Return standard deviations of the directions from those of the angles."""
+
+    def slope(self, theta: ArrayLike) -> Float:
+        """Return how fast angles turn with their directions, |dθ/dβ|, bounded away from 0."""
 
     def from_doa(self, doa: ArrayLike) -> Float:
         """Return the angles of directions, rad."""
@@ -67,6 +70,9 @@ class Manifold(Protocol):
 
     def without(self, sensors: Sequence[int] | Int) -> Manifold:
         """Return the manifold of the array less some sensors."""
+
+    def only(self, bins: Sequence[int] | Int) -> Manifold:
+        """Return the manifold of some of the bins."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,6 +174,11 @@ class GridLine:
         low, high = np.arcsin(np.clip(ends, -1, 1))
         return np.asarray((high - low) / 2)
 
+    def slope(self, theta: ArrayLike) -> Float:
+        """Return dθ/dβ = 2π d/λ cos β, with a cosine of at least 0.1."""
+        sine = np.asarray(theta, dtype=np.float64) / self.step
+        return np.asarray(self.step * np.sqrt(np.maximum(1 - sine * sine, 0.01)))
+
     def from_doa(self, doa: ArrayLike) -> Float:
         """Return electrical angles, rad."""
         return np.asarray(self.step * np.sin(doa))
@@ -182,3 +193,7 @@ class GridLine:
         if len(sensors) == 0:
             return self
         return GridLine(np.delete(self.places, sensors), self.step, self.origin, self.reference)
+
+    def only(self, bins: Sequence[int] | Int) -> GridLine:
+        """Return the same: there is one bin."""
+        return self

@@ -5,10 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.checks import not_negative, positive, probability, real
+from arrivals.checks import not_negative, probability, real
 from arrivals.motion_models.base import MotionModel
 from arrivals.motion_models.von_mises import VonMisesWalk
 from arrivals.typing import Bool, Float
+
+PAPER_KAPPA = 148.0  # 1.5° at broadside of a half-wavelength line
 
 
 @dataclass(frozen=True)
@@ -17,15 +19,20 @@ class BernoulliVonMises(MotionModel):
 
     Parameters
     ----------
-    kappa : float
-        Concentration of the angle's step per unit of time.
+    kappa : float, optional
+        Concentration of the angle's step per unit of time; 148, the paper's, if neither it nor
+        `sigma_doa` is given.
     p_activate, p_deactivate : float
         Probabilities that a silent source starts, and that an active one stops, per unit of time.
+    sigma_doa : float, optional
+        Instead of `kappa`, the standard deviation of the step in direction, rad; see
+        `VonMisesWalk`.
 
     Raises
     ------
     ValueError
-        If `kappa` is not finite and positive, or a probability lies outside [0, 1].
+        If `kappa` and `sigma_doa` are both given, one is not finite and positive, or a
+        probability lies outside [0, 1].
 
     Notes
     -----
@@ -41,22 +48,25 @@ class BernoulliVonMises(MotionModel):
     >>> model.predict_existence([0.0, 0.5, 1.0])
     array([0.1  , 0.425, 0.75 ])
     >>> model.walk
-    VonMisesWalk(kappa=148.0)
+    VonMisesWalk(kappa=148.0, sigma_doa=None)
     """
 
-    kappa: float = 148.0
+    kappa: float | None = None
     p_activate: float = 0.10
     p_deactivate: float = 0.25
+    sigma_doa: float | None = None
 
     def __post_init__(self) -> None:
-        positive("kappa", self.kappa)
+        self.walk  # noqa: B018  (refuses what is no walk)
         probability("p_activate", self.p_activate)
         probability("p_deactivate", self.p_deactivate)
 
     @property
     def walk(self) -> VonMisesWalk:
         """How the angle moves."""
-        return VonMisesWalk(self.kappa)
+        if self.kappa is None and self.sigma_doa is None:
+            return VonMisesWalk(PAPER_KAPPA)
+        return VonMisesWalk(self.kappa, self.sigma_doa)
 
     @property
     def dim_x(self) -> int:
@@ -80,9 +90,9 @@ class BernoulliVonMises(MotionModel):
         """Return the variance of the angle's step, in rad²."""
         return self.walk.Q(dt)
 
-    def blur(self, kappa: ArrayLike, dt: float = 1.0) -> Float:
+    def blur(self, kappa: ArrayLike, dt: float = 1.0, slope: ArrayLike = 1.0) -> Float:
         """Return the concentration after a step; see `VonMisesWalk.blur`."""
-        return self.walk.blur(kappa, dt)
+        return self.walk.blur(kappa, dt, slope)
 
     def sample(self, x: ArrayLike, rng: np.random.Generator, dt: float = 1.0) -> Float:
         """Draw angles after a step, as if their sources stayed active."""

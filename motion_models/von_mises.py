@@ -180,17 +180,21 @@ def mfold_modes(eta: ArrayLike, m: int) -> Complex:
 
 @dataclass(frozen=True)
 class VonMisesWalk(MotionModel):
-    """An angle that takes a von Mises step of concentration `kappa` per unit of time.
+    """An angle that takes a von Mises step per unit of time, of one width or of one in direction.
 
     Parameters
     ----------
-    kappa : float
+    kappa : float, optional
         Concentration of the step; large is slow.
+    sigma_doa : float, optional
+        Instead, the standard deviation of the step in direction, rad. An angle that turns
+        `slope` times as fast as the direction takes steps of the concentration
+        (sigma_doa · slope)⁻²; where nothing is said of a slope the angle is the direction.
 
     Raises
     ------
     ValueError
-        If `kappa` is not finite and positive.
+        If neither or both are given, or what is given is not finite and positive.
 
     Notes
     -----
@@ -205,12 +209,34 @@ class VonMisesWalk(MotionModel):
     --------
     >>> VonMisesWalk(kappa=100.0).Q().round(4)
     array([[0.0101]])
+    >>> VonMisesWalk(sigma_doa=0.1).step([1.0, 0.5])
+    array([100., 400.])
     """
 
-    kappa: float
+    kappa: float | None = None
+    sigma_doa: float | None = None
 
     def __post_init__(self) -> None:
-        positive("kappa", self.kappa)
+        for name in ("kappa", "sigma_doa"):
+            if getattr(self, name) is not None:
+                positive(name, getattr(self, name))
+        if (self.kappa is None) == (self.sigma_doa is None):
+            raise ValueError(
+                "a walk has a width of its own or one in direction: give one of kappa and "
+                f"sigma_doa, and None for the other; got {self.kappa} and {self.sigma_doa}"
+            )
+
+    def step(self, slope: ArrayLike = 1.0) -> Float:
+        """Return the concentration of the step per unit of time.
+
+        Parameters
+        ----------
+        slope : array_like, shape (...)
+            |dθ/dβ| of an angle θ whose direction is β; not used where `kappa` is given.
+        """
+        if self.sigma_doa is not None:
+            return np.asarray(self.sigma_doa * np.asarray(slope, dtype=np.float64)) ** -2
+        return np.asarray(self.kappa, dtype=np.float64)
 
     @property
     def dim_x(self) -> int:
@@ -232,9 +258,9 @@ class VonMisesWalk(MotionModel):
 
     def Q(self, dt: float = 1.0) -> Float:
         """Return the variance of the wrapped normal step of the same A, -2 ln A(κ) dt, in rad²."""
-        return np.full((1, 1), -2 * log_bessel_ratio(self.kappa) * not_negative("dt", dt))
+        return np.full((1, 1), -2 * log_bessel_ratio(self.step()) * not_negative("dt", dt))
 
-    def blur(self, kappa: ArrayLike, dt: float = 1.0) -> Float:
+    def blur(self, kappa: ArrayLike, dt: float = 1.0, slope: ArrayLike = 1.0) -> Float:
         """Return the concentration after a step of densities that had concentration `kappa`.
 
         The convolution of two von Mises densities, brought back to one by its first moment:
@@ -246,6 +272,8 @@ class VonMisesWalk(MotionModel):
             Concentrations, not negative; inf is a known angle.
         dt : float
             Not negative.
+        slope : array_like, shape (...)
+            As in `step`.
 
         Returns
         -------
@@ -261,7 +289,7 @@ class VonMisesWalk(MotionModel):
         >>> VonMisesWalk(kappa=100.0).blur([0.0, 100.0, np.inf]).round(2)
         array([  0.  ,  50.25, 100.  ])
         """
-        step = not_negative("dt", dt) * log_bessel_ratio(self.kappa)
+        step = not_negative("dt", dt) * log_bessel_ratio(self.step(slope))
         return from_log_ratio(log_bessel_ratio(kappa) + step)
 
     def sample(self, x: ArrayLike, rng: np.random.Generator, dt: float = 1.0) -> Float:

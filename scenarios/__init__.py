@@ -1,5 +1,6 @@
 """What trackers are tried on: simulated truth, recorded data, metrics and plots."""
 
+from arrivals.scenarios.any_arrays import Cardioids, Circle, Grating
 from arrivals.scenarios.ar_fields import (
     AutoregressiveField,
     FastSource,
@@ -29,7 +30,6 @@ from arrivals.scenarios.line_arrays import (
 )
 from arrivals.scenarios.methods import Method, grid
 from arrivals.scenarios.metrics import Gospa, gospa, mean_gospa, mean_rmse, ospa, rmse
-from arrivals.scenarios.monte_carlo import monte_carlo
 from arrivals.scenarios.networks import Network, read_network
 from arrivals.scenarios.plots import plot_array, plot_bearing_time
 from arrivals.scenarios.readers import read
@@ -38,12 +38,9 @@ from arrivals.scenarios.rss import BirthsAndDeaths, CrossingSources, RSSTrial, T
 from arrivals.scenarios.rss_bounds import rss_bound
 from arrivals.scenarios.rss_calibration import Calibration, calibrate
 from arrivals.scenarios.rss_metrics import huber, scores
+from arrivals.scenarios.runner import monte_carlo
 from arrivals.scenarios.separation import nmse, sdr
 from arrivals.scenarios.speech import SpeechField, SpeechOfOrderTwo
-from arrivals.scenarios.plots import plot_array, plot_bearing_time
-from arrivals.scenarios.readers import read
-from arrivals.scenarios.recordings import Recording, Snapshots
-from arrivals.scenarios.runner import monte_carlo
 from arrivals.scenarios.study import Study
 from arrivals.scenarios.swellex96 import TowPastLine
 from arrivals.scenarios.unlabelled import best_assignment_rmse
@@ -54,10 +51,13 @@ __all__ = [
     "BirthsAndDeaths",
     "BottomLayer",
     "Calibration",
+    "Cardioids",
+    "Circle",
     "CrossingSources",
     "FastSource",
     "FourOnThree",
     "Gospa",
+    "Grating",
     "InterpolationBand",
     "InterpolationCoupled",
     "InterpolationTone",

@@ -13,11 +13,14 @@ from typing import Any, NoReturn
 import arrivals
 from arrivals.scenarios import base as scenarios
 from arrivals.scenarios.demo import demo
+from arrivals.scenarios.infrasound import infrasound
 from arrivals.scenarios.live import DTYPES
 from arrivals.scenarios.locating import add_locate
 from arrivals.scenarios.reproduce import add_reproduce
 from arrivals.scenarios.tracking import track
 from arrivals.trackers import available, find
+
+DEMOS: dict[str, Callable[..., None]] = {"swellex96": demo, "brp2012": infrasound}
 
 
 def run(argv: Sequence[str] | None = None) -> None:
@@ -76,8 +79,11 @@ def _add_track(commands: Any) -> None:
     option("file", metavar="FILE", help="recording; - for raw samples from standard input")
     option("--array", required=True, metavar="TOML", help="array file")
     option("--frequency", type=float, metavar="HZ", help="of the snapshots")
+    option("--frequencies", nargs="+", type=float, metavar="HZ", help="of the bins of each step")
     option("--band", nargs=2, type=float, metavar=("F1", "F2"),
-           help="band of the sources, Hz, for a tracker of real samples")  # fmt: skip
+           help="Hz: bins that fill it, or the band of a tracker of real samples")  # fmt: skip
+    option("--snapshots", type=int, default=1, metavar="N",
+           help="successive windows in one step (1)")  # fmt: skip
     option("--snr", type=float, default=0.0, metavar="DB", help="expected in the band (0)")
     option("--tracker", default="svalse", metavar="NAME", help="see `arrivals list` (svalse)")
     option("--set", action="append", default=[], type=_setting, metavar="NAME=VALUE",
@@ -99,15 +105,21 @@ def _add_track(commands: Any) -> None:
 
 
 def _add_demo(commands: Any) -> None:
+    told = [(inspect.getdoc(show) or "").partition("\n\nParameters")[0] for show in DEMOS.values()]
     add = commands.add_parser(
         "demo",
-        help="track the paths of a ship's tone past a vertical array, by three methods",
-        description=(inspect.getdoc(demo) or "").partition("\n\nParameters")[0],
+        help="track shipped data by three methods: a towed source, or recorded infrasound",
+        description="\n\n".join(f"{n}: {text}" for n, text in zip(DEMOS, told, strict=True)),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
+    add.add_argument("name", nargs="?", default="swellex96", choices=tuple(DEMOS),
+                     help="(swellex96)")  # fmt: skip
     add.add_argument("--out", default="arrivals-demo", metavar="DIR", help="(arrivals-demo)")
     add.add_argument("--quiet", action="store_true", help="no progress bar")
-    add.set_defaults(command=lambda arguments: demo(arguments.out, _bar(arguments.quiet)))
+    add.set_defaults(
+        command=lambda arguments: DEMOS[arguments.name](arguments.out, _bar(arguments.quiet))
+    )
 
 
 def _setting(argument: str) -> tuple[str, Any]:

@@ -70,7 +70,8 @@ class LineScenario(Scenario):
         model = self.measurement
         waves = model.wave(truth, amplitude)
         u = np.sqrt(noise)[:, None] * complex_normal(rng, waves.shape)
-        return Trial(waves + u, truth, model, BernoulliVonMises())
+        motion = BernoulliVonMises(sigma_doa=np.deg2rad(1.5))
+        return Trial(waves + u, truth, model, motion)
 
 
 def complex_normal(rng: np.random.Generator, shape: tuple[int, ...]) -> Complex:

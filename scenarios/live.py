@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -30,7 +30,7 @@ def live_snapshots(
     n_channels: int,
     *,
     dtype: str = "int16",
-    frequency: float | None = None,
+    frequency: float | Sequence[float] | None = None,
     rate: float | None = None,
     window: int | None = None,
     hop: int | None = None,
@@ -46,7 +46,8 @@ def live_snapshots(
         int16 or int32 (scaled to [-1, 1)), float32, float64; or complex64, complex128: then every
         frame is a snapshot already.
     frequency, rate, window, hop
-        As in `Recording.snapshots`, whose numbers these are; for complex frames only `rate`,
+        As in `Recording.snapshots`, whose numbers these are; of several frequencies the lowest
+        sets the window. For complex frames only `rate`,
         frames per second, has a meaning.
 
     Yields
@@ -54,8 +55,8 @@ def live_snapshots(
     float
         Centre of the window, s from the first sample; the number of the step for complex frames
         without a rate.
-    ndarray, shape (n_channels,)
-        Snapshot; NaN where a channel held no finite number.
+    ndarray, shape (n_channels,) or (n_bins, n_channels)
+        Snapshot, at each of several frequencies; NaN where a channel held no finite number.
 
     Raises
     ------
@@ -79,8 +80,10 @@ def live_snapshots(
     else:
         if rate is None or frequency is None:
             raise ValueError("real samples want a rate and a frequency, Hz")
-        narrowband(np.empty((0, 1)), rate, frequency, 2, 1)  # checks both before it waits
-        window = default_window(rate, frequency) if window is None else count("window", window, 2)
+        lowest = frequency if isinstance(frequency, float | int) else min(frequency)
+        for each in [frequency] if isinstance(frequency, float | int) else frequency:
+            narrowband(np.empty((0, 1)), rate, each, 2, 1)  # checks both before it waits
+        window = default_window(rate, lowest) if window is None else count("window", window, 2)
         hop, half = window if hop is None else count("hop", hop), window / 2
     heard = False
     for step, block in enumerate(_windows(source, frame, window, hop)):
@@ -110,7 +113,10 @@ def _windows(source: BinaryIO, frame: int, window: int, hop: int) -> Iterator[by
 
 
 def _snapshot(
-    samples: NDArray[Any], rate: float, frequency: float | None, first_sample: int
+    samples: NDArray[Any],
+    rate: float,
+    frequency: float | Sequence[float] | None,
+    first_sample: int,
 ) -> Complex:
     """Return the snapshot of one window of raw samples."""
     if samples.dtype.kind == "c":
@@ -120,6 +126,8 @@ def _snapshot(
     if samples.dtype.kind == "i":
         samples = samples * 2.0 ** (1 - 8 * samples.itemsize)
     assert frequency is not None
+    if not isinstance(frequency, float | int):
+        return np.stack([_snapshot(samples, rate, each, first_sample) for each in frequency])
     window = len(samples)
     return np.asarray(narrowband(samples, rate, frequency, window, window, first_sample)[0])
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from arrivals.checks import one_of, positive, shaped
 from arrivals.measurement_models import ArraySnapshot, SensorArray
-from arrivals.trackers.cbf import beam_power, look_directions
+from arrivals.trackers.cbf import beam_power, look_directions, looks_power
 from arrivals.trackers.recorder import Run, replacing
 from arrivals.typing import Bool, Float, Int
 
@@ -48,7 +48,7 @@ def plot_bearing_time(
     ----------
     run : Run
         Of a tracker of directions, n_steps long.
-    snapshots : array_like, shape (n_steps, n_sensors), optional
+    snapshots : array_like, shape (n_steps, *measurement.shape), optional
         What the tracker was given; the beam is not drawn without it.
     measurement : ArraySnapshot, optional
         Array and wavelength, wanted with `snapshots`.
@@ -111,16 +111,15 @@ def _draw_beam(
     """Draw the beam power in grey, light enough for the tracks to stand out."""
     from matplotlib.colors import LinearSegmentedColormap
 
-    n_sensors = measurement.array.n_sensors
-    if snapshots.shape != (len(at), n_sensors):
-        raise ValueError(f"snapshots must have shape {(len(at), n_sensors)}; got {snapshots.shape}")
+    shape = (len(at), *measurement.shape)
+    if snapshots.shape != shape:
+        raise ValueError(f"snapshots must have shape {shape}; got {snapshots.shape}")
     if not (np.isfinite(snapshots) & (snapshots != 0)).any():
         return  # silence
     doa = look_directions(measurement.array, N_DIRECTIONS)
-    steering = measurement.array.steering_vector(doa, measurement.wavelength)
     starts = np.arange(0, len(at), max(1, -(-len(at) // N_COLUMNS)))
     blocks = np.split(snapshots, starts[1:])
-    power = np.array([beam_power(steering, block).max(axis=0) for block in blocks])
+    power = np.array([_beam(measurement, doa, block) for block in blocks])
     level = 10 * np.log10(np.maximum(power / power.max(), 1e-30))
     light = LinearSegmentedColormap.from_list("light", ["#ffffff", "#c3c8cf", "#4d5560"])
     image = ax.pcolormesh(
@@ -130,6 +129,16 @@ def _draw_beam(
     bar = ax.figure.colorbar(image, ax=ax, pad=0.015, aspect=25, extend="min")
     bar.set_label("beam power, dB re maximum")
     bar.outline.set_visible(False)
+
+
+def _beam(measurement: ArraySnapshot, doa: Float, block: Any) -> Float:
+    """Return the highest power in each direction of the steps of a block."""
+    if measurement.is_single and measurement.response is None:
+        A = measurement.steering_vector(doa)
+        return np.asarray(beam_power(A, block).max(axis=0))
+    steering = measurement.waves.steering(doa)
+    looks = block.reshape(len(block), measurement.n_bins, measurement.n_snapshots, -1)
+    return np.asarray(np.max([looks_power(steering, np.swapaxes(Y, 1, 2)) for Y in looks], axis=0))
 
 
 def _edges(centres: Float) -> Float:

@@ -24,6 +24,7 @@ QUICK = 10  # runs of a study that is only looked at
 # Where each study lives: a function of the number of runs and the seed, and if it likes of `out`, a
 # folder for its runs, and of `quick`. A new one gets its line.
 STUDIES: dict[str, str] = {
+    "any-array": "arrivals.scenarios.reproduce_any_array:any_array",
     "ar-kf": "arrivals.scenarios.reproduce_ar:ar_kf",
     "interpolation-table1": "arrivals.scenarios.reproduce_interpolation:table1",
     "interpolation-convergence": "arrivals.scenarios.reproduce_interpolation:convergence",

@@ -53,11 +53,11 @@ def snapshot_bound(
     True
     """
     array, w = instance("measurement", measurement, ArraySnapshot).array, np.asarray(amplitude)
-    beta = np.asarray(doa, dtype=np.float64)
-    A = np.swapaxes(array.steering_vector(beta, measurement.wavelength), -1, -2)
+    beta, wavelength = np.asarray(doa, np.float64), measurement.plain_wavelength("the bound")
+    A = np.swapaxes(array.steering_vector(beta, wavelength), -1, -2)
     turned = direction(beta + np.pi / 2, max(array.dim, 2))  # du/dβ in the plane
     slope = turned[..., 1:2] if array.dim == 1 else turned
-    D = 2j * np.pi / measurement.wavelength * (array.positions @ np.swapaxes(slope, -1, -2)) * A
+    D = 2j * np.pi / wavelength * (array.positions @ np.swapaxes(slope, -1, -2)) * A
     left = D - A @ (np.linalg.pinv(A) @ D)
     J = ((np.swapaxes(D.conj(), -1, -2) @ left) * _outer(w)).real
     variance = np.diagonal(np.linalg.pinv(J, hermitian=True), axis1=-2, axis2=-1)

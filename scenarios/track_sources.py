@@ -16,7 +16,7 @@ from arrivals.scenarios.separated import (
     thinned,
     write_signals,
 )
-from arrivals.scenarios.tracking import Bar, measurement, print_rows, refuse
+from arrivals.scenarios.tracking import Bar, model_at, print_rows, refuse
 from arrivals.trackers import ARKalmanQRDRLS, find
 from arrivals.typing import Complex, Float
 
@@ -53,7 +53,10 @@ def track_sources(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -
     refuse(arguments, ("dtype", "channels"), "goes with samples from standard input")
     if arguments.frequency is None and arguments.band:
         arguments.frequency = sum(arguments.band) / 2
-    model = measurement(array, arguments)
+    if arguments.frequency is None:
+        raise ValueError("give --frequency, or --band, of the separated sources")
+    refuse(arguments, ("frequencies",), "goes with other trackers: this one takes --frequency")
+    model = model_at(array, arguments, [arguments.frequency])
     recording = read(arguments.file, rate=arguments.rate, variable=arguments.variable,
                      transpose=arguments.transpose, array=array)  # fmt: skip
     every_sample = not (recording.is_narrowband or arguments.window)

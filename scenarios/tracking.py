@@ -6,19 +6,22 @@ import argparse
 import inspect
 import os
 import sys
+import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, get_type_hints
 
 import numpy as np
 
 from arrivals.checks import count
 from arrivals.measurement_models import ArraySamples, ArraySnapshot, SensorArray
-from arrivals.scenarios.live import live_snapshots, track_live
+from arrivals.scenarios.live import track_live
+from arrivals.scenarios.looks import frequencies_in, live_looks, looks
 from arrivals.scenarios.readers import read
+from arrivals.scenarios.recordings import Recording
 from arrivals.scenarios.sampled import band_samples, live_samples, track_samples
 from arrivals.scenarios.separated import check_suffix
 from arrivals.trackers import Tracker, find
@@ -53,36 +56,61 @@ def track(arguments: argparse.Namespace, bar: Bar) -> None:
     with threadpool_limits(1, "blas"):  # the matrices are small: more threads only wait
         if separates(arguments):
             track_sources(arguments, array, bar)
-        elif arguments.band:
+        elif arguments.band and _takes_samples(arguments.tracker):
             _track_band(arguments, array, bar)
         else:
             _track_snapshots(arguments, array, bar)
 
 
+def _takes_samples(name: str) -> bool:
+    """Tell whether a tracker's measurements are real samples, not complex snapshots."""
+    try:
+        hints = get_type_hints(find(name).__init__)
+    except (NameError, TypeError):  # somebody else's, with types that cannot be read
+        return False
+    return hints.get("measurement") is ArraySamples
+
+
 def _track_snapshots(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -> None:
-    model = measurement(array, arguments)
-    tracker = _tracker(arguments.tracker, model, dict(arguments.set))
+    count("snapshots", arguments.snapshots)
     job = _track_stream if arguments.file == "-" else _track_file
-    job(arguments, tracker, model, bar)
+    job(arguments, array, bar)
 
 
-def measurement(array: SensorArray, arguments: argparse.Namespace) -> ArraySnapshot:
-    """Return the array at the frequency, which must be unambiguous."""
+def _frequencies(arguments: argparse.Namespace, rate: float | None) -> list[float]:
+    """Return the frequencies wanted, Hz: one, several, or those that fill a band."""
+    given = [arguments.frequency, arguments.frequencies, arguments.band]
+    if sum(each is not None for each in given) > 1:
+        raise ValueError("give one of --frequency, --frequencies and --band")
+    if arguments.band:
+        if rate is None:
+            raise ValueError("--band needs the samples per second: pass --rate")
+        return frequencies_in(arguments.band, rate, arguments.window)
+    if arguments.frequencies:
+        return [float(each) for each in arguments.frequencies]
     if arguments.frequency is None:
         raise ValueError("give --frequency, or --band for a tracker of real samples")
+    return [arguments.frequency]
+
+
+def model_at(
+    array: SensorArray, arguments: argparse.Namespace, frequencies: list[float]
+) -> ArraySnapshot:
+    """Return the array at its frequencies; a line at a single one must be unambiguous."""
     if array.speed is None:
         raise ValueError(
             f"{arguments.array}: the key 'speed' is missing: "
             "a frequency wants the speed of the waves, m/s"
         )
-    wavelength = array.wavelength(arguments.frequency)
+    wavelengths = [array.wavelength(each) for each in frequencies]
     limit = array.alias_limit
-    if limit is not None and wavelength < limit * (1 - 1e-6):
+    if limit is not None and len(wavelengths) == 1 and wavelengths[0] < limit * (1 - 1e-6):
         raise ValueError(
             f"frequency must not exceed the array's alias limit, {array.speed / limit:g} Hz, at "
-            f"which its grid spacing is half the wavelength; got {arguments.frequency:g} Hz"
+            f"which its grid spacing is half the wavelength; got {frequencies[0]:g} Hz. "
+            "Several --frequencies may go beyond it"
         )
-    return ArraySnapshot(array, wavelength)
+    return ArraySnapshot(array, wavelengths, n_snapshots=arguments.snapshots)
 
 
 def _tracker(
@@ -103,8 +131,19 @@ def _tracker(
             f"the tracker {name!r} is made from {', '.join(needs)}, not from an array file alone"
         )
     plain = {key: value for key, value in settings.items() if key in known}
-    tracker = kind(**{"measurement": measurement} | plain)
-    return kind(**tracker.set_params(**settings).get_params(deep=False))
+    with _warnings_told():
+        tracker = kind(**{"measurement": measurement} | plain)
+        return kind(**tracker.set_params(**settings).get_params(deep=False))
+
+
+@contextmanager
+def _warnings_told() -> Iterator[None]:
+    """Tell each warning in one line on standard error, once."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        yield
+    for told in dict.fromkeys(str(each.message) for each in caught):
+        print(f"arrivals: warning: {told}", file=sys.stderr)
 
 
 def _check_outputs(arguments: argparse.Namespace) -> None:
@@ -144,22 +183,28 @@ class _Heard:
     time: Float | None
 
 
-def _heard(arguments: argparse.Namespace, array: SensorArray) -> _Heard:
-    """Read a recording, and find the snapshots of the array's sensors in it."""
-    recording = read(arguments.file, rate=arguments.rate, variable=arguments.variable,
-                     transpose=arguments.transpose, array=array)  # fmt: skip
-    found = recording.snapshots(arguments.frequency, window=arguments.window, hop=arguments.hop)
+def _heard(arguments: argparse.Namespace, recording: Recording, frequencies: list[float]) -> _Heard:
+    """Find the snapshots of the array's sensors in a recording."""
+    found = looks(recording, frequencies, window=arguments.window, hop=arguments.hop,
+                  n_snapshots=arguments.snapshots)  # fmt: skip
     values = found.values
     if not np.isfinite(values).any():
         raise ValueError(f"{arguments.file}: no sample of the array's channels is finite")
     return _Heard(values, found.time if np.isfinite(found.time).all() else None)
 
 
-def _track_file(
-    arguments: argparse.Namespace, tracker: Tracker, measurement: ArraySnapshot, bar: Bar
-) -> None:
+def _track_file(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -> None:
+    if arguments.band is None:  # what is wrong with the arguments is told before the file is read
+        measurement = model_at(array, arguments, _frequencies(arguments, None))
+        tracker = _tracker(arguments.tracker, measurement, dict(arguments.set))
     refuse(arguments, ("dtype", "channels"), "goes with samples from standard input")
-    heard = _heard(arguments, measurement.array)
+    recording = read(arguments.file, rate=arguments.rate, variable=arguments.variable,
+                     transpose=arguments.transpose, array=array)  # fmt: skip
+    frequencies = _frequencies(arguments, recording.rate)
+    if arguments.band:
+        measurement = model_at(array, arguments, frequencies)
+        tracker = _tracker(arguments.tracker, measurement, dict(arguments.set))
+    heard = _heard(arguments, recording, frequencies)
     result = tracker.run(bar(heard.values, desc=arguments.tracker))
     result = result if heard.time is None else result.at(heard.time)
     if arguments.out:
@@ -184,14 +229,14 @@ def _plot(path: str, result: Run, heard: _Heard, measurement: ArraySnapshot) -> 
     save(ax, path)
 
 
-def _track_stream(
-    arguments: argparse.Namespace, tracker: Tracker, measurement: ArraySnapshot, bar: Bar
-) -> None:
+def _track_stream(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -> None:
+    frequencies = _frequencies(arguments, arguments.rate)
+    measurement = model_at(array, arguments, frequencies)
+    tracker = _tracker(arguments.tracker, measurement, dict(arguments.set))
     refuse(arguments, ("plot", "variable", "transpose"), "goes with a file, not with a stream")
-    array = measurement.array
-    snapshots = live_snapshots(
-        sys.stdin.buffer, _stream_channels(arguments.channels, array),
-        dtype=arguments.dtype or "int16", frequency=arguments.frequency, rate=arguments.rate,
+    snapshots = live_looks(
+        sys.stdin.buffer, _stream_channels(arguments.channels, array), frequencies,
+        n_snapshots=arguments.snapshots, dtype=arguments.dtype or "int16", rate=arguments.rate,
         window=arguments.window, hop=arguments.hop,
     )  # fmt: skip
     steps = ((time, array.select(z)) for time, z in snapshots)
@@ -201,7 +246,11 @@ def _track_stream(
 
 def _track_band(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -> None:
     """Track by a tracker that takes real samples one by one, from a recording or a stream."""
-    refuse(arguments, ("frequency", "window"), "goes with snapshots, not with --band")
+    refuse(
+        arguments, ("frequency", "frequencies", "window"), "goes with snapshots, not with --band"
+    )
+    if arguments.snapshots != 1:
+        raise ValueError("--snapshots goes with snapshots, not with a tracker of real samples")
     if arguments.file == "-":
         _track_band_stream(arguments, array, bar)
         return

@@ -64,11 +64,15 @@ GRIDLESS: list[tuple[str, MakeTracker, Measurements]] = [
     ("peaks_gnn", lambda: PeaksGNN(LINE), two_sources(LINE)),
     ("peaks_gnn", lambda: PeaksGNN(CIRCLE, detector="mvdr", confirm=1), two_sources(CIRCLE)),
     ("peaks_gnn", lambda: PeaksGNN(LINE, detector=CBF(LINE, threshold_db=6.0)), two_sources(LINE)),
+    ("valse", lambda: VALSE(LINE, engine="coordinate"), two_sources(LINE)),
     ("svalse", lambda: SVALSE(LINE), two_sources(LINE)),
     ("svalse", lambda: SVALSE(GAPS, BernoulliVonMises(kappa=50.0)), two_sources(GAPS)),
+    ("svalse", lambda: SVALSE(GAPS, engine="coordinate"), two_sources(GAPS)),
     (
         "svalse",
-        lambda: SVALSE(LINE, reference="first", posterior="mixture", tolerance=1e-6),
+        lambda: SVALSE(
+            LINE, engine="coordinate", reference="first", posterior="mixture", tolerance=1e-6
+        ),
         two_sources(LINE, n_steps=3),
     ),
 ]

@@ -6,8 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from arrivals.measurement_models import ArraySnapshot, Manifold, SensorArray
-from arrivals.trackers.coordinate_ascent import Ascent, CoordinateAscent, autocorrelation
+from arrivals.trackers.coordinate_ascent import Ascent, CoordinateAscent
 from arrivals.trackers.line_spectrum import Prediction
+from arrivals.trackers.noise_start import autocorrelation
 from arrivals.typing import Complex, Float
 
 ARRAY = SensorArray.ula(11, spacing=0.5)

@@ -109,7 +109,11 @@ def test_setting_reaches_into_a_tracker_inside_a_tracker() -> None:
 @pytest.mark.parametrize(
     ("params", "error", "message"),
     [
-        ({"kappa": 1.0}, ValueError, "SVALSE has no parameter 'kappa'; it has: max_components"),
+        (
+            {"kappa": 1.0},
+            ValueError,
+            "SVALSE has no parameter 'kappa'; it has: engine, kl, max_comp",
+        ),
         ({"motion__kapa": 1.0}, ValueError, "BernoulliVonMises has no parameter 'kapa'"),
         ({"merge__x": 1.0}, ValueError, "merge of SVALSE has no parameters of its own"),
         ({"motion__kappa": -1.0}, ValueError, "kappa must be finite and positive; got -1"),

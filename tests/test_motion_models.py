@@ -29,6 +29,8 @@ MODELS = [
     LinearMotion([[1.0, 0.5], [-0.2, 0.9]], [[0.2, 0.1], [0.1, 0.3]], control=[[0.0], [1.0]]),
     VonMisesWalk(kappa=50.0),
     BernoulliVonMises(),
+    VonMisesWalk(sigma_doa=0.1),
+    BernoulliVonMises(sigma_doa=0.1),
 ]
 every_model = pytest.mark.parametrize("model", MODELS, ids=lambda m: f"{type(m).__name__}{m.dim_x}")
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from arrivals.measurement_models import ArraySnapshot, Manifold, SensorArray
+from arrivals.motion_models import BernoulliVonMises
 from arrivals.trackers import SBL, SSBL, SVALSE
 from arrivals.trackers.coordinate_ascent import Ascent, CoordinateAscent
 from arrivals.trackers.line_spectrum import Prediction
@@ -105,7 +106,13 @@ def test_free_running_mixture_keeps_the_recorded_number_of_sources(name: str) ->
     """The tracker itself, in the paper's form, without the slip: K as recorded in most steps."""
     z = np.load(Path(FOLDER or "") / "svalse" / f"{name}.npz")
     tracker = SVALSE(
-        LINE, reference="first", posterior="mixture", tolerance=1e-6, max_iterations=5000
+        LINE,
+        BernoulliVonMises(),
+        engine="coordinate",
+        reference="first",
+        posterior="mixture",
+        tolerance=1e-6,
+        max_iterations=5000,
     )
     run = tracker.run(z["y"].T)
     assert (run.n_found == z["svalse_K"]).mean() >= 0.85

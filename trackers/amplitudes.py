@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from arrivals.trackers.noise_start import NOISE_FLOOR
 from arrivals.typing import Complex, Float, Int
-
-NOISE_FLOOR = 1e-9  # of the power: keeps a snapshot without noise from a division by zero
 
 
 class Amplitudes:

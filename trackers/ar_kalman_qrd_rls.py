@@ -439,7 +439,7 @@ class ARKalmanQRDRLS(Tracker):
 
 @lru_cache(maxsize=64)
 def _manifold(model: ArraySnapshot) -> ArrayManifold:
-    return ArrayManifold(model.array, model.wavelength, model.noise)
+    return ArrayManifold(model.array, model.plain_wavelength("ar_kalman_qrd_rls"), model.noise)
 
 
 def _wanted(s: Sources | None, interval: int) -> int:

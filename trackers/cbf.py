@@ -74,6 +74,32 @@ def beam_power(A: Complex, z: ArrayLike) -> Float:
     return np.asarray((beam.real**2 + beam.imag**2) / n_heard)
 
 
+def looks_power(A: Complex, Y: Complex) -> Float:
+    """Return the mean of |aᴴy|² / ‖a‖² over looks, the largest over a second unknown.
+
+    Parameters
+    ----------
+    A : ndarray, shape (n_nuisance, n_bins, n_sensors, n_directions)
+    Y : ndarray, shape (n_bins, n_sensors, n_snapshots)
+        Looks without a number are left out, and sensors that are NaN are left out of theirs.
+
+    Returns
+    -------
+    ndarray, shape (n_directions,)
+
+    Examples
+    --------
+    >>> looks_power(np.ones((1, 1, 3, 1)), np.array([[[1.0], [np.nan], [1.0]]]))
+    array([2.])
+    """
+    heard = ~np.isnan(Y)
+    beam = np.swapaxes(A.conj(), 2, 3) @ np.where(heard, Y, 0)  # (S, F, n, N)
+    norm = np.swapaxes(A.real**2 + A.imag**2, 2, 3) @ heard
+    power = (beam.real**2 + beam.imag**2) / np.maximum(norm, 1e-12)
+    n_looks = max(int(heard.any(axis=1).sum()), 1)
+    return np.asarray(power.sum(axis=(1, 3)).max(axis=0) / n_looks)
+
+
 def peaks(power: Float, *, circular: bool) -> Int:
     """Return the indices of the local maxima of a spectrum, the highest first.
 
@@ -134,7 +160,8 @@ class CBF(Tracker):
     Parameters
     ----------
     measurement : ArraySnapshot
-        Any array; its noise is not used.
+        Any array; its noise is not used. Of several looks a step the powers are averaged, each
+        direction at the slowness or elevation that suits it best.
     n_directions : int
         Look directions: over ±90° for a line (361: every half degree), else over the circle.
     threshold_db : float
@@ -194,13 +221,13 @@ class CBF(Tracker):
         self._show(DirectionEstimate.nothing())
 
     def update(self, z: ArrayLike | None) -> None:
-        """Scan one snapshot, (n_sensors,); sensors that are NaN or infinite are left out."""
+        """Scan one measurement; sensors that are NaN or infinite are left out."""
         if missed(z):
             return
         z = self.measurement.snapshot(np.asarray(z))
-        array, wavelength = self.measurement.array, self.measurement.wavelength
-        self.doa_grid, A = look_vectors(array, wavelength, self.n_directions)
-        self.power = self.spectrum(A, z)
+        array = self.measurement.array
+        self.doa_grid = look_directions(array, self.n_directions)
+        self.power = self._scan(z)
         top = peaks(self.power, circular=array.dim > 1)
         high = self.power[top] > self.power.max() * 10 ** (-self.threshold_db / 10)
         doa = refined(self.doa_grid, self.power, top[high][: self.n_slots])
@@ -209,10 +236,25 @@ class CBF(Tracker):
                 doa=doa,
                 std=np.full(len(doa), np.nan),
                 existence=np.full(len(doa), np.nan),
-                amplitude=self.beam(array.steering_vector(doa, wavelength), z),
+                amplitude=self._amplitude(doa, z),
                 label=np.full(len(doa), -1),
             )
         )
+
+    def _scan(self, z: Complex) -> Float:
+        model = self.measurement
+        if model.is_single and model.response is None:
+            return self.spectrum(model.steering_vector(self.doa_grid), z)
+        return looks_power(model.waves.steering(self.doa_grid), model.looks(z))
+
+    def _amplitude(self, doa: Float, z: Complex) -> Complex:
+        """Return amplitudes; of several looks, or unequal elements, the root of the mean power."""
+        model = self.measurement
+        if model.is_single and model.response is None:
+            return self.beam(model.steering_vector(doa), z)
+        A = model.waves.steering(doa)
+        norm = (A.real**2 + A.imag**2).sum(axis=2).mean(axis=(0, 1))
+        return np.asarray(np.sqrt(looks_power(A, model.looks(z)) / norm) + 0j)
 
     def spectrum(self, A: Complex, z: Complex) -> Float:
         """Return the power of one snapshot from directions with steering vectors A."""

@@ -6,6 +6,7 @@ are those of Park, Meyer and Gerstoft, JASA 153(1), 2023.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Literal
@@ -13,7 +14,8 @@ from typing import Literal
 import numpy as np
 
 from arrivals.measurement_models.manifolds import Manifold
-from arrivals.trackers.amplitudes import NOISE_FLOOR, Amplitudes
+from arrivals.motion_models.bessel import inverse_bessel_ratio
+from arrivals.trackers.amplitudes import Amplitudes
 from arrivals.trackers.angle_posteriors import (
     AnglePosterior,
     fold,
@@ -24,6 +26,8 @@ from arrivals.trackers.angle_posteriors import (
     unfold,
 )
 from arrivals.trackers.line_spectrum import Fit, Prediction
+from arrivals.trackers.looks_ascent import LooksAscent
+from arrivals.trackers.noise_start import NOISE_FLOOR, autocorrelation, first_noise
 from arrivals.typing import Complex, Int
 
 PosteriorName = Literal["quadrature", "mixture"]
@@ -44,11 +48,22 @@ class CoordinateAscent:
     merge : float
         Two active components nearer than this, rad of direction, become one; 0 for never.
     snr_db : float or None
-        Signal-to-noise ratio from which the noise starts; None estimates it from the lags.
+        Signal-to-noise ratio from which the noise starts. None estimates it from the lags of a
+        line; elsewhere it is the noise of the last step for several looks, if it is known, or
+        that of 20 dB.
     max_components : int or None
         As many as there are sensors if None.
     descending : bool
         Order of the mixture's factors.
+    temper : float
+        Looks of a step that count as one.
+    power_floor : float or None
+        Power, in units of one look's noise after beamforming, below which nothing is a source;
+        None is 0 for one look and 3 for several.
+    max_snr_db : float or None
+        Signal-to-noise ratio beyond which what is left of the data is laid to the model.
+    n_moments : int
+        Moments of the angles' densities to carry; 0 for von Mises densities.
     """
 
     posterior: PosteriorName = "quadrature"
@@ -58,18 +73,28 @@ class CoordinateAscent:
     snr_db: float | None = 20.0
     max_components: int | None = None
     descending: bool = False
+    temper: float = 1.0
+    power_floor: float | None = None
+    max_snr_db: float | None = None
+    n_moments: int = 0
 
     def fit(self, Y: Complex, manifold: Manifold, prediction: Prediction | None) -> Fit:
-        """Fit one snapshot: start, then iterate (sections III and IV, Fig. 3).
+        """Fit the looks of one step: start, then iterate (sections III and IV, Fig. 3).
 
         Parameters
         ----------
-        Y : ndarray, shape (1, n_sensors, 1)
+        Y : ndarray, shape (n_bins, n_sensors, n_snapshots)
         manifold : Manifold
         prediction : Prediction or None
             None in a first step and in VALSE: nothing is known.
         """
-        step = self.step(Y[0, :, 0], manifold, prediction)
+        if not Y.any():
+            return SILENCE
+        step: Ascent | LooksAscent
+        if self._for_a_line(Y, manifold):
+            step = self.step(Y[0, :, 0], manifold, prediction)
+        else:
+            step = LooksAscent(self, Y, manifold, prediction)
         x, converged = step.start(), False
         while not converged and step.iterations < self.max_iterations and not step.cycles():
             step.iterations += 1
@@ -78,9 +103,23 @@ class CoordinateAscent:
             step.refine_angles()
             step.merge()
             x_old, x = x, step.reconstruction()
-            rests = np.linalg.norm(x - x_old) < self.tolerance * np.linalg.norm(x_old)
-            converged = bool(rests or not (x.any() or x_old.any()))
+            converged = step.rests(x, x_old)
         return step.result(converged)
+
+    def fit_batch(
+        self,
+        Ys: Sequence[Complex],
+        manifold: Manifold,
+        predictions: Sequence[Prediction | None],
+    ) -> list[Fit]:
+        """Fit independent snapshots of one array, one after the other."""
+        return [self.fit(Y, manifold, known) for Y, known in zip(Ys, predictions, strict=True)]
+
+    def _for_a_line(self, Y: Complex, manifold: Manifold) -> bool:
+        """Tell whether the short form for one look of a line on a grid serves."""
+        plain = not self.power_floor and self.max_snr_db is None and self.n_moments == 0
+        line = manifold.coefficients is None and Y.shape[0] == Y.shape[2] == 1
+        return plain and line and self.temper == 1
 
     def step(self, y: Complex, manifold: Manifold, prediction: Prediction | None) -> Ascent:
         """Return the working state for one snapshot."""
@@ -109,8 +148,8 @@ class Ascent(Amplitudes):
         L = min(M, settings.max_components or M)
         self.settings, self.manifold, self.k = settings, manifold, manifold.harmonics
         self.degree = max(int(np.abs(self.k).max()), 1)
-        self.learn_rho = prediction is None
-        if prediction is None:
+        self.learn_rho = prediction is None or len(prediction.mu) == 0
+        if prediction is None or self.learn_rho:
             prediction = Prediction(np.zeros(0), np.zeros(0), np.zeros(0), max(L // 2, 1) / L)
         self.n_carried = n = min(len(prediction.mu), L)
         rho = np.concatenate([prediction.existence[:n], np.full(L - n, prediction.birth)])
@@ -206,13 +245,20 @@ class Ascent(Amplitudes):
         """Tell whether the search keeps reviving what merging removes."""
         return bool(self.merged.max() > CYCLE * self.settings.max_iterations)
 
+    def rests(self, x: Complex, x_old: Complex) -> bool:
+        """Tell whether the reconstruction moved by less than the tolerance."""
+        rests = np.linalg.norm(x - x_old) < self.settings.tolerance * np.linalg.norm(x_old)
+        return bool(rests or not (x.any() or x_old.any()))
+
     def result(self, converged: bool) -> Fit:
         """Return the fit."""
+        resultant = np.minimum(np.abs(self.mean), 1 - 1e-15)
         return Fit(
             theta=np.angle(self.mean),
-            resultant=np.minimum(np.abs(self.mean), 1 - 1e-15),
+            resultant=resultant,
+            kappa=inverse_bessel_ratio(resultant),
             active=self.active.copy(),
-            was_active=self.was_active.copy(),
+            age=np.where(self.active, 0, np.where(self.was_active, 1, -1)),
             amplitude=self.w.copy(),
             evidence=self.evidence(),
             noise=self.nu,
@@ -222,37 +268,16 @@ class Ascent(Amplitudes):
         )
 
 
-def first_noise(y: Complex, places: Int, snr_db: float | None) -> float:
-    """Start ν from an expected signal-to-noise ratio; or from the small eigenvalues of the lags.
-
-    Parameters
-    ----------
-    y : ndarray, shape (n_sensors,)
-    places : ndarray of int, shape (n_sensors,)
-        Grid points of the sensors.
-    snr_db : float or None
-        None: the mean of the ⌊M/4⌋ smallest eigenvalues of the Toeplitz matrix of the biased lags.
-    """
-    M, power = len(y), float(np.vdot(y, y).real)
-    if snr_db is not None:
-        return power / M * 10 ** (-snr_db / 10)
-    lags = autocorrelation(y, places) / M
-    apart = np.subtract.outer(places, places)
-    toeplitz = np.where(apart < 0, lags[np.abs(apart)].conj(), lags[np.abs(apart)])
-    smallest = np.linalg.eigvalsh(toeplitz)[: max(M // 4, 1)]
-    return max(float(smallest.mean()), NOISE_FLOOR * power / M)
-
-
-def autocorrelation(z: Complex, places: Int) -> Complex:
-    """Return the lags Rᵢ = Σ z_{k+i} z*_k, i = 0 .. span, of samples at integer places.
-
-    Examples
-    --------
-    >>> autocorrelation(np.array([1, 1j]), np.array([0, 2])).round(6) + 0
-    array([2.+0.j, 0.+0.j, 0.+1.j])
-    """
-    span = int(places.max() - places.min())
-    line = np.zeros(span + 1, dtype=np.complex128)
-    line[places - places.min()] = z
-    spectrum = np.fft.fft(line, 1 << int(np.ceil(np.log2(2 * span + 2))))
-    return np.asarray(np.fft.ifft(spectrum.real**2 + spectrum.imag**2)[: span + 1])
+SILENCE = Fit(
+    theta=np.zeros(0),
+    resultant=np.zeros(0),
+    kappa=np.zeros(0),
+    active=np.zeros(0, dtype=np.bool_),
+    age=np.zeros(0, dtype=np.int64),
+    amplitude=np.zeros(0, dtype=np.complex128),
+    evidence=np.zeros(0),
+    noise=0.0,
+    power=0.0,
+    iterations=0,
+    converged=True,
+)

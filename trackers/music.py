@@ -173,7 +173,7 @@ class MUSIC(CovarianceSubspace[Scan]):
         )
 
     def _finder(self, model: ArraySnapshot) -> Scan:
-        return Scan(model.array, model.wavelength, self.n_directions)
+        return Scan(model.array, model.plain_wavelength("music"), self.n_directions)
 
     @property
     def doa_grid(self) -> Float:

@@ -50,7 +50,7 @@ class MVDR(RunningCovariance, CBF):
     Parameters
     ----------
     measurement : ArraySnapshot
-        Any array; its noise is not used.
+        Any array of isotropic sensors, one look a step; its noise is not used.
     loading : float
         Added to the diagonal of the covariance, in mean powers of a sensor.
     forgetting : float
@@ -97,7 +97,8 @@ class MVDR(RunningCovariance, CBF):
     ) -> None:
         self.loading = positive("loading", loading)
         self.forgetting = probability("forgetting", forgetting)
-        self._know_nothing(instance("measurement", measurement, ArraySnapshot).array.n_sensors)
+        instance("measurement", measurement, ArraySnapshot).plain_wavelength("mvdr")
+        self._know_nothing(measurement.array.n_sensors)
         super().__init__(
             measurement,
             n_directions=n_directions,

@@ -189,7 +189,7 @@ class PAST(SubspaceTracker[Finder]):
 
     def _finder(self, model: ArraySnapshot) -> Finder:
         if self.method == "music":
-            return Scan(model.array, model.wavelength, self.n_directions)
+            return Scan(model.array, model.plain_wavelength("past"), self.n_directions)
         return Roots(on_grid(model)) if self.method == "root_music" else Shift(on_grid(model))
 
 

@@ -93,6 +93,7 @@ class SBL(Tracker):
         max_sources: int | None = None,
     ) -> None:
         self.measurement = instance("measurement", measurement, ArraySnapshot)
+        measurement.plain_wavelength("sbl")
         self.n_directions = count("n_directions", n_directions, least=3)
         self.threshold = probability("threshold", threshold)
         self.start_power = positive("start_power", start_power)
@@ -166,8 +167,7 @@ class SBL(Tracker):
         return self.start if fits else np.full(self.n_directions, self.start_power)
 
     def _waves(self, doa: Float, sensors: Bool) -> Complex:
-        array, wavelength = self.measurement.array, self.measurement.wavelength
-        return array.steering_vector(doa, wavelength)[:, sensors]
+        return self.measurement.steering_vector(doa)[:, sensors]
 
     def _fit(self, Y: Complex, sensors: Bool, start: Float) -> Powers:
         grid = look_directions(self.measurement.array, self.n_directions)

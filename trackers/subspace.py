@@ -102,7 +102,8 @@ class SubspaceTracker(Tracker, Generic[F]):
         """Keep the parameters under their names, checked; know nothing."""
         for name, value in params.items():
             setattr(self, name, value)
-        instance("measurement", self.measurement, ArraySnapshot)
+        model = instance("measurement", self.measurement, ArraySnapshot)
+        model.plain_wavelength("a subspace method")
         self.forgetting = probability("forgetting", self.forgetting)
         count("interval", self.interval)
         if self.max_sources is not None:
@@ -205,7 +206,7 @@ class SubspaceTracker(Tracker, Generic[F]):
 
     def _described(self, doa: Float, z: Complex) -> DirectionEstimate:
         unknown = np.full(len(doa), np.nan)
-        a = self.measurement.array.steering_vector(doa, self.measurement.wavelength)
+        a = self.measurement.steering_vector(doa)
         label = np.full(len(doa), -1)
         return DirectionEstimate(doa, unknown, unknown, fitted(a, z), label)
 

@@ -2,54 +2,77 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Literal, Self
+
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.checks import instance, not_negative, positive
-from arrivals.measurement_models.manifolds import Reference
+from arrivals.checks import instance, one_of, positive
+from arrivals.measurement_models.manifolds import Manifold, Reference
 from arrivals.measurement_models.snapshots import ArraySnapshot
 from arrivals.motion_models.bernoulli_von_mises import BernoulliVonMises
-from arrivals.motion_models.bessel import bessel_ratio, inverse_bessel_ratio
-from arrivals.trackers.base import missed
-from arrivals.trackers.coordinate_ascent import CoordinateAscent, PosteriorName
+from arrivals.motion_models.bessel import bessel_ratio, bessel_ratios
+from arrivals.trackers.coordinate_ascent import PosteriorName
 from arrivals.trackers.estimates import DirectionEstimate
-from arrivals.trackers.line_spectrum import Engine, Prediction
+from arrivals.trackers.line_spectrum import Engine, Fit, Prediction
+from arrivals.trackers.looks import Heard, updated
 from arrivals.trackers.registry import register
 from arrivals.trackers.slots import padded
-from arrivals.trackers.valse import VALSE, circular_std, described, reported
-from arrivals.typing import Bool, Float, Int
+from arrivals.trackers.valse import VALSE, EngineName, circular_std, described, reported
+from arrivals.typing import Bool, Complex, Float, Int
+
+DEFAULT_MOTION = BernoulliVonMises(sigma_doa=np.deg2rad(1.5))
+Carry = Literal["von_mises", "posterior"]
 
 
 @register("svalse")
 class SVALSE(VALSE):
     """Sequential VALSE: what was found in one step is the prior of the next.
 
-    The components in use at the end of a step are carried to the next one, and so, for one step,
-    are those that were in use at the end of one of its iterations. Each keeps its von Mises
-    density, widened by the motion model, and its label.
+    The components in use at the end of a step are carried to the next one, and so, for some
+    steps, are those that were in use before. Each keeps its von Mises density, widened by the
+    motion model, and its label.
 
     Parameters
     ----------
     measurement : ArraySnapshot
-        Its array must be a line on a uniform grid, gaps allowed. Its noise is not used: the
-        method estimates it.
+        Any array, of as many frequencies and snapshots a step as it says. Its noise is not used:
+        the method estimates it.
     motion : BernoulliVonMises
-        Steps, births and deaths; the paper's values are the default. Its angle is the electrical
-        one, 2π d/λ sin β.
-    reference, posterior, tolerance, max_iterations, max_components
-        As in `VALSE`. The paper's choices are "first", "mixture" and 1e-6.
+        Steps, births and deaths. The default has the paper's probabilities, and a step of 1.5°
+        in direction; the paper's, `BernoulliVonMises()`, is one in the electrical angle,
+        2π d/λ sin β, which lets sources near endfire jump by many degrees.
+    engine, reference, posterior, tolerance, max_iterations, max_components, kl
+        As in `VALSE`. The paper's choices are "coordinate", "first", "mixture" and 1e-6.
+    temper, power_floor, max_snr_db
+        As in `VALSE`, for recorded data: see docs/any_array.md.
     merge : float
         Of two active components nearer than this, rad of direction, the later is switched off;
         0 for never. (Only in the paper's program, not in its text.)
-    snr_db : float
-        Signal-to-noise ratio from which the noise estimate of each step starts; above 0, so
-        that something is left to the sources.
+    snr_db : float, optional
+        Signal-to-noise ratio from which the noise estimate of the first step starts, and, with
+        coordinate ascent, of every step; above 0, so that something is left to the sources. If
+        None, 20; but with several looks a step, the later ones start from the noise before.
+    carry : {"von_mises", "posterior"}
+        What is kept of an angle from step to step: one von Mises density, or the whole one, which
+        remembers all directions that single steps cannot tell apart.
 
     Attributes
     ----------
     mu, kappa, existence, label : ndarray, shape (L,)
         The carried components: mean angle, concentration, probability of being active, and
         label; NaN, 0, 0 and -1 in unused places. These are the belief, and may be assigned.
+    age : ndarray of int, shape (L,)
+        Steps since each was last in use; 0 for those that are.
+    expected_snr_db : float or None
+        Smoothed signal-to-noise ratio, where the noise estimate of the next step starts.
+    moments : ndarray, shape (L, n_moments)
+        ⟨exp(jiθ)⟩ of the carried components, where the whole posterior is; else none.
+    nuisance : ndarray, shape (L, n_nuisance)
+        Their densities over the values of an unknown slowness or elevation.
+    bin_noise : ndarray, shape (n_bins,)
+        Noise of each bin when it was last heard; NaN before, and for one look of a line.
     x, P, noise
         As in `VALSE`.
 
@@ -74,53 +97,77 @@ class SVALSE(VALSE):
     >>> z = model.simulate([[0.50], [0.51], [0.52]], 1.0, np.random.default_rng(0))
     >>> run = SVALSE(model).run(z)
     >>> run.doa[:, 0].round(2), run.label[:, 0]
-    (array([0.5 , 0.51, 0.51]), array([0, 0, 0]))
+    (array([0.5 , 0.51, 0.52]), array([0, 0, 0]))
     """
 
     mu: Float
     kappa: Float
     existence: Float
     label: Int
+    age: Int
+    moments: Complex
+    nuisance: Float
 
     def __init__(
         self,
         measurement: ArraySnapshot,
-        motion: BernoulliVonMises = BernoulliVonMises(),  # noqa: B008  (models are immutable)
+        motion: BernoulliVonMises = DEFAULT_MOTION,
         *,
+        engine: EngineName = "fast",
         reference: Reference = "middle",
         posterior: PosteriorName = "quadrature",
-        tolerance: float = 1e-4,
+        tolerance: float | None = None,
         max_iterations: int = 500,
         max_components: int | None = None,
+        kl: float = 0.5,
+        temper: float = 1.0,
+        power_floor: float | None = None,
+        max_snr_db: float | None = None,
         merge: float = np.deg2rad(1.5),
-        snr_db: float = 20.0,
+        snr_db: float | None = None,
+        carry: Carry = "von_mises",
     ) -> None:
         super().__init__(
             measurement,
+            engine=engine,
             reference=reference,
             posterior=posterior,
             tolerance=tolerance,
             max_iterations=max_iterations,
             max_components=max_components,
+            kl=kl,
+            temper=temper,
+            power_floor=power_floor,
+            max_snr_db=max_snr_db,
+            merge=merge,
         )
         self.motion = instance("motion", motion, BernoulliVonMises)
-        self.merge = not_negative("merge", merge)
-        self.snr_db = positive("snr_db", snr_db)
+        self.snr_db = snr_db if snr_db is None else positive("snr_db", snr_db)
+        self.carry = one_of("carry", carry, ("von_mises", "posterior"))
+        if carry == "posterior" and posterior == "mixture":
+            raise ValueError('carry "posterior" wants the posterior "quadrature"')
         self.n_labels = 0
         self.birth = motion.p_activate
-        self._carry(np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0, dtype=np.int64))
+        self.expected_snr_db: float | None = None
+        none = np.zeros(0)
+        self._carry(none, none, none, none.astype(np.int64), none.astype(np.int64))
+        self._carry_densities(None, none.astype(np.int64))
 
     @property
-    def engine(self) -> Engine:
+    def solver(self) -> Engine:
         """What maximises the ELBO, with this tracker's settings."""
-        return CoordinateAscent(
-            self.posterior,
-            self.tolerance,
-            self.max_iterations,
-            self.merge,
-            self.snr_db,
-            self.max_components,
-        )
+        single = self.measurement.is_single
+        snr_db = 20.0 if self.snr_db is None and single else self.snr_db
+        return self._solver(snr_db, descending=False, n_moments=self.n_moments)
+
+    @property
+    def n_moments(self) -> int:
+        """Moments that a density has after a step of the motion model; 0 if none are carried."""
+        if self.carry == "von_mises":
+            return 0
+        manifold = self.measurement.manifold(self.reference)
+        slowest = manifold.slope(manifold.from_doa(np.pi / 2))
+        return int(7 * np.sqrt(float(self.motion.blur(np.inf, 1.0, slowest)))) + 8
 
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
         """Widen the angles' densities, and let sources be born and die, (62)-(65).
@@ -128,18 +175,35 @@ class SVALSE(VALSE):
         The width is that of the exact convolution, A(κ') = A(κ) A(κ_r), whose limit for large
         κ (63) is.
         """
-        self.kappa, self.existence, self.birth = (
-            self.motion.blur(self.kappa, dt),
-            np.where(self.carried, self.motion.predict_existence(self.existence, dt), 0.0),
-            float(self.motion.predict_existence(0.0, dt)),
-        )
-        self._show(self._expected())
+        super().predict(u, dt=dt)
 
-    def update(self, z: ArrayLike | None) -> None:
-        """Fit one snapshot, (n_sensors,), given what is carried; leave out sensors that are NaN."""
-        if missed(z) or self._too_few(z):
-            return
-        manifold, fit = self._fit(z, self._prediction())
+    def _move(self, trackers: Sequence[Self], dt: float) -> None:
+        mu, kappa, existence = (
+            np.stack([getattr(tracker, name) for tracker in trackers])
+            for name in ("mu", "kappa", "existence")
+        )
+        carried = ~np.isnan(mu)
+        slope = self.measurement.manifold(self.reference).slope(np.where(carried, mu, 0.0))
+        kappa = self.motion.blur(kappa, dt, slope)
+        rho = np.where(carried, self.motion.predict_existence(existence, dt), 0.0)
+        birth = float(self.motion.predict_existence(0.0, dt))
+        for i, tracker in enumerate(trackers):
+            tracker.kappa, tracker.existence, tracker.birth = kappa[i], rho[i], birth
+            tracker._move_densities(slope[i], dt)
+
+    def _move_densities(self, slope: Float, dt: float) -> None:
+        """Blur whole densities by the exact convolution, and let the second unknown drift."""
+        if self.moments.size:
+            step = np.broadcast_to(self.motion.blur(np.inf, dt, slope), slope.shape)
+            self.moments = self.moments * bessel_ratios(self.moments.shape[1] - 1, step)
+        if self.nuisance.shape[1] > 1:
+            self.nuisance = drifted(self.nuisance)
+
+    def _expect(self) -> None:
+        self._show(self._expected(self.measurement.manifold(self.reference)))
+
+    def _absorb(self, manifold: Manifold, fit: Fit, heard: Heard) -> None:
+        """Take in a fit: report and label what is active, carry what is to be remembered."""
         label = np.full(len(fit.theta), -1)
         label[: self.carried.sum()] = self.label[self.carried][: len(label)]
         found = reported(manifold, fit)
@@ -147,42 +211,66 @@ class SVALSE(VALSE):
         label[fresh] = self.n_labels + np.arange(fresh.sum())
         self.n_labels += int(fresh.sum())
         self._show(described(manifold, fit, found, label[found]))
-        # the active first, then those that were active in some iteration
-        history = fit.was_active & ~fit.active
-        order = np.concatenate([np.flatnonzero(fit.active), np.flatnonzero(history)])
-        kappa = inverse_bessel_ratio(fit.resultant[order])
-        self._carry(fit.theta[order], kappa, fit.active[order], label[order])
+        order = np.concatenate([np.flatnonzero(fit.age == 0), np.flatnonzero(fit.age > 0)])
+        self._carry(
+            fit.theta[order], fit.kappa[order], fit.active[order], label[order], fit.age[order]
+        )
+        self._carry_densities(fit, order)
+        self.expected_snr_db = fit.snr_db
+        self.bin_noise = updated(self.bin_noise, heard.bins, fit.bin_noise)
 
-    def _too_few(self, z: ArrayLike | None) -> bool:
-        """Tell whether fewer sensors gave a number than the expected sources need."""
-        heard = np.isfinite(self.measurement.snapshot(np.asarray(z))).sum()
-        return bool(heard <= (self.carried & (self.existence >= 0.5)).sum())
+    def _looks(self, z: ArrayLike | None) -> tuple[Complex, Heard] | None:
+        """Return the data, or None also if fewer sensors gave a number than the tracks need."""
+        looks = super()._looks(z)
+        expected = (self.carried & (self.age == 0) & (self.existence >= 0.5)).sum()
+        return None if looks is None or looks[1].sensors.sum() <= expected else looks
 
     @property
     def carried(self) -> Bool:
         """Which places hold a carried component, (L,)."""
         return ~np.isnan(self.mu)
 
-    def _prediction(self) -> Prediction | None:
+    def _prediction(self, heard: Heard | None = None) -> Prediction:
         on = self.carried
-        if not on.any():
-            return None
-        return Prediction(self.mu[on], self.kappa[on], self.existence[on], self.birth)
+        return Prediction(
+            self.mu[on],
+            self.kappa[on],
+            self.existence[on],
+            self.birth,
+            self.age[on],
+            self.expected_snr_db,
+            noise=None if heard is None or self.snr_db else self.bin_noise[heard.bins],
+            nuisance=self.nuisance[on],
+            moments=self.moments[on] if self.moments.size else None,
+        )
 
-    def _carry(self, mu: Float, kappa: Float, existence: Float | Bool, label: Int) -> None:
+    def _carry(
+        self, mu: Float, kappa: Float, existence: Float | Bool, label: Int, age: Int
+    ) -> None:
         n = self.n_slots
         self.mu = padded(mu, n, np.nan)
         self.kappa = padded(kappa, n, 0.0)
         self.existence = padded(existence, n, 0.0)
         self.label = padded(label, n, -1).astype(np.int64)
+        self.age = padded(age, n, 0).astype(np.int64)
 
-    def _expected(self) -> DirectionEstimate:
+    def _carry_densities(self, fit: Fit | None, order: Int) -> None:
+        """Keep the whole densities of the carried components, and those of the second unknown."""
+        weights = self.measurement.manifold(self.reference).nuisance_weights
+        self.nuisance = np.tile(weights, (self.n_slots, 1))
+        self.moments = np.zeros((self.n_slots, self.n_moments), dtype=np.complex128)
+        order = order[: self.n_slots]
+        if fit is not None and fit.nuisance is not None and fit.moments is not None:
+            self.nuisance[: len(order)] = fit.nuisance[order]
+            self.moments[: len(order)] = fit.moments[order]
+
+    def _expected(self, manifold: Manifold) -> DirectionEstimate:
         """Return what is likely to be there, before it is measured."""
-        manifold = self.measurement.manifold(self.reference)
-        likely = self.carried & (self.existence >= 0.5) & (self.label >= 0)
-        slack = 3 * circular_std(bessel_ratio(self.kappa))
-        likely &= ~np.isnan(manifold.to_doa(self.mu, slack))
-        theta, std = self.mu[likely], circular_std(bessel_ratio(self.kappa[likely]))
+        likely = np.flatnonzero(self.carried & (self.existence >= 0.5) & (self.label >= 0))
+        std = circular_std(bessel_ratio(self.kappa[likely]))
+        real = ~np.isnan(manifold.to_doa(self.mu[likely], 3 * std))
+        likely, std = likely[real], std[real]
+        theta = self.mu[likely]
         return DirectionEstimate(
             doa=manifold.to_doa(theta, slack=np.inf),
             std=manifold.doa_std(theta, std),
@@ -190,3 +278,19 @@ class SVALSE(VALSE):
             amplitude=np.full(len(theta), complex(np.nan, np.nan)),
             label=self.label[likely],
         )
+
+
+def drifted(nuisance: Float) -> Float:
+    """Return densities (..., n) of a second unknown after a step, on its grid.
+
+    It stays with probability 0.9, and else goes to a neighbour; a trace is anywhere.
+
+    Examples
+    --------
+    >>> drifted(np.array([0.0, 1.0, 0.0])).round(4)
+    array([0.05  , 0.8999, 0.05  ])
+    """
+    left, right = nuisance[..., :1], nuisance[..., -1:]
+    wide = np.concatenate([left, nuisance, right], axis=-1)
+    moved = 0.9 * nuisance + 0.05 * (wide[..., :-2] + wide[..., 2:])
+    return np.asarray((1 - 1e-4) * moved + 1e-4 / nuisance.shape[-1])

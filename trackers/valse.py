@@ -2,19 +2,30 @@
 
 from __future__ import annotations
 
+import copy
+import time
+from collections.abc import Iterable, Sequence
+from itertools import zip_longest
+from typing import Any, Literal, Self
+
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.checks import count, instance, not_negative, one_of, positive
+from arrivals.checks import count, instance, not_negative, one_of, positive, probability
 from arrivals.measurement_models.manifolds import Manifold, Reference
 from arrivals.measurement_models.snapshots import ArraySnapshot
 from arrivals.trackers.base import Tracker, missed
 from arrivals.trackers.coordinate_ascent import CoordinateAscent, PosteriorName
 from arrivals.trackers.estimates import DirectionEstimate
+from arrivals.trackers.joint_ascent import JointNewton
 from arrivals.trackers.line_spectrum import Engine, Fit, Prediction
+from arrivals.trackers.looks import Heard, check_directions, updated
+from arrivals.trackers.recorder import Recorder, Run
 from arrivals.trackers.registry import register
 from arrivals.trackers.slots import padded
-from arrivals.typing import Bool, Float, Int
+from arrivals.typing import Bool, Complex, Float, Int
+
+EngineName = Literal["fast", "coordinate"]
 
 
 @register("valse")
@@ -24,19 +35,40 @@ class VALSE(Tracker):
     Parameters
     ----------
     measurement : ArraySnapshot
-        Its array must be a line on a uniform grid, gaps allowed. Its noise is not used: the
-        method estimates it.
+        Any array, of as many frequencies and snapshots a step as it says. Its noise is not used:
+        the method estimates it.
+    engine : {"fast", "coordinate"}
+        What maximises the bound: joint Newton steps on all angles, or the paper's coordinate
+        ascent, which takes some thirty times as long and integrates the angles' densities. The
+        fast one is for one look a step of a line on a uniform grid within half of one wavelength;
+        everything else is fitted by coordinate ascent.
     reference : {"middle", "first"}
         The sensor at which the amplitudes' phases are counted. "first" is the paper's; with the
         middle one phase and angle are uncorrelated, which saves most of the iterations.
     posterior : {"quadrature", "mixture"}
-        How the angles' densities are integrated; "mixture" is the paper's Heuristic 1.
-    tolerance : float
-        Relative change of the reconstruction at which the iteration rests; the paper's is 1e-6.
+        How coordinate ascent integrates the angles' densities; "mixture" is the paper's
+        Heuristic 1.
+    tolerance : float, optional
+        Where the iteration rests. Fast: change of the bound, nats, 1e-5 if None. Coordinate:
+        relative change of the reconstruction, 1e-4 if None; the paper's is 1e-6.
     max_iterations : int
         Iterations at most; a step that needs more is reported as not converged.
     max_components : int, optional
         Components that may be used at once; as many as there are sensors if None.
+    kl : float
+        Fast: share of the cost of localising a component, nats, that it must earn to be kept.
+        1 is the exact bound; less finds weaker sources, and more false ones below 10 dB.
+    temper : float
+        Looks of a step that count as one, at least 1: overlapping windows and neighbouring bins
+        of a recording are not independent, and deviate from a plane wave alike.
+    power_floor : float, optional
+        Power, in units of one look's noise after beamforming, below which nothing is a source. If
+        None, 0 for one look a step, which is the paper's model, and 3 for several.
+    max_snr_db : float, optional
+        Signal-to-noise ratio beyond which what is left of the data is laid to the array's model.
+    merge : float
+        Of two active components nearer than this, rad of direction, the later is switched off;
+        0 for never, as in the paper.
 
     Attributes
     ----------
@@ -72,35 +104,76 @@ class VALSE(Tracker):
         self,
         measurement: ArraySnapshot,
         *,
+        engine: EngineName = "fast",
         reference: Reference = "middle",
         posterior: PosteriorName = "quadrature",
-        tolerance: float = 1e-4,
+        tolerance: float | None = None,
         max_iterations: int = 500,
         max_components: int | None = None,
+        kl: float = 0.5,
+        temper: float = 1.0,
+        power_floor: float | None = None,
+        max_snr_db: float | None = None,
+        merge: float = 0.0,
     ) -> None:
         self.measurement = instance("measurement", measurement, ArraySnapshot)
+        self.engine = one_of("engine", engine, ("fast", "coordinate"))
         self.reference = one_of("reference", reference, ("middle", "first"))
         self.posterior = one_of("posterior", posterior, ("quadrature", "mixture"))
-        self.tolerance = positive("tolerance", tolerance)
+        if engine == "fast" and posterior == "mixture":
+            raise ValueError("posterior='mixture' needs engine='coordinate'; got engine='fast'")
+        self.tolerance = tolerance if tolerance is None else positive("tolerance", tolerance)
+        self.kl = probability("kl", kl)
         self.max_iterations = count("max_iterations", max_iterations)
         self.max_components = max_components
         if max_components is not None:
             count("max_components", max_components)
-        measurement.manifold(self.reference)  # refuses arrays that have none
+        self.temper = positive("temper", temper)
+        if temper < 1:
+            raise ValueError(f"temper must be at least 1; got {temper}")
+        self.power_floor, self.max_snr_db = power_floor, max_snr_db
+        if power_floor is not None:
+            not_negative("power_floor", power_floor)
+        if max_snr_db is not None:
+            positive("max_snr_db", max_snr_db)
+        self.merge = not_negative("merge", merge)
+        check_directions(measurement, self.reference, mixture=self.posterior == "mixture")
+        self.bin_noise = np.full(measurement.n_bins, np.nan)
         self._nothing()
 
     @property
-    def engine(self) -> Engine:
+    def solver(self) -> Engine:
         """What maximises the ELBO, with this tracker's settings."""
+        return self._solver(snr_db=None, descending=True)
+
+    def _solver(self, snr_db: float | None, *, descending: bool, n_moments: int = 0) -> Engine:
+        settings: dict[str, Any] = {
+            "max_iterations": self.max_iterations,
+            "merge": self.merge,
+            "snr_db": snr_db,
+            "max_components": self.max_components,
+        }
+        if self.tolerance is not None:
+            settings["tolerance"] = self.tolerance
+        if self.is_fast and n_moments == 0:
+            return JointNewton(kl=self.kl, **settings)
         return CoordinateAscent(
             self.posterior,
-            self.tolerance,
-            self.max_iterations,
-            merge=0.0,
-            snr_db=None,
-            max_components=self.max_components,
-            descending=True,
+            descending=descending,
+            temper=self.temper,
+            power_floor=self.power_floor,
+            max_snr_db=self.max_snr_db,
+            n_moments=n_moments,
+            **settings,
         )
+
+    @property
+    def is_fast(self) -> bool:
+        """Whether the fast engine is wanted, and serves this measurement and these settings."""
+        plain = self.temper == 1 and not self.power_floor and self.max_snr_db is None
+        if self.engine != "fast" or not plain or not self.measurement.is_single:
+            return False
+        return self.measurement.manifold(self.reference).coefficients is None
 
     @property
     def n_slots(self) -> int:
@@ -110,24 +183,89 @@ class VALSE(Tracker):
 
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
         """Forget: nothing is carried from snapshot to snapshot."""
-        not_negative("dt", dt)
-        self._nothing()
+        self._move([self], not_negative("dt", dt))
+        self._expect()
 
     def update(self, z: ArrayLike | None) -> None:
-        """Fit one snapshot, (n_sensors,); sensors that are NaN or infinite are left out."""
+        """Fit one measurement, of the model's `shape`; sensors that are NaN are left out."""
+        looks = self._looks(z)
+        if looks is not None:
+            Y, heard = looks
+            manifold = self._manifold(heard)
+            fit = self.solver.fit(Y, manifold, self._prediction(heard))
+            self._absorb(manifold, fit, heard)
+
+    def run_batch(
+        self, measurements: Iterable[Iterable[ArrayLike | None]], dt: float = 1.0
+    ) -> list[Run]:
+        """Run independent sequences, the leading axis, each from the present state.
+
+        All are solved together, step by step, as one array program; the numbers are those of
+        single runs, up to rounding. The tracker itself stays as it is.
+        """
+        positive("dt", dt)
+        sequences = [list(sequence) for sequence in measurements]
+        trackers = [copy.deepcopy(self) for _ in sequences]
+        recorders = [Recorder(type(self.estimate)) for _ in sequences]
+        started = time.perf_counter()
+        for step in zip_longest(*sequences, fillvalue=OVER):
+            on = [n for n, z in enumerate(step) if z is not OVER]
+            self._together([trackers[n] for n in on], [step[n] for n in on], dt)
+            for n in on:
+                recorders[n].add(trackers[n].estimate, trackers[n].x)
+        elapsed = (time.perf_counter() - started) / max(len(sequences), 1)
+        return [recorder.run(dt=dt, elapsed=elapsed) for recorder in recorders]
+
+    def _together(self, trackers: Sequence[Self], step: Sequence[Any], dt: float) -> None:
+        """Predict and update copies of this tracker, those with the same sensors in one call."""
+        self._move(trackers, dt)
+        groups: dict[bytes, list[tuple[Self, Complex, Heard]]] = {}
+        for tracker, z in zip(trackers, step, strict=True):
+            looks = tracker._looks(z)
+            if looks is None:
+                tracker._expect()
+            else:
+                groups.setdefault(looks[1].key, []).append((tracker, *looks))
+        for group in groups.values():
+            heard = group[0][2]
+            manifold = self._manifold(heard)
+            fits = self.solver.fit_batch(
+                [Y for _, Y, _ in group],
+                manifold,
+                [tracker._prediction(heard) for tracker, *_ in group],
+            )
+            for (tracker, *_), fit in zip(group, fits, strict=True):
+                tracker._absorb(manifold, fit, heard)
+
+    def _move(self, trackers: Sequence[Self], dt: float) -> None:
+        """Move the beliefs of copies of this tracker by `dt`: there are none."""
+
+    def _expect(self) -> None:
+        """Show what is expected before a measurement: nothing."""
+        self._nothing()
+
+    def _looks(self, z: ArrayLike | None) -> tuple[Complex, Heard] | None:
+        """Return the looks without gaps, and which these are; None for a missed measurement."""
         if missed(z):
-            return
-        manifold, fit = self._fit(z, None)
+            return None
+        Y = self.measurement.looks(np.asarray(z))
+        heard = Heard.of(Y)
+        return heard.block(Y), heard
+
+    def _manifold(self, heard: Heard) -> Manifold:
+        """Return the manifold of the bins and sensors that gave a number."""
+        manifold = self.measurement.manifold(self.reference).only(np.flatnonzero(heard.bins))
+        return manifold.without(np.flatnonzero(~heard.sensors))
+
+    def _prediction(self, heard: Heard | None = None) -> Prediction | None:
+        """Return what is known before the snapshot: nothing."""
+        return None
+
+    def _absorb(self, manifold: Manifold, fit: Fit, heard: Heard) -> None:
+        """Take in a fit."""
+        self.bin_noise = updated(self.bin_noise, heard.bins, fit.bin_noise)
         found = reported(manifold, fit)
         self._show(described(manifold, fit, found, np.full(found.sum(), -1)))
-
-    def _fit(self, z: ArrayLike | None, prediction: Prediction | None) -> tuple[Manifold, Fit]:
-        """Fit the sensors that gave a number; a silent snapshot holds nothing."""
-        Y = self.measurement.looks(np.asarray(z))
-        dead = np.isnan(Y).any(axis=(0, 2))
-        manifold = self.measurement.manifold(self.reference).without(np.flatnonzero(dead))
-        Y = Y[:, ~dead]
-        return manifold, self.engine.fit(Y, manifold, prediction) if Y.any() else SILENCE
 
     def _show(self, estimate: DirectionEstimate) -> None:
         self._estimate = estimate
@@ -144,18 +282,7 @@ class VALSE(Tracker):
         return self._estimate
 
 
-SILENCE = Fit(
-    theta=np.zeros(0),
-    resultant=np.zeros(0),
-    active=np.zeros(0, dtype=np.bool_),
-    was_active=np.zeros(0, dtype=np.bool_),
-    amplitude=np.zeros(0, dtype=np.complex128),
-    evidence=np.zeros(0),
-    noise=0.0,
-    power=0.0,
-    iterations=0,
-    converged=True,
-)
+OVER = object()  # in place of a measurement, where a sequence has ended
 
 
 def reported(manifold: Manifold, fit: Fit) -> Bool:

@@ -40,7 +40,8 @@ class LagOne(Tracker):
         power = self.power + np.nansum(np.abs(products))
         if power > 0:
             model = self.measurement
-            sine = np.angle(lag) / (2 * np.pi * (model.array.spacing or np.inf) / model.wavelength)
+            turn = 2 * np.pi * (model.array.spacing or np.inf) / model.wavelengths[0]
+            sine = np.angle(lag) / turn
             self.x = np.arcsin(np.clip([sine], -1.0, 1.0))
             self.P = np.array([[1 - abs(lag) / power]])
         self.lag, self.power = lag, power

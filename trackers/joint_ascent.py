@@ -1,0 +1,148 @@
+"""The fast engine of VALSE and SVALSE: joint Newton steps and single moves of the support.
+
+The support is changed by one move at a time from a warm one, each followed by a few Newton steps
+on all angles together; a move stays only if it raises the support criterion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from arrivals.measurement_models.manifolds import Manifold
+from arrivals.trackers.joint_elbo import Response
+from arrivals.trackers.joint_moves import Bursts, Moves
+from arrivals.trackers.joint_newton import ascend
+from arrivals.trackers.joint_work import Problem, Work, result, silence, start
+from arrivals.trackers.line_spectrum import Fit, Prediction
+from arrivals.trackers.support_moves import Grid, removal_gains
+from arrivals.typing import Complex
+
+
+@dataclass(frozen=True)
+class JointNewton:
+    """Settings of the engine.
+
+    Parameters
+    ----------
+    tolerance : float
+        Change of the ELBO, nats, at which the last Newton steps rest.
+    max_iterations : int
+        Newton steps at most.
+    merge : float
+        Two active components nearer than this, rad of direction, become one; 0 for never.
+    snr_db : float or None
+        Signal-to-noise ratio from which the noise starts where the prediction has none; None
+        estimates it from the lags.
+    max_components : int or None
+        As many as there are sensors if None.
+    kl : float
+        Share of the angles' KL divergences that is charged in decisions on the support.
+    fill : float
+        Components, as a share of the sensors of a filled line of the same extent, up to which
+        some are added before the noise is learned.
+    max_age : int
+        Steps that a component is remembered without being active.
+    keep : float
+        Weight of the newest signal-to-noise ratio in the start of the next step.
+    inner, fill_inner, final : int
+        Newton steps after a move, after one while filling, and at the end.
+    inner_tolerance : float
+        Change of the ELBO, nats, at which those after a move rest.
+    grid : int
+        Angles for each sensor at which components may be born.
+    max_moves : int
+        Changes of the support at most.
+    """
+
+    tolerance: float = 1e-5
+    max_iterations: int = 500
+    merge: float = np.deg2rad(1.5)
+    snr_db: float | None = 20.0
+    max_components: int | None = None
+    kl: float = 0.5
+    fill: float = 0.5
+    max_age: int = 3
+    keep: float = 0.3
+    inner: int = 3
+    fill_inner: int = 2
+    final: int = 12
+    inner_tolerance: float = 1e-2
+    grid: int = 8
+    max_moves: int = 60
+
+    def fit(self, Y: Complex, manifold: Manifold, prediction: Prediction | None) -> Fit:
+        """Fit one snapshot, (1, n_sensors, 1); no prediction: nothing is known."""
+        return self.fit_batch([Y], manifold, [prediction])[0]
+
+    def fit_batch(
+        self,
+        Ys: Sequence[Complex],
+        manifold: Manifold,
+        predictions: Sequence[Prediction | None],
+    ) -> list[Fit]:
+        """Fit independent snapshots of one array, as one array program."""
+        most = min(manifold.n_sensors, self.max_components or manifold.n_sensors)
+        problems = [
+            Problem(Y[0, :, 0], known, most) for Y, known in zip(Ys, predictions, strict=True)
+        ]
+        fits = [silence(problem, self.max_age) for problem in problems]
+        heard = [i for i, problem in enumerate(problems) if problem.power > 0]
+        if heard and manifold.n_sensors > 1:
+            for i, fit in zip(
+                heard, self._solved([problems[i] for i in heard], manifold, most), strict=True
+            ):
+                fits[i] = fit
+        return fits
+
+    def _solved(self, problems: list[Problem], manifold: Manifold, most: int) -> list[Fit]:
+        """Fit snapshots that have power: moves and Newton steps in turn until all rest."""
+        moves = self.moves(manifold, most)
+        work = start(problems, moves.response, self.snr_db, len(moves.grid.theta), most)
+        work.left[:] = np.where(work.free, 0, self.inner)
+        work.tolerance[:] = self.inner_tolerance
+        fits: dict[int, Fit] = {}
+        while len(work):
+            over = work.left == 0
+            if over.any():
+                part = work.take(over)
+                moves.choose(part)
+                work = work.put(over, part)
+                if work.done.any():
+                    gains = removal_gains(work.state, self.kl)
+                    for i in map(int, np.flatnonzero(work.done)):
+                        n = int(work.row[i])
+                        fits[n] = result(work, i, problems[n], gains, self.keep, self.max_age)
+                    if work.done.all():
+                        break
+                    work = work.take(~work.done)
+                work.state, work.saved = work.state.trimmed(), work.saved.trimmed()
+            climb(moves.response, work)
+        return [fits[n] for n in range(len(problems))]
+
+    def moves(self, manifold: Manifold, most: int) -> Moves:
+        """Return the moves between Newton steps, for an array."""
+        response = Response(manifold)
+        M = manifold.n_sensors
+        return Moves(
+            response,
+            Grid(response, self.grid, self.merge),
+            Bursts(self.inner, self.fill_inner, self.final, self.inner_tolerance, self.tolerance),
+            self.kl,
+            places=most,
+            most=min(most, M - 1),
+            fill_to=min(int(np.ceil(round(self.fill * response.extent, 6))), most, M - 1),
+            max_moves=self.max_moves,
+            max_iterations=self.max_iterations,
+        )
+
+
+def climb(response: Response, work: Work) -> None:
+    """Take one Newton step in every problem."""
+    before = work.state.F
+    work.state = ascend(response, work.state, work.learn)
+    work.iterations = work.iterations + 1
+    rests = np.abs(work.state.F - before) < work.tolerance
+    work.left = np.where(rests, 0, work.left - 1)

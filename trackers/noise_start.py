@@ -1,0 +1,45 @@
+"""Where the estimate of the noise of a line spectrum starts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from arrivals.typing import Complex, Int
+
+NOISE_FLOOR = 1e-9  # of the power: keeps a snapshot without noise from a division by zero
+
+
+def first_noise(y: Complex, places: Int, snr_db: float | None) -> float:
+    """Start ν from an expected signal-to-noise ratio; or from the small eigenvalues of the lags.
+
+    Parameters
+    ----------
+    y : ndarray, shape (n_sensors,)
+    places : ndarray of int, shape (n_sensors,)
+        Grid points of the sensors.
+    snr_db : float or None
+        None: the mean of the ⌊M/4⌋ smallest eigenvalues of the Toeplitz matrix of the biased lags.
+    """
+    M, power = len(y), float(np.vdot(y, y).real)
+    if snr_db is not None:
+        return power / M * 10 ** (-snr_db / 10)
+    lags = autocorrelation(y, places) / M
+    apart = np.subtract.outer(places, places)
+    toeplitz = np.where(apart < 0, lags[np.abs(apart)].conj(), lags[np.abs(apart)])
+    smallest = np.linalg.eigvalsh(toeplitz)[: max(M // 4, 1)]
+    return max(float(smallest.mean()), NOISE_FLOOR * power / M)
+
+
+def autocorrelation(z: Complex, places: Int) -> Complex:
+    """Return the lags Rᵢ = Σ z_{k+i} z*_k, i = 0 .. span, of samples at integer places.
+
+    Examples
+    --------
+    >>> autocorrelation(np.array([1, 1j]), np.array([0, 2])).round(6) + 0
+    array([2.+0.j, 0.+0.j, 0.+1.j])
+    """
+    span = int(places.max() - places.min())
+    line = np.zeros(span + 1, dtype=np.complex128)
+    line[places - places.min()] = z
+    spectrum = np.fft.fft(line, 1 << int(np.ceil(np.log2(2 * span + 2))))
+    return np.asarray(np.fft.ifft(spectrum.real**2 + spectrum.imag**2)[: span + 1])
