@@ -284,7 +284,7 @@ def asked(tracker: ARKalmanQRDRLS, z: Complex) -> list[Any]:
         given.append(arguments)
         return steady_filter(*arguments)
 
-    with mock.patch("arrivals.trackers.source_intervals.steady_filter", noted):
+    with mock.patch("arrivals.trackers.source_filter.steady_filter", noted):
         copy.deepcopy(tracker).run(z)
     return given
 

@@ -50,8 +50,8 @@ def analytic(samples: ArrayLike, rate: float, band: Sequence[float] | None = Non
     Examples
     --------
     >>> t = np.arange(8) / 8
-    >>> analytic(np.cos(2 * np.pi * t)[:, None], rate=8.0)[:3, 0].round(3)
-    array([1.   +0.j   , 0.707+0.707j, 0.   +1.j   ])
+    >>> np.abs(analytic(np.cos(2 * np.pi * t)[:, None], rate=8.0)[:3, 0]).round(3)
+    array([1., 1., 1.])
     """
     x = np.asarray(samples, dtype=np.float64)
     low, high = (0.0, rate / 2) if band is None else (float(edge) for edge in band)
@@ -100,7 +100,10 @@ def for_recording(
            if key.startswith("motion__")}  # fmt: skip
     whole = z[np.isfinite(z).all(axis=1)]
     if not np.any(whole):
-        raise ValueError("no sample of the recording is heard by all sensors")
+        raise ValueError(
+            "the recording is silent, or no sample of it is heard by all sensors: leave out those "
+            "that do not work, and their partners, by `missing` in the array file"
+        )
     total = float(np.mean(whole.real**2 if real_valued else np.abs(whole) ** 2))
     noisy = measurement.replace(noise=QUIET * total * (2 if real_valued else 1))
     if "motion" in params:

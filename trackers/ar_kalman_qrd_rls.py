@@ -15,31 +15,24 @@ from arrivals.checks import count, covariance, instance, not_negative, positive,
 from arrivals.measurement_models.array_manifold import ArrayManifold
 from arrivals.measurement_models.snapshots import ArraySnapshot
 from arrivals.motion_models.autoregressive import AutoregressiveSources
-from arrivals.motion_models.companion import blocks
 from arrivals.trackers.base import Tracker
 from arrivals.trackers.estimates import SourceEstimate
 from arrivals.trackers.recorder import Run
 from arrivals.trackers.registry import register
-from arrivals.trackers.source_acquisition import acquired
 from arrivals.trackers.source_history import History, closes
-from arrivals.trackers.source_intervals import filtered, interval
+from arrivals.trackers.source_program import NOTHING, Program, frame, frames, wanted
 from arrivals.trackers.source_states import (
     Options,
     Sources,
-    beginning,
     covariance_outside,
     inside,
-    joined,
     measured,
     outside,
     repeated,
 )
-from arrivals.trackers.steady_kalman import transposed
 from arrivals.typing import Complex, Float
 
 SEPARATE = 1e-6  # rad
-NOTHING = complex(np.nan, np.nan)
-ACQUISITION = 60  # snapshots that the first directions are looked for in
 
 
 @register("ar_kalman_qrd_rls")
@@ -179,8 +172,8 @@ class ARKalmanQRDRLS(Tracker):
         shape = (1, 0, self.measurement.array.n_sensors)
         self.x, self.P = np.zeros(self.motion.dim_x), self.motion.stationary_covariance()
         self._known_x, self._known_P = self.x, self.P
-        self._sources = None if self.doa is None else self._begun(np.zeros(shape))
-        most = max(self.interval, _wanted(self._sources, self.interval))
+        self._sources = None if self.doa is None else self._program.begun(np.zeros(shape))
+        most = wanted(self._sources, self.interval)
         self.frames = np.full((most, shape[-1]), NOTHING)
         self.n_pending = 0
         self.signals = np.full((self.interval, self.motion.n_sources), NOTHING)
@@ -193,12 +186,12 @@ class ARKalmanQRDRLS(Tracker):
 
     def update(self, z: ArrayLike | None) -> None:
         """Take one snapshot, (n_sensors,), complex; with the last of an interval, work it off."""
-        frame = self._frame(z)
+        new = frame(z, self.measurement.array.n_sensors)
         self._close_if_full()
-        self.frames = np.concatenate([self.frames[1:], frame[None]])
+        self.frames = np.concatenate([self.frames[1:], new[None]])
         self.n_pending += 1
-        if self._full() and closes(frame):
-            self._close()
+        if self._full() and closes(new):
+            self._moved(self._pending())
 
     @property
     def estimate(self) -> SourceEstimate:
@@ -246,8 +239,11 @@ class ARKalmanQRDRLS(Tracker):
         """
         positive("dt", dt)
         started = time.perf_counter()
-        z = np.concatenate([self._pending(), self._block(measurements)])
-        history = self._history(z[None], move=True)
+        z = np.concatenate(
+            [self._pending(), frames(measurements, self.measurement.array.n_sensors)]
+        )
+        history = self._moved(z, open_end=True)
+        history.signals.append(self._program.provisional(self._sources, self._pending()[None]))
         return history.run(0, dt, time.perf_counter() - started)
 
     def run_batch(
@@ -266,15 +262,18 @@ class ARKalmanQRDRLS(Tracker):
             Time between snapshots.
         """
         positive("dt", dt)
-        sequences = [self._block(sequence) for sequence in measurements]
+        sequences = [frames(each, self.measurement.array.n_sensors) for each in measurements]
         if len({len(z) for z in sequences}) != 1:
             return super().run_batch(sequences, dt)
         started = time.perf_counter()
         z = np.array([np.concatenate([self._pending(), sequence]) for sequence in sequences])
+        program, s = self._program, self._now()
         first = measured(z[:, : len(self.frames)], self.manifold, self.motion.n_parts)
-        if self._sources is None and self._telling(first) is None:
+        if s is None and program.telling(first) is None:
             return super().run_batch(sequences, dt)
-        history = self._history(z)
+        s = None if s is None else repeated(s, len(z))
+        s, done, history = program.history(s, z, self.n_pending)
+        history.signals.append(program.provisional(s, z[:, done:]))
         elapsed = (time.perf_counter() - started) / len(z)
         return [history.run(n, dt, elapsed) for n in range(len(z))]
 
@@ -288,29 +287,6 @@ class ARKalmanQRDRLS(Tracker):
 
     # -- snapshots ---------------------------------------------------------------------------------
 
-    def _frame(self, z: ArrayLike | None) -> Complex:
-        """Return one snapshot as complex numbers, a copy; NaN if it is missing."""
-        n = self.measurement.array.n_sensors
-        array = np.asarray(np.nan if z is None else z)
-        if array.dtype.kind not in "biufc":
-            raise TypeError(f"a snapshot must hold complex numbers; got {array.dtype}")
-        if array.ndim == 0 and np.isnan(array):
-            return np.full(n, NOTHING)
-        if array.shape != (n,):
-            raise ValueError(
-                f"a snapshot must have shape ({n},), one number a sensor; got {array.shape}"
-            )
-        return np.array(array, dtype=np.complex128)
-
-    def _block(self, measurements: Iterable[ArrayLike | None]) -> Complex:
-        """Return snapshots as an array (n_steps, n_sensors)."""
-        n = self.measurement.array.n_sensors
-        if isinstance(measurements, np.ndarray) and measurements.shape[1:] == (n,):
-            if measurements.dtype.kind not in "biufc":
-                raise TypeError(f"snapshots must hold complex numbers; got {measurements.dtype}")
-            return measurements.astype(np.complex128)
-        return np.array([self._frame(z) for z in measurements], np.complex128).reshape(-1, n)
-
     def _pending(self) -> Complex:
         return self.frames[len(self.frames) - self.n_pending :]
 
@@ -322,106 +298,33 @@ class ARKalmanQRDRLS(Tracker):
     # -- intervals ---------------------------------------------------------------------------------
 
     def _full(self) -> bool:
-        return self.n_pending == _wanted(self._sources, self.interval)
-
-    def _close(self) -> None:
-        """Work off the snapshots that are pending."""
-        self._history(self._pending()[None], move=True, closing=True)
+        return self.n_pending == wanted(self._sources, self.interval)
 
     def _close_if_full(self) -> None:
         if self._full():
-            self._close()
+            self._moved(self._pending())
 
-    def _history(self, z: Complex, move: bool = False, closing: bool = False) -> History:
-        """Work off snapshots, (n_sequences, n_snapshots, n_sensors), from the present belief.
-
-        To move is to take over what a single sequence told: up to an interval that its end does
-        not close, unless this is what closes it.
-        """
-        history = History(z, self.n_pending, self.motion, self.gate > 0)
-        s, done = self._now(len(z)), 0
-        history.add(s, 0)
-        while (end := done + _wanted(s, self.interval)) <= z.shape[1]:
-            if move and end == z.shape[1] and not (closing or closes(z[0, -1])):
-                break
-            s, done = self._heard(s, z[:, done:end], end, history), end
-        if move:
-            self._take_over(s, z[0, done:], history)
-        if not closing:
-            history.signals.append(self._provisional(s, z[:, done:]))
-        return history
-
-    def _heard(self, s: Sources | None, z: Complex, end: int, history: History) -> Sources | None:
-        """Work off the intervals that snapshots consist of, the first once they tell where."""
-        parts, places = self.motion.n_parts, blocks(self.motion.orders, lag_by_lag=True)
-        manifold, options = self.manifold, self._options
-        y = measured(z, manifold, parts)
-        s = self._begun(y) if s is None else s
-        if s is None:
-            history.signals.append(np.full((*z.shape[:2], self.motion.n_sources), NOTHING))
-            return None
-        for part in np.split(y, z.shape[1] // self.interval, axis=1):
-            s, X = interval(s, part, manifold, places, options)
-            history.add(s, end)
-            history.signals.append(joined(X, parts, self.motion.n_sources))
-        return s
-
-    def _provisional(self, s: Sources | None, z: Complex) -> Complex:
-        """Return the signals in snapshots that are no interval yet."""
-        parts, n_sources = self.motion.n_parts, self.motion.n_sources
-        if s is None or z.shape[1] == 0:
-            return np.full((*z.shape[:2], n_sources), NOTHING)
-        y = measured(z, self.manifold, parts)
-        A = transposed(self.manifold.real_steering(s.doa))
-        places = blocks(self.motion.orders, lag_by_lag=True)
-        return joined(filtered(s, s, y, A, places, self._options).X, parts, n_sources)
-
-    def _begun(self, y: Float) -> Sources | None:
-        """Return the belief to start from: where `doa` says, or where measurements (...) do."""
-        if self.doa is not None:
-            doa = np.tile(real("doa", self.doa), (len(y), 1))
-        else:
-            telling = self._telling(y)
-            if telling is None:
-                return None
-            doa = np.array([acquired(one, self.motion, self.manifold) for one in telling])
-        x, P = inside(self.x, self.P, self.motion)
-        x, P = (np.repeat(value[None], len(y), axis=0) for value in (x, P))
-        return beginning(doa, x, P, self.motion, self.manifold, self._options)
-
-    def _telling(self, y: Float) -> list[Float] | None:
-        """Return the rows of each sequence to look for directions in; None if one has none.
-
-        Where there is a gate, they must be louder than what it lets pass.
-        """
-        rows = [one[np.isfinite(one).all(axis=-1)] for one in y]
-        least = self.gate * self.motion.power.sum() / self.motion.n_parts
-        if all(len(one) > 0 and np.mean(one**2) > least for one in rows):
-            return rows
-        return None
-
-    def _now(self, n: int) -> Sources | None:
-        """Return the present belief n times, with `x` and `P` if they were assigned."""
-        s = self._sources
-        if s is None:
-            return None
-        if not (self.x is self._known_x and self.P is self._known_P):
-            dim = self.motion.dim_x
-            x, P = shaped("x", self.x, dim), covariance("P", self.P, dim)
-            x, P = inside(x, P, self.motion)
-            s = replace(s, x=x[None], P=P[None])
-        return s if n == 1 else repeated(s, n)
-
-    def _take_over(self, s: Sources | None, rest: Complex, history: History) -> None:
+    def _moved(self, z: Complex, open_end: bool = False) -> History:
+        """Work off snapshots, (n_snapshots, n_sensors), pending ones in front; keep the rest."""
+        s, done, history = self._program.history(self._now(), z[None], self.n_pending, open_end)
         if s is not None and history.moved:
             self._sources = s
             self.x = outside(s.x[0], self.motion)
             self.P = covariance_outside(s.P[0], self.motion)
             self._known_x, self._known_P = self.x, self.P
             self.signals = history.signals[-1][0]
-        n = len(self.frames) - len(rest)
-        self.frames = np.concatenate([np.full((n, rest.shape[1]), NOTHING), rest])
-        self.n_pending = len(rest)
+        self.n_pending = len(z) - done
+        gone = len(self.frames) - self.n_pending
+        self.frames = np.concatenate([np.full((gone, z.shape[1]), NOTHING), z[done:]])
+        return history
+
+    def _now(self) -> Sources | None:
+        """Return the present belief, with `x` and `P` if they were assigned."""
+        if self._sources is None or (self.x is self._known_x and self.P is self._known_P):
+            return self._sources
+        n = self.motion.dim_x
+        x, P = inside(shaped("x", self.x, n), covariance("P", self.P, n), self.motion)
+        return replace(self._sources, x=x[None], P=P[None])
 
     @property
     def manifold(self) -> ArrayManifold:
@@ -429,22 +332,19 @@ class ARKalmanQRDRLS(Tracker):
         return _manifold(self.measurement)
 
     @property
-    def _options(self) -> Options:
-        return Options(
+    def _program(self) -> Program:
+        doa = None if self.doa is None else real("doa", self.doa)
+        options = Options(
             self.forgetting, self.ar_forgetting, self.ridge, self.ar_ridge, self.gate, self.inner,
             self.correction, self.adapt_drive, self.adapt_noise, self.r_start, self.tau,
             self.memory,
         )  # fmt: skip
+        return Program(self.motion, self.manifold, self.interval, doa, options, self.x, self.P)
 
 
 @lru_cache(maxsize=64)
 def _manifold(model: ArraySnapshot) -> ArrayManifold:
     return ArrayManifold(model.array, model.plain_wavelength("ar_kalman_qrd_rls"), model.noise)
-
-
-def _wanted(s: Sources | None, interval: int) -> int:
-    """Return the snapshots that are worked off next: an interval, or all that acquisition takes."""
-    return interval * (1 if s is not None else -(-ACQUISITION // interval))
 
 
 def _check_directions(doa: ArrayLike, n_sources: int) -> None:
