@@ -23,15 +23,7 @@ import numpy as np
 from arrivals.measurement_models import LogNormalRSS, db_to_neper
 from arrivals.motion_models import RandomWalk
 from arrivals.scenarios.networks import Network, read_network
-from arrivals.scenarios.rss import (
-    BirthsAndDeaths,
-    CrossingSources,
-    FixedSources,
-    RSSTrial,
-    Table1K3,
-    Table1K7,
-    in_disc,
-)
+from arrivals.scenarios.rss import FixedSources, RSSTrial, Table1K3, Table1K7, in_disc
 from arrivals.scenarios.rss_births import gospa_over_time, told_nothing, told_the_truth
 from arrivals.scenarios.rss_calibration import Calibration, calibrate
 from arrivals.scenarios.rss_measured import (
@@ -43,13 +35,15 @@ from arrivals.scenarios.rss_measured import (
     track_transmitter,
 )
 from arrivals.scenarios.rss_metrics import Scores, assigned, distances, scores
+from arrivals.scenarios.rss_moving import BirthsAndDeaths, CrossingSources
 from arrivals.scenarios.rss_trials import answers, bounds, draws, one_of_batch
 from arrivals.trackers import Run
 from arrivals.trackers.rss_cycles import Cycling, Sweep, solve
 from arrivals.trackers.rss_map import maximum
 from arrivals.trackers.rss_problem import Prior, Problem, inverse_2x2, marginals
 from arrivals.trackers.rss_quality import quality
-from arrivals.trackers.rss_start import Newcomers, best, grown
+from arrivals.trackers.rss_scan import Newcomers
+from arrivals.trackers.rss_start import best, grown
 from arrivals.typing import Float
 
 SEEDS = (0, 1, 2)
