@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike
 from arrivals.checks import constant, count, number, positive, real
 from arrivals.measurement_models.base import MeasurementModel
 from arrivals.measurement_models.decibels import neper_to_db
-from arrivals.measurement_models.envelope import log_envelope_moments, sample_log_envelope
+from arrivals.measurement_models.envelope import sample_log_envelope
 from arrivals.measurement_models.path_loss import Field, Levels, slopes
+from arrivals.measurement_models.rss_parts import entries, gains, moments, per_sensor
 from arrivals.typing import Float
 
 FARTHEST = 40.0  # Np, 347 dB: what lies beyond is in another unit
@@ -127,17 +128,17 @@ class LogNormalRSS(MeasurementModel):
             "alpha": positive("alpha", alpha),
             "log_noise": None if log_noise is None else per_sensor("log_noise", log_noise, n),
             "offsets": per_sensor("offsets", offsets, n),
-            "log_gain": None if log_gain is None else _gains(log_gain, n),
+            "log_gain": None if log_gain is None else gains(log_gain, n),
             "r_min": positive("r_min", r_min),
             "exact_moments": bool(exact_moments),
             "log_amplitude": number("log_amplitude", log_amplitude),
             "n_sources": count("n_sources", n_sources),
         }
-        own["position"], own["amplitude"] = _entries(position, amplitude)
+        own["position"], own["amplitude"] = entries(position, amplitude)
         if own["sigma"] is not None and not np.all(np.asarray(own["sigma"]) > 0):
             raise ValueError(f"sigma must be positive; got {sigma!r}")
         own["_noise"] = -np.inf if own["log_noise"] is None else own["log_noise"]
-        own["_bias"], own["_variance"] = _moments(
+        own["_bias"], own["_variance"] = moments(
             own["sigma"], own["n_snapshots"], own["exact_moments"], n
         )
         for name, value in own.items():
@@ -264,65 +265,3 @@ class LogNormalRSS(MeasurementModel):
     def _content(self) -> tuple[object, ...]:
         params = self.get_params(deep=False).values()
         return tuple((v.shape, v.tobytes()) if isinstance(v, np.ndarray) else v for v in params)
-
-
-def per_sensor(name: str, value: ArrayLike, n: int) -> float | Float:
-    """Return a finite number, or one for each sensor that cannot be written to.
-
-    Examples
-    --------
-    >>> per_sensor("sigma", [0.5, 0.7], 3)
-    Traceback (most recent call last):
-    ValueError: sigma must be a number or have shape (3,); got (2,)
-    """
-    if np.ndim(value) == 0:
-        value = number(name, value)
-        if not np.isfinite(value):
-            raise ValueError(f"{name} must be finite; got {value}")
-        return value
-    array = np.array(real(name, value))
-    if array.shape != (n,):
-        raise ValueError(f"{name} must be a number or have shape ({n},); got {array.shape}")
-    if not np.isfinite(array).all():
-        raise ValueError(f"{name} must be finite; got {array.tolist()}")
-    array.setflags(write=False)
-    return array
-
-
-def _gains(log_gain: ArrayLike, n: int) -> Float:
-    array = np.array(real("log_gain", log_gain))
-    if array.ndim not in (1, 2) or array.shape[-1] != n:
-        raise ValueError(f"log_gain must have shape (..., {n}); got {array.shape}")
-    if not np.isfinite(array).all():
-        raise ValueError("log_gain must be finite")
-    array.setflags(write=False)
-    return array
-
-
-def _entries(
-    position: tuple[int, int], amplitude: int | None
-) -> tuple[tuple[int, int], int | None]:
-    entries = tuple(count("position", entry, least=0) for entry in position)
-    if len(entries) != 2:
-        raise ValueError(f"position must name two entries of the state; got {position}")
-    if amplitude is not None:
-        amplitude = count("amplitude", amplitude, least=0)
-    if len({*entries, amplitude}) != 3:
-        raise ValueError(
-            f"position and amplitude must be different entries; got {position}, {amplitude}"
-        )
-    return (entries[0], entries[1]), amplitude
-
-
-def _moments(
-    sigma: float | Float | None, n_snapshots: int, exact: bool, n: int
-) -> tuple[float, Float]:
-    """Return the bias and the variances of readings."""
-    bias, variance = 0.0, np.full(n, 1 / (4 * n_snapshots))
-    if sigma is not None:
-        variance = np.broadcast_to(np.square(sigma), n).copy()
-    elif exact:
-        mean, spread = log_envelope_moments(n_snapshots)
-        bias, variance = float(mean), np.full(n, float(spread))
-    variance.setflags(write=False)
-    return bias, variance

@@ -45,6 +45,11 @@ from arrivals.scenarios.study import Study
 from arrivals.scenarios.swellex96 import TowPastLine
 from arrivals.scenarios.unlabelled import best_assignment_rmse
 from arrivals.scenarios.waveguides import BottomLayer, Waveguide
+from arrivals.scenarios.rss import RSSTrial, Table1K3, Table1K7
+from arrivals.scenarios.rss_bounds import rss_bound
+from arrivals.scenarios.rss_calibration import Calibration, calibrate
+from arrivals.scenarios.rss_metrics import huber, scores
+from arrivals.scenarios.rss_moving import BirthsAndDeaths, CrossingSources
 
 __all__ = [
     "AutoregressiveField",

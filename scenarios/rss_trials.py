@@ -16,7 +16,8 @@ from arrivals.scenarios.rss import FixedSources, in_disc
 from arrivals.trackers.rss_cycles import Cycling, Solution, solve
 from arrivals.trackers.rss_map import Method, maximum
 from arrivals.trackers.rss_problem import Marginals, Prior, Problem, marginals
-from arrivals.trackers.rss_start import Newcomers, grown, refined
+from arrivals.trackers.rss_scan import Newcomers
+from arrivals.trackers.rss_start import grown, refined
 from arrivals.typing import Float
 
 

@@ -7,12 +7,14 @@ import pytest
 
 from arrivals.measurement_models import LogNormalRSS, db_to_neper
 from arrivals.motion_models import ConstantVelocity, RandomWalk
-from arrivals.scenarios.rss import BirthsAndDeaths, in_disc
+from arrivals.scenarios.rss import in_disc
 from arrivals.scenarios.rss_births import gospa_over_time, told_nothing, told_the_truth
+from arrivals.scenarios.rss_moving import BirthsAndDeaths
 from arrivals.trackers import RSSML, RSSVB
 from arrivals.trackers.rss_births import SURE, Census
 from arrivals.trackers.rss_problem import Prior, Problem
-from arrivals.trackers.rss_start import Fit, Newcomers, best, grown, nothing, refined, scan
+from arrivals.trackers.rss_scan import Newcomers, scan
+from arrivals.trackers.rss_start import Fit, best, grown, nothing, refined
 from arrivals.typing import Float
 
 NOISE = float(db_to_neper(40.0))

@@ -9,8 +9,9 @@ from scipy.differentiate import hessian, jacobian
 from arrivals.measurement_models import LogNormalRSS, db_to_neper
 from arrivals.measurement_models.path_loss import Field
 from arrivals.motion_models import ConstantVelocity, CoordinatedTurn, RandomWalk
-from arrivals.scenarios.rss import CrossingSources, Table1K3, Table1K7
+from arrivals.scenarios.rss import Table1K3, Table1K7
 from arrivals.scenarios.rss_metrics import scores
+from arrivals.scenarios.rss_moving import CrossingSources
 from arrivals.scenarios.rss_trials import answers, bounds, draws
 from arrivals.trackers import RSSML, RSSVB
 from arrivals.trackers.rss_belief import Sources, unflat

@@ -129,3 +129,16 @@ def transitions(motion: MotionModel, x: Float, dt: float) -> Float:
 def empty(n: int) -> Sources:
     """Return no source, of states of n entries."""
     return Sources(np.zeros((0, n)), np.zeros((0, n, n)), np.zeros(0), np.zeros(0))
+
+
+def where_finite(moved: Sources, before: Sources) -> Sources:
+    """Return a batch of beliefs after a step, and before it where something is not finite."""
+    sound = np.ones(len(moved.u), dtype=np.bool_)
+    for part in moved:
+        sound &= np.isfinite(part).reshape(len(part), -1).all(axis=1)
+    if sound.all():
+        return moved
+    return Sources(*(
+        np.where(sound.reshape(-1, *[1] * (new.ndim - 1)), new, old)
+        for new, old in zip(moved, before, strict=True)
+    ))  # fmt: skip

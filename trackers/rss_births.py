@@ -10,7 +10,8 @@ import numpy as np
 from arrivals.trackers.rss_belief import Sources
 from arrivals.trackers.rss_found import Found, found_of, in_batch
 from arrivals.trackers.rss_problem import Marginals, Problem
-from arrivals.trackers.rss_start import Fit, Newcomers
+from arrivals.trackers.rss_scan import Newcomers
+from arrivals.trackers.rss_start import Fit
 from arrivals.typing import Bool, Float, Int
 
 if TYPE_CHECKING:

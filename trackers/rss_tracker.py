@@ -17,7 +17,7 @@ from arrivals.trackers.gaussians import likelihood
 from arrivals.trackers.given import as_measurement
 from arrivals.trackers.recorder import Run
 from arrivals.trackers.rss_batch import run_in_chunks
-from arrivals.trackers.rss_belief import Sources, unflat
+from arrivals.trackers.rss_belief import Sources, unflat, where_finite
 from arrivals.trackers.rss_births import Census, counted
 from arrivals.trackers.rss_found import Found, Status, Told, found_of, in_batch
 from arrivals.trackers.rss_given import (
@@ -29,7 +29,8 @@ from arrivals.trackers.rss_given import (
 )
 from arrivals.trackers.rss_problem import Problem
 from arrivals.trackers.rss_quality import Quality, quality
-from arrivals.trackers.rss_start import Fit, Newcomers, best, grown, refined
+from arrivals.trackers.rss_scan import Newcomers
+from arrivals.trackers.rss_start import Fit, best, grown, refined
 from arrivals.trackers.slots import padded
 from arrivals.typing import Bool, Float
 
@@ -209,7 +210,7 @@ class RSSTracker(Tracker):
             found.u, found.theta, found.marginals, self.xy, self.motion.angles
         )  # fmt: skip
         judged = self._judged(problem._replace(W=told.full), found)
-        return _where_finite(moved, sources), found, judged
+        return where_finite(moved, sources), found, judged
 
     def _judged(self, problem: Problem, found: Found) -> Quality:
         with np.errstate(over="ignore", invalid="ignore"):
@@ -297,16 +298,3 @@ class RSSTracker(Tracker):
         z = [[as_measurement(np.nan if one is None else one, m) for one in row]
              for row in sequences]  # fmt: skip
         return run_in_chunks(self, self.measurement.readings(np.array(z)), dt)
-
-
-def _where_finite(moved: Sources, before: Sources) -> Sources:
-    """Return a batch of beliefs after a step, and before it where something is not finite."""
-    sound = np.ones(len(moved.u), dtype=np.bool_)
-    for part in moved:
-        sound &= np.isfinite(part).reshape(len(part), -1).all(axis=1)
-    if sound.all():
-        return moved
-    return Sources(*(
-        np.where(sound.reshape(-1, *[1] * (new.ndim - 1)), new, old)
-        for new, old in zip(moved, before, strict=True)
-    ))  # fmt: skip
