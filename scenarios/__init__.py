@@ -34,10 +34,11 @@ from arrivals.scenarios.networks import Network, read_network
 from arrivals.scenarios.plots import plot_array, plot_bearing_time
 from arrivals.scenarios.readers import read
 from arrivals.scenarios.recordings import Recording, Snapshots
-from arrivals.scenarios.rss import BirthsAndDeaths, CrossingSources, RSSTrial, Table1K3, Table1K7
+from arrivals.scenarios.rss import RSSTrial, Table1K3, Table1K7
 from arrivals.scenarios.rss_bounds import rss_bound
 from arrivals.scenarios.rss_calibration import Calibration, calibrate
 from arrivals.scenarios.rss_metrics import huber, scores
+from arrivals.scenarios.rss_moving import BirthsAndDeaths, CrossingSources
 from arrivals.scenarios.runner import monte_carlo
 from arrivals.scenarios.separation import nmse, sdr
 from arrivals.scenarios.speech import SpeechField, SpeechOfOrderTwo
@@ -45,11 +46,6 @@ from arrivals.scenarios.study import Study
 from arrivals.scenarios.swellex96 import TowPastLine
 from arrivals.scenarios.unlabelled import best_assignment_rmse
 from arrivals.scenarios.waveguides import BottomLayer, Waveguide
-from arrivals.scenarios.rss import RSSTrial, Table1K3, Table1K7
-from arrivals.scenarios.rss_bounds import rss_bound
-from arrivals.scenarios.rss_calibration import Calibration, calibrate
-from arrivals.scenarios.rss_metrics import huber, scores
-from arrivals.scenarios.rss_moving import BirthsAndDeaths, CrossingSources
 
 __all__ = [
     "AutoregressiveField",
