@@ -100,7 +100,7 @@ class SVALSE(VALSE):
         engine: EngineName = "fast",
         reference: Reference = "middle",
         posterior: PosteriorName = "quadrature",
-        tolerance: float | None = None,
+        tolerance: float = 1e-4,
         max_iterations: int = 500,
         max_components: int | None = None,
         kl: float = 0.5,
@@ -139,21 +139,18 @@ class SVALSE(VALSE):
         """
         super().predict(u, dt=dt)
 
-    def _move(self, trackers: Sequence[Self], dt: float) -> None:
+    def _move(self, trackers: Sequence[Self], dt: float, manifold: Manifold) -> None:
         mu, kappa, existence = (
             np.stack([getattr(tracker, name) for tracker in trackers])
             for name in ("mu", "kappa", "existence")
         )
         carried = ~np.isnan(mu)
-        slope = self.measurement.manifold(self.reference).slope(np.where(carried, mu, 0.0))
+        slope = manifold.slope(np.where(carried, mu, 0.0))
         kappa = self.motion.blur(kappa, dt, slope)
         rho = np.where(carried, self.motion.predict_existence(existence, dt), 0.0)
         birth = float(self.motion.predict_existence(0.0, dt))
         for i, tracker in enumerate(trackers):
             tracker.kappa, tracker.existence, tracker.birth = kappa[i], rho[i], birth
-
-    def _expect(self) -> None:
-        self._show(self._expected(self.measurement.manifold(self.reference)))
 
     def _absorb(self, manifold: Manifold, fit: Fit) -> None:
         """Take in a fit: report and label what is active, carry what is to be remembered."""
@@ -202,17 +199,18 @@ class SVALSE(VALSE):
         self.label = padded(label, n, -1).astype(np.int64)
         self.age = padded(age, n, 0).astype(np.int64)
 
-    def _expected(self, manifold: Manifold) -> DirectionEstimate:
-        """Return what is likely to be there, before it is measured."""
+    def _expect(self, manifold: Manifold) -> None:
+        """Show what is likely to be there, before it is measured."""
         likely = np.flatnonzero(self.carried & (self.existence >= 0.5) & (self.label >= 0))
         std = circular_std(bessel_ratio(self.kappa[likely]))
         real = ~np.isnan(manifold.to_doa(self.mu[likely], 3 * std))
         likely, std = likely[real], std[real]
         theta = self.mu[likely]
-        return DirectionEstimate(
+        expected = DirectionEstimate(
             doa=manifold.to_doa(theta, slack=np.inf),
             std=manifold.doa_std(theta, std),
             existence=self.existence[likely],
             amplitude=np.full(len(theta), complex(np.nan, np.nan)),
             label=self.label[likely],
         )
+        self._show(expected)

@@ -45,9 +45,9 @@ class VALSE(Tracker):
     posterior : {"quadrature", "mixture"}
         How coordinate ascent integrates the angles' densities; "mixture" is the paper's
         Heuristic 1.
-    tolerance : float, optional
-        Where the iteration rests. Fast: change of the bound, nats, 1e-5 if None. Coordinate:
-        relative change of the reconstruction, 1e-4 if None; the paper's is 1e-6.
+    tolerance : float
+        Where the iteration rests. Fast: change of the bound, nats. Coordinate: relative change of
+        the reconstruction; the paper's is 1e-6.
     max_iterations : int
         Iterations at most; a step that needs more is reported as not converged.
     max_components : int, optional
@@ -93,7 +93,7 @@ class VALSE(Tracker):
         engine: EngineName = "fast",
         reference: Reference = "middle",
         posterior: PosteriorName = "quadrature",
-        tolerance: float | None = None,
+        tolerance: float = 1e-4,
         max_iterations: int = 500,
         max_components: int | None = None,
         kl: float = 0.5,
@@ -104,7 +104,7 @@ class VALSE(Tracker):
         self.posterior = one_of("posterior", posterior, ("quadrature", "mixture"))
         if engine == "fast" and posterior == "mixture":
             raise ValueError("posterior='mixture' needs engine='coordinate'; got engine='fast'")
-        self.tolerance = tolerance if tolerance is None else positive("tolerance", tolerance)
+        self.tolerance = positive("tolerance", tolerance)
         self.kl = probability("kl", kl)
         self.max_iterations = count("max_iterations", max_iterations)
         self.max_components = max_components
@@ -124,12 +124,11 @@ class VALSE(Tracker):
             "merge": merge,
             "snr_db": snr_db,
             "max_components": self.max_components,
+            "tolerance": self.tolerance,
         }
-        if self.tolerance is not None:
-            settings["tolerance"] = self.tolerance
         if self.engine == "fast":
             return JointNewton(kl=self.kl, **settings)
-        return CoordinateAscent(self.posterior, descending=snr_db is None, **settings)
+        return CoordinateAscent(posterior=self.posterior, descending=snr_db is None, **settings)
 
     @property
     def n_slots(self) -> int:
@@ -139,15 +138,16 @@ class VALSE(Tracker):
 
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
         """Forget: nothing is carried from snapshot to snapshot."""
-        self._move([self], not_negative("dt", dt))
-        self._expect()
+        manifold = self.measurement.manifold(self.reference)
+        self._move([self], not_negative("dt", dt), manifold)
+        self._expect(manifold)
 
     def update(self, z: ArrayLike | None) -> None:
         """Fit one snapshot, (n_sensors,); sensors that are NaN or infinite are left out."""
         looks = self._looks(z)
         if looks is not None:
             Y, dead = looks
-            manifold = self._manifold(dead)
+            manifold = self.measurement.manifold(self.reference).without(np.flatnonzero(dead))
             self._absorb(manifold, self.solver.fit(Y, manifold, self._prediction()))
 
     def run_batch(
@@ -173,26 +173,27 @@ class VALSE(Tracker):
 
     def _together(self, trackers: Sequence[Self], step: Sequence[Any], dt: float) -> None:
         """Predict and update copies of this tracker, those with the same sensors in one call."""
-        self._move(trackers, dt)
+        whole = self.measurement.manifold(self.reference)
+        self._move(trackers, dt, whole)
         groups: dict[bytes, list[tuple[Self, Complex, Bool]]] = {}
         for tracker, z in zip(trackers, step, strict=True):
             looks = tracker._looks(z)
             if looks is None:
-                tracker._expect()
+                tracker._expect(whole)
             else:
                 groups.setdefault(looks[1].tobytes(), []).append((tracker, *looks))
         for group in groups.values():
-            manifold = self._manifold(group[0][2])
+            manifold = whole.without(np.flatnonzero(group[0][2]))
             fits = self.solver.fit_batch(
                 [Y for _, Y, _ in group], manifold, [tracker._prediction() for tracker, *_ in group]
             )
             for (tracker, *_), fit in zip(group, fits, strict=True):
                 tracker._absorb(manifold, fit)
 
-    def _move(self, trackers: Sequence[Self], dt: float) -> None:
+    def _move(self, trackers: Sequence[Self], dt: float, manifold: Manifold) -> None:
         """Move the beliefs of copies of this tracker by `dt`: there are none."""
 
-    def _expect(self) -> None:
+    def _expect(self, manifold: Manifold) -> None:
         """Show what is expected before a measurement: nothing."""
         self._nothing()
 
@@ -203,10 +204,6 @@ class VALSE(Tracker):
         Y = self.measurement.looks(np.asarray(z))
         dead = np.asarray(np.isnan(Y).any(axis=(0, 2)))
         return (Y[:, ~dead], dead) if dead.any() else (Y, dead)
-
-    def _manifold(self, dead: Bool) -> Manifold:
-        """Return the manifold of the sensors that gave a number."""
-        return self.measurement.manifold(self.reference).without(np.flatnonzero(dead))
 
     def _prediction(self) -> Prediction | None:
         """Return what is known before the snapshot: nothing."""
