@@ -106,7 +106,9 @@ def test_parameters_are_set_by_nested_names(
 ) -> None:
     assert main(track(scene, "--tracker", "cbf", "--set", "max_sources=1")) == 0
     assert len(table(capsys.readouterr().out)) == 20
-    settings = ("--set", "motion__kappa=300", "--set", "reference=first")
+    settings = ("--set", "motion__sigma_doa=0.02", "--set", "reference=first")
+    assert main(track(scene, *settings)) == 0
+    settings = ("--set", "motion__kappa=300", "--set", "motion__sigma_doa=None")
     assert main(track(scene, *settings)) == 0
 
 

@@ -85,7 +85,7 @@ def slope_of(state: State, row: int, k: int, h: float, response: Response) -> fl
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_gradients_are_slopes(seed: int, model: ArraySnapshot) -> None:
     state, response = scene(seed, model), Response(model.manifold())
-    g, curvature = slopes(state, weights(state))
+    g, curvature = slopes(state, *weights(state))
     of_s = 0.5 / state.facts[0, S] - 0.5 * curvature[0]
     for k in range(5):
         s = float(state.facts[0, S, k])
@@ -103,12 +103,12 @@ def test_hessian_is_the_slope_of_the_gradient_to_a_hundredth(model: ArraySnapsho
     state, response = scene(0, model), Response(model.manifold())
     for _ in range(5):
         state = ascend(response, state, NONE)
-    P = weights(state)
-    N = negative_hessian(state, P, slopes(state, P)[1])
+    v, P = weights(state)
+    N = negative_hessian(state, P, slopes(state, v, P)[1])
     np.testing.assert_allclose(N, N.swapaxes(1, 2), atol=1e-9 * np.abs(N).max())
     for k in range(5):
         ends = [shifted(state, MU, k, h, response) for h in (1e-6, -1e-6)]
-        up, down = (slopes(end, weights(end))[0][0] for end in ends)
+        up, down = (slopes(end, *weights(end))[0][0] for end in ends)
         np.testing.assert_allclose(N[0, :, k], (down - up) / 2e-6, atol=0.01 * np.abs(N).max())
 
 

@@ -293,3 +293,14 @@ def test_manifold_has_room_for_more_axes() -> None:
     assert manifold.nuisance_weights.tolist() == [1.0]
     with pytest.raises(ValueError, match="reference must be one of"):
         MODELS[0].manifold("last")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("spacing", [0.5, 0.3])
+def test_slope_is_the_derivative_of_the_angle(spacing: float) -> None:
+    """Down to a tenth of the broadside's, where the direction is not to be told any more."""
+    line = ArraySnapshot(SensorArray.ula(7, spacing), wavelength=1.0).manifold()
+    doa = np.deg2rad([-80.0, -30.0, 0.0, 12.0, 75.0])
+    slope = (line.from_doa(doa + 1e-6) - line.from_doa(doa - 1e-6)) / 2e-6
+    np.testing.assert_allclose(line.slope(line.from_doa(doa)), slope, rtol=1e-6)
+    broadside = line.slope(0.0)
+    np.testing.assert_allclose(line.slope(line.from_doa(np.pi / 2)), 0.1 * broadside)

@@ -308,3 +308,35 @@ def test_concentration_of_a_walk_is_positive(kappa: float) -> None:
 
 def test_walk_wraps_its_states() -> None:
     np.testing.assert_allclose(VonMisesWalk(1.0).f([[4.0], [1.0]]), [[4.0 - 2 * np.pi], [1.0]])
+
+
+# a walk in direction
+
+
+def test_a_walk_in_direction_widens_by_the_same_angle_everywhere() -> None:
+    """σ_θ = σ_β dθ/dβ: the concentration of the step is of each component."""
+    walk, slope = VonMisesWalk(sigma_doa=0.02), np.array([3.0, 1.0, 0.3])
+    np.testing.assert_allclose(walk.step(slope), (0.02 * slope) ** -2.0)
+    widened = walk.blur([np.inf] * 3, slope=slope)
+    np.testing.assert_allclose(1 / np.sqrt(widened) / slope, 0.02, rtol=1e-3)
+    twice = walk.blur(walk.blur([50.0, 500.0, 5000.0], slope=slope), slope=slope)
+    once = walk.blur([50.0, 500.0, 5000.0], dt=2.0, slope=slope)
+    np.testing.assert_allclose(once, twice, rtol=1e-9)
+
+
+def test_a_walk_of_its_own_width_asks_for_no_slope() -> None:
+    walk = VonMisesWalk(50.0)
+    np.testing.assert_array_equal(walk.blur([1.0, 100.0], slope=7.0), walk.blur([1.0, 100.0]))
+    np.testing.assert_allclose(VonMisesWalk(sigma_doa=0.1).Q(), VonMisesWalk(100.0).Q())
+
+
+@pytest.mark.parametrize("params", [{}, {"kappa": 3.0, "sigma_doa": 0.1}])
+def test_a_walk_has_one_width(params: dict[str, float]) -> None:
+    with pytest.raises(ValueError, match="give one of kappa and sigma_doa, and None for the other"):
+        VonMisesWalk(**params)
+
+
+@pytest.mark.parametrize("params", [{"sigma_doa": 0.0}, {"sigma_doa": -1.0}, {"kappa": np.inf}])
+def test_a_width_is_positive(params: dict[str, float]) -> None:
+    with pytest.raises(ValueError, match="must be finite and positive"):
+        VonMisesWalk(**params)

@@ -51,13 +51,15 @@ class JointNewton:
         Newton steps after a move, after one while filling, and at the end.
     inner_tolerance : float
         Change of the ELBO, nats, at which those after a move rest.
+    far : float
+        Gain of a Newton step, nats, after which another follows in any case.
     grid : int
         Angles for each sensor at which components may be born.
     max_moves : int
         Changes of the support at most.
     """
 
-    tolerance: float = 1e-5
+    tolerance: float = 1e-4
     max_iterations: int = 500
     merge: float = np.deg2rad(1.5)
     snr_db: float | None = 20.0
@@ -70,7 +72,8 @@ class JointNewton:
     fill_inner: int = 2
     final: int = 12
     inner_tolerance: float = 1e-2
-    grid: int = 8
+    far: float = 10.0
+    grid: int = 4
     max_moves: int = 60
 
     def fit(self, Y: Complex, manifold: Manifold, prediction: Prediction | None) -> Fit:
@@ -119,7 +122,7 @@ class JointNewton:
                         break
                     work = work.take(~work.done)
                 work.state, work.saved = work.state.trimmed(), work.saved.trimmed()
-            climb(moves.response, work)
+            self.climb(moves.response, work)
         return [fits[n] for n in range(len(problems))]
 
     def moves(self, manifold: Manifold, most: int) -> Moves:
@@ -138,11 +141,12 @@ class JointNewton:
             max_iterations=self.max_iterations,
         )
 
-
-def climb(response: Response, work: Work) -> None:
-    """Take one Newton step in every problem."""
-    before = work.state.F
-    work.state = ascend(response, work.state, work.learn)
-    work.iterations = work.iterations + 1
-    rests = np.abs(work.state.F - before) < work.tolerance
-    work.left = np.where(rests, 0, work.left - 1)
+    def climb(self, response: Response, work: Work) -> None:
+        """Take one Newton step in every problem; a burst goes on while its steps gain much."""
+        before = work.state.F
+        work.state = ascend(response, work.state, work.learn)
+        work.iterations = work.iterations + 1
+        gain = np.abs(work.state.F - before)
+        left = np.where(gain > self.far, np.maximum(work.left, 2), work.left)
+        work.left = np.where(gain < work.tolerance, 0, left - 1)
+        work.left = np.minimum(work.left, self.max_iterations - work.iterations)

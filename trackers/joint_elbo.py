@@ -108,6 +108,8 @@ class State(Rows):
         What odds and divergences give to the ELBO.
     w, G : ndarray, shapes (B, L), (B, L, L)
         Means of the amplitudes; their covariance is ν G.
+    explained : ndarray, shape (B,)
+        hᴴŵ.
     F : ndarray, shape (B,)
         The ELBO, up to a constant of the step.
     """
@@ -128,7 +130,11 @@ class State(Rows):
     prior: Float
     w: Complex
     G: Complex
+    explained: Float
     F: Float
+
+    def __len__(self) -> int:
+        return len(self.K)
 
     @property
     def TT(self) -> Complex:
@@ -143,7 +149,8 @@ class State(Rows):
         return State(
             self.y, self.facts[:, :, :L], self.K, self.used[:, :L], self.nu, self.tau, self.rest,
             self.A[:, :L], self.X[:, :, :L, :L], self.h[:, :, :L], self.size[:, :L],
-            self.pull[:, :L], self.D[:, :L], self.prior, self.w[:, :L], self.G[:, :L, :L], self.F,
+            self.pull[:, :L], self.D[:, :L], self.prior, self.w[:, :L], self.G[:, :L, :L],
+            self.explained, self.F,
         )  # fmt: skip
 
     def criterion(self, kl: float) -> Float:
@@ -157,7 +164,7 @@ def evaluate(
     """Return the state of given components and variances."""
     B, _, L = facts.shape
     used = np.arange(L) < K[:, None]
-    padded = not used.all()
+    padded = min(K.tolist()) < L
     s = np.where(used, facts[:, S], 1.0) if padded else facts[:, S]
     stack = response(facts[:, MU], s)
     if padded:
@@ -175,10 +182,11 @@ def evaluate(
     if padded:
         pull, D, each = pull * used, D * used, each * used
     prior = rest + each.sum(axis=1)
-    w, G, F = amplitudes(X[:, 0], h[:, 0], used, K, nu, tau, y.shape[1])
+    w, G, explained, F = amplitudes(X[:, 0], h[:, 0], used, K, nu, tau, y.shape[1])
     return State(
-        y, facts, K, used, nu, tau, rest, stack[:, 0], X, h, size, pull, D, prior, w, G, F + prior
-    )
+        y, facts, K, used, nu, tau, rest, stack[:, 0], X, h, size, pull, D, prior,
+        w, G, explained, F + prior,
+    )  # fmt: skip
 
 
 def diagonals(X: Array) -> Array:
@@ -190,17 +198,17 @@ def diagonals(X: Array) -> Array:
 def with_variances(state: State, nu: Float, tau: Float) -> State:
     """Return the state with other variances; the angles stay."""
     s = state
-    w, G, F = amplitudes(s.X[:, 0], s.h[:, 0], s.used, s.K, nu, tau, s.y.shape[1])
+    w, G, explained, F = amplitudes(s.X[:, 0], s.h[:, 0], s.used, s.K, nu, tau, s.y.shape[1])
     return State(
         s.y, s.facts, s.K, s.used, nu, tau, s.rest, s.A, s.X, s.h, s.size, s.pull, s.D, s.prior,
-        w, G, F + s.prior,
+        w, G, explained, F + s.prior,
     )  # fmt: skip
 
 
 def amplitudes(
     J: Complex, h: Complex, used: Bool, K: Int, nu: Float, tau: Float, M: int
-) -> tuple[Complex, Complex, Float]:
-    """Return ŵ = G h, G = (J + ν/τ I)⁻¹, and what they and the noise give to the ELBO."""
+) -> tuple[Complex, Complex, Float, Float]:
+    """Return ŵ = G h, G = (J + ν/τ I)⁻¹, hᴴŵ, and what all this gives to the ELBO."""
     ratio = nu / tau
     regularised = J.copy()
     # 1 where unused: no part in the determinant
@@ -209,4 +217,4 @@ def amplitudes(
     w = (G @ h[:, :, None])[:, :, 0]
     explained = (h.conj() * w).real.sum(axis=1)
     F = (explained - M) / nu - M * np.log(np.pi * nu) + K * np.log(ratio)
-    return w, G, F - np.linalg.slogdet(regularised)[1]
+    return w, G, explained, F - np.linalg.slogdet(regularised)[1]

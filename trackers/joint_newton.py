@@ -20,24 +20,24 @@ from arrivals.trackers.noise_start import NOISE_FLOOR
 from arrivals.typing import Bool, Complex, Float
 
 LARGEST_VARIANCE = 0.3  # rad²: a wrapped normal density of more is no longer normal
+ROUNDING = 1e-7  # nats
 SMALLEST_CURVATURE = 1e-3  # of the largest: what is flatter is no direction to run along
 
 
-def weights(state: State) -> Complex:
-    """Return Pₗₗ' = ŵ*ₗ ŵₗ'/ν + Gₗ'ₗ, (B, L, L)."""
-    wc = state.w.conj() / state.nu[:, None]
-    return np.asarray(wc[:, :, None] * state.w[:, None] + state.G.swapaxes(1, 2))
+def weights(state: State) -> tuple[Complex, Complex]:
+    """Return ŵ*/ν, (B, L), and Pₗₗ' = ŵ*ₗ ŵₗ'/ν + Gₗ'ₗ, (B, L, L)."""
+    v = state.w.conj() / state.nu[:, None]
+    return v, v[:, :, None] * state.w[:, None] + state.G.swapaxes(1, 2)
 
 
-def slopes(state: State, P: Complex) -> tuple[Float, Float]:
+def slopes(state: State, v: Complex, P: Complex) -> tuple[Float, Float]:
     """Return ∂F/∂μ and the curvature with the amplitudes held, -∂²F/∂μ², both (B, L).
 
     The fixed point of the variances is s = 1/curvature: ∂F/∂s = 1/2s - curvature/2.
     """
     # Re (∂â)ᴴη and Re (∂²â)ᴴη, with ηₗ = 2/ν w*ₗ y - 2 Σ Pₗₗ' âₗ' over all others (33)
-    own = (state.w.conj() / state.nu[:, None])[:, None] * state.h[:, 1:]
     others = (P[:, None] * state.X[:, 1:3]).sum(axis=3)
-    both = 2 * (own - others).real
+    both = 2 * (v[:, None] * state.h[:, 1:] - others).real
     return both[:, 0] - state.pull.imag, state.pull.real - both[:, 1]
 
 
@@ -46,11 +46,10 @@ def negative_hessian(state: State, P: Complex, curvature: Float) -> Float:
 
     One term of second order, tr(G ∂J G ∂J), is left out.
     """
-    TA, w = state.X[:, 1], state.w
-    B = -(TA.conj().swapaxes(1, 2) * w[:, None])  # of h - (J + ν/τ I) w with respect to each μ
-    B = np.ascontiguousarray(B)
-    diagonals(B)[...] = state.h[:, 1] - (TA @ w[:, :, None])[:, :, 0]
-    gained = (B.conj().swapaxes(1, 2) @ (state.G @ B)).real / state.nu[:, None, None]
+    TA, w = state.X[:, 1], state.w[:, :, None]
+    B = TA.conj() * -w  # row l: the derivative of h - (J + ν/τ I) w with respect to μₗ
+    diagonals(B)[...] = state.h[:, 1] - (TA @ w)[:, :, 0]
+    gained = (B.conj() @ state.G @ B.swapaxes(1, 2)).real / state.nu[:, None, None]
     N = np.asarray(2 * ((P * state.TT).real - gained))
     diagonals(N)[...] += curvature
     return N
@@ -75,8 +74,8 @@ def ascend(response: Response, state: State, learn: Bool) -> State:
     state : State
     learn : ndarray of bool, shape (B,)
     """
-    P = weights(state)
-    g, curvature = slopes(state, P)
+    v, P = weights(state)
+    g, curvature = slopes(state, v, P)
     d = direction(g, negative_hessian(state, P, curvature), 2 / response.extent)
     s = 1 / np.maximum(curvature, 1 / LARGEST_VARIANCE)
     best = moved(response, state, d, s)
@@ -114,8 +113,7 @@ def shortened(response: Response, state: State, d: Float, s: Float) -> State:
 
 def fell(new: State, old: State) -> Bool:
     """Tell in which rows F fell by more than rounding."""
-    rounding = 1e-9 + 1e-13 * new.y.shape[1] / old.nu
-    return np.asarray(~(old.F - rounding <= new.F))
+    return np.asarray(~(new.F >= old.F - ROUNDING))
 
 
 def learned(response: Response, state: State) -> State:
@@ -129,7 +127,7 @@ def learned(response: Response, state: State) -> State:
     energy = w2.sum(axis=1)
     trace = (state.G.diagonal(axis1=1, axis2=2).real * state.used).sum(axis=1)
     # ‖y‖² - 2 Re hᴴŵ + ŵᴴJŵ, since Jŵ = h - ν/τ ŵ and ‖y‖² = M
-    E = M - (state.h[:, 0].conj() * state.w).real.sum(axis=1) - ratio * energy
+    E = M - state.explained - ratio * energy
     gamma = K - ratio * trace  # tr JG
     lost = (w2 * (response.norm2 - state.size)).sum(axis=1)
     S = np.minimum(lost, 0.5 * K * state.nu)

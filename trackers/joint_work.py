@@ -120,6 +120,9 @@ class Work(Rows):
     iterations: Int
     moves: Int
 
+    def __len__(self) -> int:
+        return len(self.row)
+
 
 def start(
     problems: Sequence[Problem], response: Response, snr_db: float | None, n_angles: int, most: int
