@@ -117,10 +117,9 @@ def simulated(rows: Sequence[Row], runs: int) -> None:
         found = []
         for seed in tqdm(range(runs), desc=row.scene, leave=False):
             trial = create(row.scene, **row.numbers).sample(np.random.default_rng(seed))
-            levels = (3.0, 6.0, 10.0, 13.0) if row.method == "cbf" else (None,)
-            tries: list[dict[str, Any]] = [
-                row.params if dB is None else {"threshold_db": dB} for dB in levels
-            ]
+            tries: list[dict[str, Any]] = [row.params]
+            if row.method == "cbf":
+                tries = [{"threshold_db": level} for level in (3.0, 6.0, 10.0, 13.0)]
             found.append([scored(trial, trial.tracker(row.method, **each)) for each in tries])
         best = min(range(len(found[0])), key=lambda i: np.mean([each[i][0] for each in found]))
         values = np.array([each[best] for each in found])

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from rss_trackers import TRACKERS as RSS_TRACKERS
 from subspace_trackers import TRACKERS as SUBSPACE_TRACKERS
 
-from arrivals.measurement_models import ArraySnapshot, SensorArray
+from arrivals.measurement_models import ArraySnapshot, ElementResponse, SensorArray
 from arrivals.motion_models import BernoulliVonMises
 from arrivals.params import Model
 from arrivals.trackers import (
@@ -39,6 +39,8 @@ from arrivals.trackers.conformance import (
 
 LINE = ArraySnapshot(SensorArray.ula(9, spacing=0.5), wavelength=1.0, noise=1e-3)
 CIRCLE = ArraySnapshot(SensorArray.uca(7, radius=0.5), wavelength=1.0, noise=1e-3)
+LOOKS = CIRCLE.replace(wavelength=[1.0, 1.4], n_snapshots=2)
+SLOWNESS = LOOKS.replace(slowness=[0.9, 1.0, 1.1], response=ElementResponse.first_order([0.3] * 7))
 GAPS = ArraySnapshot(SensorArray.ula(10, 0.4, missing=[2]), wavelength=1.0, noise=1e-3)
 
 
@@ -47,7 +49,7 @@ def two_sources(model: ArraySnapshot, n_steps: int = 4) -> Measurements:
     on = np.arange(n_steps) > 0
     doa = np.stack([0.5 + 0.02 * np.arange(n_steps), np.where(on, -0.4, np.nan)], axis=-1)
     z = model.simulate(doa, [1.0, 0.8j], np.random.default_rng(5))
-    z[1, 3] = np.nan
+    z[1, ..., 3] = np.nan
     z[-1] = 0.0
     return z
 
@@ -74,6 +76,14 @@ GRIDLESS: list[tuple[str, MakeTracker, Measurements]] = [
             LINE, engine="coordinate", reference="first", posterior="mixture", tolerance=1e-6
         ),
         two_sources(LINE, n_steps=3),
+    ),
+    ("cbf", lambda: CBF(SLOWNESS, n_directions=90), two_sources(SLOWNESS)),
+    ("valse", lambda: VALSE(LOOKS, temper=2.0, max_snr_db=25.0), two_sources(LOOKS)),
+    ("svalse", lambda: SVALSE(CIRCLE), two_sources(CIRCLE)),
+    (
+        "svalse",
+        lambda: SVALSE(SLOWNESS, BernoulliVonMises(sigma_doa=0.05), carry="posterior"),
+        two_sources(SLOWNESS),
     ),
 ]
 # A new tracker gets its line here, or in the list that is about its kind.

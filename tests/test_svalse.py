@@ -383,13 +383,8 @@ def test_coordinate_ascent_on_figures_4_to_6(
 # -- what is refused --------------------------------------------------------------------------
 
 
-def test_what_is_no_uniform_line_is_refused() -> None:
-    circle = LINE.replace(array=SensorArray.uca(8, radius=0.5))
-    irregular = LINE.replace(array=SensorArray(np.sqrt([0.0, 0.2, 0.7, 1.9])))
-    for model in (circle, irregular):
-        with pytest.raises(ValueError, match="line of sensors on a uniform grid"):
-            SVALSE(model)
-    with pytest.raises(ValueError, match="alias limit of two grid spacings, 1 m"):
+def test_a_grid_wider_than_half_a_wavelength_warns_of_the_first_two_directions_alike() -> None:
+    with pytest.warns(UserWarning, match=r"directions -90\.0 and 53\.1 degrees look alike"):
         SVALSE(LINE.replace(wavelength=0.9))
 
 
