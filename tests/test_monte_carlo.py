@@ -68,7 +68,9 @@ def test_threads_and_processes_give_equal_numbers(
 
 def test_size_of_a_batch_does_not_matter(serial: list[tuple[Any, ...]]) -> None:
     study = monte_carlo(SHORT, TRACKERS, 5, seed=3, metrics=METRICS, batch=5)
-    assert numbers(study) == serial
+    for ours, theirs in zip(numbers(study), serial, strict=True):
+        assert (ours[:4], ours[5]) == (theirs[:4], theirs[5])
+        assert float(ours[4]) == pytest.approx(float(theirs[4]), abs=1e-9, nan_ok=True)
 
 
 def test_fewer_methods_or_runs_are_a_part_of_more(serial: list[tuple[Any, ...]]) -> None:
@@ -400,8 +402,8 @@ def test_progress_counts_what_was_done_before(
 
 
 def test_svalse_is_better_than_ssbl_on_the_same_draws() -> None:
-    """Golden, section 12.1: -0.40 ± 0.07 on Fig. 6 over 20 seeds."""
+    """Section 12.1 has -0.40 ± 0.07 on Fig. 6 for coordinate ascent; the default does more."""
     scenario = PairsInTurn(n_steps=25)
     study = monte_carlo(scenario, ["ssbl", "svalse"], 4, seed=5, metrics=["gospa"], batch=3)
     off = study.paired("gospa", "svalse", "ssbl")
-    assert -1.0 < off.mean < 0.0
+    assert off.mean < -2 * off.error < 0.0

@@ -49,7 +49,7 @@ class VALSE(Tracker):
         How coordinate ascent integrates the angles' densities; "mixture" is the paper's
         Heuristic 1.
     tolerance : float, optional
-        Where the iteration rests. Fast: change of the bound, nats, 1e-5 if None. Coordinate:
+        Where the iteration rests. Fast: change of the bound, nats, 1e-4 if None. Coordinate:
         relative change of the reconstruction, 1e-4 if None; the paper's is 1e-6.
     max_iterations : int
         Iterations at most; a step that needs more is reported as not converged.
