@@ -87,7 +87,7 @@ def _add_track(commands: Any) -> None:
     option("--snr", type=float, default=0.0, metavar="DB", help="expected in the band (0)")
     option("--tracker", default="svalse", metavar="NAME", help="see `arrivals list` (svalse)")
     option("--set", action="append", default=[], type=_setting, metavar="NAME=VALUE",
-           help="parameter of the tracker, such as motion__p_activate=0.2; may be repeated")  # fmt: skip
+           help="parameter of the tracker, such as motion__p_activate=0.2; repeatable")  # fmt: skip
     option("--out", metavar="CSV", help="tracks file (standard output)")
     option("--signals", metavar="WAV",
            help="the separated sources, WAV or npy, of a tracker that tells them")  # fmt: skip
