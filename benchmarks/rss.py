@@ -467,7 +467,7 @@ def measured(folder: Path) -> None:
     line("exponent, shadowing", f"{known.alpha:.2f}, {known.sigma / level:.1f} dB", "2.5, 6.6 dB")
     _snapshots(single.take(eighth), fresh)
     before = calibrate(single.take(np.setdiff1d(np.arange(len(single)), first)), floor_db=FLOOR_DB)
-    for name, calibration in (("", known), (", calibrated on the other days' data", before)):
+    for name, calibration in (("", known), (", calibrated on the rest of the data", before)):
         for tau, wanted in ((4.0, "121, 224, 10.1"), (30.0, "124, 228, 2.99"),
                             (120.0, "110..140, 230, 0.7..2")):  # fmt: skip
             found = track_transmitter(single.take(first), calibration, tau=tau)
