@@ -28,7 +28,7 @@ METHODS = {
 
 
 def brp2012() -> tuple[ArraySnapshot, Complex, Float]:
-    """Return 20 minutes of a recorded infrasound array, in steps of 10 s every 5 s.
+    """Return 20 minutes of a recorded infrasound array, in steps of 10 s every 4.96 s.
 
     Returns
     -------
@@ -43,7 +43,7 @@ def brp2012() -> tuple[ArraySnapshot, Complex, Float]:
     --------
     >>> measurement, steps, time = brp2012()
     >>> steps.shape, measurement.shape, time[:2]
-    ((240, 5, 3, 4), (5, 3, 4), array([5., 10.]))
+    ((240, 5, 3, 4), (5, 3, 4), array([4.98, 9.94]))
     """
     with as_file(files("arrivals.scenarios") / "data" / "brp2012.toml") as path:
         array = SensorArray.from_toml(path)

@@ -171,7 +171,7 @@ def reproduce(
     --------
     >>> reproduce("interpolation-table9", "out")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
-    ValueError: name must be one of 'all', 'interpolation-table1', ...; got 'interpolation-table9'
+    ValueError: name must be one of 'all', 'any-array', ...; got 'interpolation-table9'
     """
     one_of("name", name, ("all", *STUDIES))
     if jobs != -1:

@@ -52,7 +52,12 @@ def on_grid(model: ArraySnapshot) -> GridLine:
     ValueError
         If it is none, or its grid is wider than half the wavelength.
     """
-    line = model.manifold()
+    line, limit = model.manifold(), model.array.alias_limit
+    if limit is not None and model.wavelengths[0] < limit * (1 - 1e-6):
+        raise ValueError(
+            f"the wavelength, {model.wavelengths[0]:.6g} m, is below the array's alias limit of "
+            f"two grid spacings, {limit:.6g} m: this method would be ambiguous"
+        )
     if not isinstance(line, GridLine):
         raise ValueError(
             "this method needs a line of sensors on a uniform grid (gaps are allowed); "
