@@ -166,17 +166,7 @@ def test_on_a_line_it_is_the_ascent_of_the_paper(reference: Any) -> None:
     for z in trial.measurements:
         Y = trial.measurement.looks(z)  # type: ignore[union-attr]
         short = settings.fit(Y, manifold, known)
-        general = LooksAscent(settings, Y, manifold, known)
-        X, converged = general.start(), False
-        while not converged and general.iterations < 500 and not general.cycles():
-            general.iterations += 1
-            general.choose_support()
-            general.learn_variances()
-            general.refine_angles()
-            general.merge()
-            X_old, X = X, general.reconstruction()
-            converged = general.rests(X, X_old)
-        fit = general.result(converged)
+        fit = settings.iterate(LooksAscent(settings, Y, manifold, known))
         assert fit.iterations == short.iterations
         assert fit.active.tolist() == short.active.tolist()
         on = fit.active

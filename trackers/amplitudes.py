@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from arrivals.trackers.component_support import MergedSupport
 from arrivals.trackers.noise_start import NOISE_FLOOR
 from arrivals.typing import Complex, Float, Int
 
 
-class Amplitudes:
+class Amplitudes(MergedSupport):
     """Which of L components are in use, how strong, and how strong the noise is.
 
     Attributes
@@ -49,17 +50,9 @@ class Amplitudes:
         self.J[:, changed] = rows.conj().T
         self.h[changed] = conj @ self.y
 
-    def choose_support(self) -> None:
-        """Search the support greedily from the empty one: each flip raises the ELBO by its Δ."""
-        self.active[:] = False
+    def empty(self) -> None:
+        """Set the amplitudes of all components to zero."""
         self.C[:], self.w[:] = 0, 0
-        self.gains_from_empty()
-        for _ in range(4 * len(self.w)):
-            delta = self.deltas()
-            k = int(np.argmax(delta))
-            if not delta[k] > 1e-10:
-                return
-            self.flip(k)
 
     def gains_from_empty(self) -> None:
         """Reset what `flip` keeps up to date: z = h - J w and g = ν/v."""
@@ -130,8 +123,3 @@ class Amplitudes:
         prior = np.where(self.active, np.log(self.rho / self.tau), np.log1p(-self.rho)).sum()
         rest = -len(self.y) * np.log(np.pi * self.nu) - self.power / self.nu
         return float(rest + fit + prior)
-
-    def evidence(self) -> Float:
-        """Return by how much the ELBO would fall without each active component; -inf elsewhere."""
-        self.gains_from_empty()
-        return np.where(self.active, -self.deltas(), -np.inf)

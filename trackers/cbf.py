@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike
 from arrivals.checks import count, instance, not_negative, positive
 from arrivals.measurement_models.arrays import SensorArray
 from arrivals.measurement_models.snapshots import ArraySnapshot
-from arrivals.trackers.base import Tracker, missed
+from arrivals.trackers.base import missed
 from arrivals.trackers.estimates import DirectionEstimate
 from arrivals.trackers.registry import register
-from arrivals.trackers.slots import padded
+from arrivals.trackers.slots import DirectionTracker
 from arrivals.typing import Complex, Float, Int
 
 
@@ -154,7 +154,7 @@ def parabolic(doa_grid: Float, level: Float, top: Int) -> Float:
 
 
 @register("cbf")
-class CBF(Tracker):
+class CBF(DirectionTracker):
     """Peaks of the conventional beamformer, within some dB of the highest.
 
     Parameters
@@ -264,13 +264,3 @@ class CBF(Tracker):
         """Return the amplitudes of plane waves with steering vectors A, each as if alone."""
         heard = ~np.isnan(z)
         return np.asarray(A[:, heard].conj() @ z[heard] / heard.sum())
-
-    def _show(self, estimate: DirectionEstimate) -> None:
-        self._estimate = estimate
-        self.x = padded(estimate.doa, self.n_slots, np.nan)
-        self.P = np.zeros((self.n_slots, self.n_slots))
-
-    @property
-    def estimate(self) -> DirectionEstimate:
-        """The peaks of the last snapshot, the highest first."""
-        return self._estimate

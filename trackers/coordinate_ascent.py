@@ -25,13 +25,13 @@ from arrivals.trackers.angle_posteriors import (
     top_mode,
     unfold,
 )
+from arrivals.trackers.component_support import Places
 from arrivals.trackers.line_spectrum import Fit, Prediction
 from arrivals.trackers.looks_ascent import LooksAscent
 from arrivals.trackers.noise_start import NOISE_FLOOR, autocorrelation, first_noise
 from arrivals.typing import Complex, Int
 
 PosteriorName = Literal["quadrature", "mixture"]
-CYCLE = 0.2  # of the iterations allowed: a component merged away so often is in a limit cycle
 
 
 @dataclass(frozen=True)
@@ -90,18 +90,20 @@ class CoordinateAscent:
         """
         if not Y.any():
             return SILENCE
-        step: Ascent | LooksAscent
         if self._for_a_line(Y, manifold):
-            step = self.step(Y[0, :, 0], manifold, prediction)
-        else:
-            step = LooksAscent(self, Y, manifold, prediction)
-        x, converged = step.start(), False
-        while not converged and step.iterations < self.max_iterations and not step.cycles():
+            return self.iterate(self.step(Y[0, :, 0], manifold, prediction))
+        return self.iterate(LooksAscent(self, Y, manifold, prediction))
+
+    def iterate(self, step: Ascent | LooksAscent) -> Fit:
+        """Improve support, variances and angles in turn until the reconstruction rests."""
+        x, converged, most = step.start(), False, self.max_iterations
+        while not converged and step.iterations < most and not step.cycles(most):
             step.iterations += 1
             step.choose_support()
             step.learn_variances()
+            step.learn_odds()
             step.refine_angles()
-            step.merge()
+            step.merge(self.merge)
             x_old, x = x, step.reconstruction()
             converged = step.rests(x, x_old)
         return step.result(converged)
@@ -148,20 +150,15 @@ class Ascent(Amplitudes):
         L = min(M, settings.max_components or M)
         self.settings, self.manifold, self.k = settings, manifold, manifold.harmonics
         self.degree = max(int(np.abs(self.k).max()), 1)
-        self.learn_rho = prediction is None or len(prediction.mu) == 0
-        if prediction is None or self.learn_rho:
-            prediction = Prediction(np.zeros(0), np.zeros(0), np.zeros(0), max(L // 2, 1) / L)
-        self.n_carried = n = min(len(prediction.mu), L)
-        rho = np.concatenate([prediction.existence[:n], np.full(L - n, prediction.birth)])
-        self.K0 = max(L // 2, 1) if self.learn_rho else int((rho == rho.max()).sum())
+        places = Places.of(prediction, L)
+        known, n = places.known, places.n_carried
         power = float(np.vdot(y, y).real) / M
         nu = first_noise(y, self.k, settings.snr_db)
-        super().__init__(y, rho, nu, max(power - nu, NOISE_FLOOR * power) / self.K0)
+        tau = max(power - nu, NOISE_FLOOR * power) / places.n_expected
+        super().__init__(y, places.rho, nu, tau)
+        self.begin(places)
         self.prior, self.mean = np.zeros((2, L), dtype=np.complex128)
-        self.prior[:n] = prediction.kappa[:n] * np.exp(1j * prediction.mu[:n])
-        self.was_active = np.zeros(L, dtype=np.bool_)
-        self.merged = np.zeros(L, dtype=np.int64)  # how often each was merged away
-        self.iterations = 0
+        self.prior[:n] = known.kappa[:n] * np.exp(1j * known.mu[:n])
         self.integrate: AnglePosterior = quadrature
         self.first_mode: AnglePosterior = top_mode
         if settings.posterior == "mixture":
@@ -189,16 +186,9 @@ class Ascent(Amplitudes):
             self.g[k] = len(self.y) + self.nu / self.tau - np.vdot(j, self.C @ j).real / self.nu
             self.z[k] = self.h[k] - self.J[k] @ self.w
             self.flip(k)
-            if k + 1 == self.K0:
+            if k + 1 == self.n_expected:
                 reference = self.w @ self.A
         return reference
-
-    def learn_variances(self) -> None:
-        """Maximise the ELBO over ν and τ, and over ρ where nothing is predicted."""
-        super().learn_variances()
-        L, K = len(self.w), int(self.active.sum())
-        if self.learn_rho:
-            self.rho[:] = min(max(K, 1), L - 1) / L if L > 1 else 0.5
 
     def refine_angles(self) -> None:
         """Update q(θ) of each active component, each on the newest of the others (32)-(33).
@@ -227,24 +217,6 @@ class Ascent(Amplitudes):
         C.flat[:: len(on) + 1] = 0
         return C
 
-    def merge(self) -> None:
-        """Switch off every active component whose direction is too near to an earlier one's."""
-        on = self.active.nonzero()[0]
-        doa = self.manifold.to_doa(np.angle(self.mean[on]))
-        near = np.abs(doa[:, None] - doa) < self.settings.merge
-        if np.count_nonzero(near) > np.count_nonzero(near.diagonal()):
-            for i, row in enumerate(np.triu(near, 1)):
-                if self.active[on[i]]:
-                    gone = on[row & self.active[on]]
-                    self.active[gone] = False
-                    self.merged[gone] += 1
-            self.solve()
-        self.was_active |= self.active
-
-    def cycles(self) -> bool:
-        """Tell whether the search keeps reviving what merging removes."""
-        return bool(self.merged.max() > CYCLE * self.settings.max_iterations)
-
     def rests(self, x: Complex, x_old: Complex) -> bool:
         """Tell whether the reconstruction moved by less than the tolerance."""
         rests = np.linalg.norm(x - x_old) < self.settings.tolerance * np.linalg.norm(x_old)
@@ -258,7 +230,7 @@ class Ascent(Amplitudes):
             resultant=resultant,
             kappa=inverse_bessel_ratio(resultant),
             active=self.active.copy(),
-            age=np.where(self.active, 0, np.where(self.was_active, 1, -1)),
+            age=self.age,
             amplitude=self.w.copy(),
             evidence=self.evidence(),
             noise=self.nu,

@@ -10,11 +10,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from arrivals.trackers.component_support import MergedSupport
 from arrivals.trackers.noise_start import NOISE_FLOOR
 from arrivals.typing import Complex, Float, Int
 
 
-class LooksAmplitudes:
+class LooksAmplitudes(MergedSupport):
     """Which of L components are in use, how strong in each look, and how strong the noise is.
 
     Attributes
@@ -61,17 +62,9 @@ class LooksAmplitudes:
         self.J[:, :, changed] = np.swapaxes(rows.conj(), 1, 2)
         self.H[:, changed] = conj @ self.Y
 
-    def choose_support(self) -> None:
-        """Search the support greedily from the empty one: each flip raises the ELBO by its Δ."""
-        self.active[:] = False
+    def empty(self) -> None:
+        """Set the amplitudes of all components to zero."""
         self.C[:], self.W[:] = 0, 0
-        self.gains_from_empty()
-        for _ in range(4 * len(self.rho)):
-            delta = self.deltas()
-            k = int(np.argmax(delta))
-            if not delta[k] > 1e-10:
-                return
-            self.flip(k)
 
     def gains_from_empty(self) -> None:
         """Reset what `flip` keeps up to date: Z = H - J W and g = ν/v."""
@@ -162,11 +155,6 @@ class LooksAmplitudes:
         rest = -M * N * np.log(np.pi * self.nu) - self.power / self.nu
         looks = (fit + rest - N * len(on) * np.log(self.tau)).sum() / self.temper
         return float(looks + np.where(self.active, np.log(self.rho), np.log1p(-self.rho)).sum())
-
-    def evidence(self) -> Float:
-        """Return by how much the ELBO would fall without each active component; -inf elsewhere."""
-        self.gains_from_empty()
-        return np.where(self.active, -self.deltas(), -np.inf)
 
 
 def _inner(a: Complex, b: Complex) -> Float:

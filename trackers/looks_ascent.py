@@ -13,7 +13,6 @@ import numpy as np
 
 from arrivals.measurement_models.manifolds import Manifold
 from arrivals.motion_models.bessel import inverse_bessel_ratio
-from arrivals.motion_models.von_mises import wrap
 from arrivals.trackers.angle_posteriors import fold, quadrature, top_mode, unfold
 from arrivals.trackers.circle_posteriors import (
     CirclePrior,
@@ -21,6 +20,7 @@ from arrivals.trackers.circle_posteriors import (
     VonMisesPrior,
     grid_moments,
 )
+from arrivals.trackers.component_support import Places
 from arrivals.trackers.line_spectrum import Fit, Prediction
 from arrivals.trackers.looks_amplitudes import LooksAmplitudes
 from arrivals.trackers.noise_start import NOISE_FLOOR
@@ -57,26 +57,16 @@ class LooksAscent(LooksAmplitudes):
         L = min(M, settings.max_components or M)
         self.settings, self.manifold = settings, manifold
         self._read_manifold()
-        self.learn_rho = prediction is None or len(prediction.mu) == 0
-        if prediction is None or self.learn_rho:
-            known = None if prediction is None else prediction.noise
-            none = np.zeros(0)
-            prediction = Prediction(none, none, none, max(L // 2, 1) / L, noise=known)
-        self.n_carried = n = min(len(prediction.mu), L)
-        rho = np.concatenate([prediction.existence[:n], np.full(L - n, prediction.birth)])
-        self.K0 = max(L // 2, 1) if self.learn_rho else int((rho == rho.max()).sum())
+        places = Places.of(prediction, L)
         power = (Y.real**2 + Y.imag**2).sum(axis=(1, 2)) / (M * Y.shape[2])
-        nu = self._first_noise(power, prediction)
+        nu = self._first_noise(power, places.known)
         left = np.maximum(power - nu, NOISE_FLOOR * power)
-        super().__init__(
-            Y, rho, nu, left / self.K0 * M / self.norms[:, 0], self.norms[:, 0], settings.temper
-        )
-        self._read_prediction(prediction, L)
+        tau = left / places.n_expected * M / self.norms[:, 0]
+        super().__init__(Y, places.rho, nu, tau, self.norms[:, 0], settings.temper)
+        self.begin(places)
+        self._read_prediction(places.known, L)
         floor = settings.power_floor
         self.power_floor = (0.0 if self.n_looks == 1 else 3.0) if floor is None else floor
-        self.was_active = np.zeros(L, dtype=np.bool_)
-        self.merged = np.zeros(L, dtype=np.int64)  # how often each was merged away
-        self.iterations = 0
 
     def _read_manifold(self) -> None:
         """Lay the manifold out for products: rows of G are (bin, sensor) pairs."""
@@ -143,7 +133,7 @@ class LooksAscent(LooksAmplitudes):
             self.g[:, k] -= (j.conj() * Cj).sum(axis=1).real / self.nu
             self.Z[:, k] = self.H[:, k] - (self.J[:, k, None] @ self.W)[:, 0]
             self.flip(k)
-            if k + 1 == self.K0:
+            if k + 1 == self.n_expected:
                 reference = self.reconstruction()
         return reference
 
@@ -261,31 +251,10 @@ class LooksAscent(LooksAmplitudes):
     # -- the rest of an iteration -----------------------------------------------------------------
 
     def learn_variances(self, power_floor: float = 0.0, noise_floor: float = NOISE_FLOOR) -> None:
-        """Maximise the ELBO over ν and τ, and over ρ where nothing is predicted (sec. 5)."""
+        """Maximise the ELBO over ν and τ (sec. 5)."""
         if self.settings.max_snr_db is not None:
             noise_floor = 10 ** (-self.settings.max_snr_db / 10)
         super().learn_variances(self.power_floor, noise_floor)
-        L, K = len(self.rho), int(self.active.sum())
-        if self.learn_rho:
-            self.rho[:] = min(max(K, 1), L - 1) / L if L > 1 else 0.5
-
-    def merge(self) -> None:
-        """Switch off every active component whose direction is too near to an earlier one's."""
-        on = self.active.nonzero()[0]
-        doa = self.manifold.to_doa(np.angle(self.mean[on]))
-        near = np.abs(wrap(doa[:, None] - doa)) < self.settings.merge
-        if np.count_nonzero(near) > np.count_nonzero(near.diagonal()):
-            for i, row in enumerate(np.triu(near, 1)):
-                if self.active[on[i]]:
-                    gone = on[row & self.active[on]]
-                    self.active[gone] = False
-                    self.merged[gone] += 1
-            self.solve()
-        self.was_active |= self.active
-
-    def cycles(self) -> bool:
-        """Tell whether the search keeps reviving what merging removes: a fifth of the time."""
-        return bool(self.merged.max() > 0.2 * self.settings.max_iterations)
 
     def rests(self, X: Complex, X_old: Complex) -> bool:
         """Tell whether the reconstruction moved by less than the tolerance, bins normalised."""
@@ -303,7 +272,7 @@ class LooksAscent(LooksAmplitudes):
             resultant=resultant,
             kappa=inverse_bessel_ratio(resultant),
             active=self.active.copy(),
-            age=np.where(self.active, 0, np.where(self.was_active, 1, -1)),
+            age=self.age,
             amplitude=self.W[0, :, 0].copy() if single else rms,
             evidence=self.evidence(),
             noise=float(self.nu.mean()),

@@ -17,12 +17,12 @@ from arrivals.trackers.bank import Bank, nearest
 from arrivals.trackers.base import Tracker, missed
 from arrivals.trackers.estimates import DirectionEstimate
 from arrivals.trackers.registry import find, register
-from arrivals.trackers.slots import padded
+from arrivals.trackers.slots import DirectionTracker
 from arrivals.typing import Bool, Complex, Float
 
 
 @register("peaks_gnn")
-class PeaksGNN(Tracker):
+class PeaksGNN(DirectionTracker):
     """Peaks, frame by frame, and a global nearest-neighbour bank of Kalman filters behind them.
 
     Parameters
@@ -98,7 +98,7 @@ class PeaksGNN(Tracker):
             count("max_sources", max_sources)
         self.scan = self._fresh_scan()
         self.bank = Bank.empty(self.n_slots, walk.dim_x)
-        self._show(np.full(self.n_slots, complex(np.nan, np.nan)))
+        self._report(np.full(self.n_slots, complex(np.nan, np.nan)))
 
     @property
     def n_slots(self) -> int:
@@ -112,7 +112,7 @@ class PeaksGNN(Tracker):
         self.scan.predict(dt=dt)
         self.bank = self.bank.predicted(self.walk, dt)
         self.bank = self.bank.without(self.bank.used & self._outside(self.bank.mean[:, 0]))
-        self._show(np.full(self.n_slots, complex(np.nan, np.nan)))
+        self._report(np.full(self.n_slots, complex(np.nan, np.nan)))
 
     def update(self, z: ArrayLike | None) -> None:
         """Find peaks, give each to the nearest track, start tracks with what is left."""
@@ -134,7 +134,7 @@ class PeaksGNN(Tracker):
         self.bank = bank.with_births(found.doa[free], self._new_covariance())
         born = self.bank.used & ~older
         amplitude[born] = found.amplitude[free][: born.sum()]
-        self._show(amplitude)
+        self._report(amplitude)
 
     def _settle(self) -> None:
         """Begin anew with what depends on parameters that were changed."""
@@ -169,21 +169,17 @@ class PeaksGNN(Tracker):
         variances[0] = self.std**2
         return np.diag(variances)
 
-    def _show(self, amplitude: Complex) -> None:
+    def _report(self, amplitude: Complex) -> None:
+        """Report the tracks that were confirmed."""
         bank = self.bank
         on = bank.used & (bank.hits >= self.confirm)
         doa = bank.mean[on, 0]
-        self._estimate = DirectionEstimate(
-            doa=wrap(doa) if self.measurement.array.dim > 1 else doa,
-            std=np.sqrt(bank.covariance[on, 0, 0]),
-            existence=np.full(on.sum(), np.nan),
-            amplitude=amplitude[on],
-            label=bank.label[on],
+        self._show(
+            DirectionEstimate(
+                doa=wrap(doa) if self.measurement.array.dim > 1 else doa,
+                std=np.sqrt(bank.covariance[on, 0, 0]),
+                existence=np.full(on.sum(), np.nan),
+                amplitude=amplitude[on],
+                label=bank.label[on],
+            )
         )
-        self.x = padded(self._estimate.doa, self.n_slots, np.nan)
-        self.P = np.diag(padded(self._estimate.std**2, self.n_slots, 0.0))
-
-    @property
-    def estimate(self) -> DirectionEstimate:
-        """The tracks that were confirmed."""
-        return self._estimate

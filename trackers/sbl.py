@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import copy
-import time
-from collections.abc import Iterable
-from itertools import zip_longest
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.checks import count, instance, not_negative, positive, probability
 from arrivals.measurement_models.snapshots import ArraySnapshot
-from arrivals.trackers.base import Tracker, missed
+from arrivals.trackers.base import missed
 from arrivals.trackers.cbf import look_directions
 from arrivals.trackers.estimates import DirectionEstimate
-from arrivals.trackers.recorder import Recorder, Run
 from arrivals.trackers.registry import register
-from arrivals.trackers.slots import padded
+from arrivals.trackers.slots import SideBySide
 from arrivals.trackers.sparse_bayes import Powers, SparseBayes, highest
 from arrivals.typing import Bool, Complex, Float
 
@@ -26,7 +22,7 @@ Heard = tuple[Complex, Bool]
 
 
 @register("sbl")
-class SBL(Tracker):
+class SBL(SideBySide):
     """Sparse Bayesian learning: the peaks of a sparse power spectrum, every step on its own.
 
     Parameters
@@ -134,24 +130,21 @@ class SBL(Tracker):
             Y, sensors = heard
             self._take(self._fit(Y[None], sensors, self._from()[None]), 0, heard)
 
-    def run_batch(
-        self, measurements: Iterable[Iterable[ArrayLike | None]], dt: float = 1.0
-    ) -> list[Run]:
-        """Run independent sequences side by side, each from the present state."""
-        positive("dt", dt)
-        started = time.perf_counter()
-        sequences = [list(sequence) for sequence in measurements]
-        trackers = [copy.deepcopy(self) for _ in sequences]
-        recorders = [Recorder(DirectionEstimate) for _ in sequences]
-        for step in zip_longest(*sequences, fillvalue=ABSENT):
-            going = [n for n, z in enumerate(step) if z is not ABSENT]
-            for n in going:
-                trackers[n].predict(dt=dt)
-            _update_together([trackers[n] for n in going], [step[n] for n in going])
-            for n in going:
-                recorders[n].add(trackers[n].estimate, trackers[n].x)
-        each = (time.perf_counter() - started) / max(1, len(sequences))
-        return [recorder.run(dt=dt, elapsed=each) for recorder in recorders]
+    def _together(self, trackers: Sequence[Self], step: Sequence[Any], dt: float) -> None:
+        """Fit, as one batch each, the steps in which the same sensors gave as many snapshots."""
+        groups: dict[tuple[int, bytes], list[tuple[Self, Heard]]] = {}
+        for tracker, z in zip(trackers, step, strict=True):
+            tracker.predict(dt=dt)
+            heard = None if missed(z) else tracker._heard(np.asarray(z))
+            if heard is not None:
+                key = heard[0].shape[1], heard[1].tobytes()
+                groups.setdefault(key, []).append((tracker, heard))
+        for group in groups.values():
+            Y = np.stack([heard[0] for _, heard in group])
+            starts = np.stack([tracker._from() for tracker, _ in group])
+            powers = self._fit(Y, group[0][1][1], starts)
+            for n, (tracker, heard) in enumerate(group):
+                tracker._take(powers, n, heard)
 
     def _heard(self, z: Complex) -> Heard | None:
         """Return the snapshots (n_sensors, n_snapshots) of the sensors heard; None for silence."""
@@ -200,33 +193,3 @@ class SBL(Tracker):
 
     def _amplitudes(self, doa: Float, Y: Complex, sensors: Bool) -> Complex:
         return np.asarray(np.linalg.lstsq(self._waves(doa, sensors).T, Y[:, -1], rcond=None)[0])
-
-    def _show(self, estimate: DirectionEstimate) -> None:
-        self._estimate = estimate
-        self.noise = estimate.noise
-        self.x = padded(estimate.doa, self.n_slots, np.nan)
-        self.P = np.zeros((self.n_slots, self.n_slots))
-
-    @property
-    def estimate(self) -> DirectionEstimate:
-        """The peaks of the last step, the highest first."""
-        return self._estimate
-
-
-ABSENT: Any = object()  # where one sequence is over and others go on
-
-
-def _update_together(trackers: list[SBL], step: list[ArrayLike | None]) -> None:
-    """Fit, as one batch each, the steps in which the same sensors gave as many snapshots."""
-    groups: dict[tuple[int, bytes], list[tuple[SBL, Heard]]] = {}
-    for tracker, z in zip(trackers, step, strict=True):
-        heard = None if missed(z) else tracker._heard(np.asarray(z))
-        if heard is not None:
-            key = heard[0].shape[1], heard[1].tobytes()
-            groups.setdefault(key, []).append((tracker, heard))
-    for group in groups.values():
-        first, (_, sensors) = group[0]
-        Y = np.stack([heard[0] for _, heard in group])
-        powers = first._fit(Y, sensors, np.stack([tracker._from() for tracker, _ in group]))
-        for n, (tracker, heard) in enumerate(group):
-            tracker._take(powers, n, heard)

@@ -12,10 +12,10 @@ from arrivals.checks import count, instance, not_negative, one_of, probability
 from arrivals.measurement_models.arrays import SensorArray
 from arrivals.measurement_models.manifolds import GridLine
 from arrivals.measurement_models.snapshots import ArraySnapshot
-from arrivals.trackers.base import Tracker, missed
+from arrivals.trackers.base import missed
 from arrivals.trackers.covariances import RunningCovariance, smoothed
 from arrivals.trackers.estimates import DirectionEstimate
-from arrivals.trackers.slots import padded
+from arrivals.trackers.slots import DirectionTracker
 from arrivals.trackers.source_number import number_of_sources
 from arrivals.typing import Bool, Complex, Float
 
@@ -83,7 +83,7 @@ def fitted(A: Complex, z: Complex) -> Complex:
     return np.linalg.solve(G, A.conj() @ y).astype(np.complex128)
 
 
-class SubspaceTracker(Tracker, Generic[F]):
+class SubspaceTracker(DirectionTracker, Generic[F]):
     """Directions of sources that span less than all sensors could hear.
 
     Subclasses say how a subspace is learned (`_learn`, `_decomposed`) and how directions are
@@ -214,16 +214,6 @@ class SubspaceTracker(Tracker, Generic[F]):
         a = self.measurement.steering_vector(doa)
         label = np.full(len(doa), -1)
         return DirectionEstimate(doa, unknown, unknown, fitted(a, z), label)
-
-    def _show(self, estimate: DirectionEstimate) -> None:
-        self._estimate = estimate
-        self.x = padded(estimate.doa, self.n_slots, np.nan)
-        self.P = np.zeros((self.n_slots, self.n_slots))
-
-    @property
-    def estimate(self) -> DirectionEstimate:
-        """The directions found last, in rising order."""
-        return self._estimate
 
 
 class CovarianceSubspace(RunningCovariance, SubspaceTracker[F]):

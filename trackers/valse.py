@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import copy
-import time
-from collections.abc import Iterable, Sequence
-from itertools import zip_longest
+from collections.abc import Sequence
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -14,22 +11,21 @@ from numpy.typing import ArrayLike
 from arrivals.checks import count, instance, not_negative, one_of, positive, probability
 from arrivals.measurement_models.manifolds import Manifold, Reference
 from arrivals.measurement_models.snapshots import ArraySnapshot
-from arrivals.trackers.base import Tracker, missed
+from arrivals.trackers.base import missed
 from arrivals.trackers.coordinate_ascent import CoordinateAscent, PosteriorName
 from arrivals.trackers.estimates import DirectionEstimate
 from arrivals.trackers.joint_ascent import JointNewton
 from arrivals.trackers.line_spectrum import Engine, Fit, Prediction
 from arrivals.trackers.looks import Heard, check_directions, updated
-from arrivals.trackers.recorder import Recorder, Run
 from arrivals.trackers.registry import register
-from arrivals.trackers.slots import padded
+from arrivals.trackers.slots import SideBySide
 from arrivals.typing import Bool, Complex, Float, Int
 
 EngineName = Literal["fast", "coordinate"]
 
 
 @register("valse")
-class VALSE(Tracker):
+class VALSE(SideBySide):
     """Variational Bayesian line spectral estimation: every snapshot on its own.
 
     Parameters
@@ -195,27 +191,6 @@ class VALSE(Tracker):
             fit = self.solver.fit(Y, manifold, self._prediction(heard))
             self._absorb(manifold, fit, heard)
 
-    def run_batch(
-        self, measurements: Iterable[Iterable[ArrayLike | None]], dt: float = 1.0
-    ) -> list[Run]:
-        """Run independent sequences, the leading axis, each from the present state.
-
-        All are solved together, step by step, as one array program; the numbers are those of
-        single runs, up to rounding. The tracker itself stays as it is.
-        """
-        positive("dt", dt)
-        sequences = [list(sequence) for sequence in measurements]
-        trackers = [copy.deepcopy(self) for _ in sequences]
-        recorders = [Recorder(type(self.estimate)) for _ in sequences]
-        started = time.perf_counter()
-        for step in zip_longest(*sequences, fillvalue=OVER):
-            on = [n for n, z in enumerate(step) if z is not OVER]
-            self._together([trackers[n] for n in on], [step[n] for n in on], dt)
-            for n in on:
-                recorders[n].add(trackers[n].estimate, trackers[n].x)
-        elapsed = (time.perf_counter() - started) / max(len(sequences), 1)
-        return [recorder.run(dt=dt, elapsed=elapsed) for recorder in recorders]
-
     def _together(self, trackers: Sequence[Self], step: Sequence[Any], dt: float) -> None:
         """Predict and update copies of this tracker, those with the same sensors in one call."""
         self._move(trackers, dt)
@@ -267,22 +242,8 @@ class VALSE(Tracker):
         found = reported(manifold, fit)
         self._show(described(manifold, fit, found, np.full(found.sum(), -1)))
 
-    def _show(self, estimate: DirectionEstimate) -> None:
-        self._estimate = estimate
-        self.noise = estimate.noise
-        self.x = padded(estimate.doa, self.n_slots, np.nan)
-        self.P = np.diag(padded(estimate.std**2, self.n_slots, 0.0))
-
     def _nothing(self) -> None:
         self._show(DirectionEstimate.nothing())
-
-    @property
-    def estimate(self) -> DirectionEstimate:
-        """The sources found in the last snapshot."""
-        return self._estimate
-
-
-OVER = object()  # in place of a measurement, where a sequence has ended
 
 
 def reported(manifold: Manifold, fit: Fit) -> Bool:
