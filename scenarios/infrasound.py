@@ -5,17 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from importlib.resources import as_file, files
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.motion_models import BernoulliVonMises
+from arrivals.scenarios.demonstration import Demonstration
 from arrivals.scenarios.looks import looks
 from arrivals.scenarios.readers import read
 from arrivals.trackers import CBF, SVALSE, VALSE, Tracker
-from arrivals.trackers.recorder import Run
 from arrivals.typing import Complex, Float
 
 FREQUENCIES = (0.6, 1.0, 1.4, 1.8, 2.2)  # Hz
@@ -92,37 +91,8 @@ def infrasound(
     n_steps : int, optional
         Stop after so many of the 240 steps.
     """
-    from threadpoolctl import threadpool_limits
-
-    folder = Path(out)
-    folder.mkdir(parents=True, exist_ok=True)
     measurement, steps, time = brp2012()
-    steps, time = steps[:n_steps], time[:n_steps]
-    runs = {}
-    for name in METHODS:
-        with threadpool_limits(1, "blas"):
-            run = tracker(name, measurement).run(bar(steps, desc=f"{name:<6}"))
-        runs[name] = run.at(time)
-        path = folder / f"brp2012-{name}.csv"
-        runs[name].to_csv(path)
-        print(f"{path}: {run.n_found.sum()} directions in {len(run)} steps, {run.elapsed:.1f} s",
-              flush=True)  # fmt: skip
-    picture = folder / "brp2012.png"
-    _draw(picture, runs, steps, measurement)
-    print(picture)
-
-
-def _draw(path: Path, runs: dict[str, Run], steps: Complex, measurement: ArraySnapshot) -> None:
-    """Draw the tracks of each method over the beam power, one below the other."""
-    from matplotlib.figure import Figure
-
-    from arrivals.scenarios.plots import plot_bearing_time, save
-
-    figure = Figure(figsize=(9.0, 10.5), layout="constrained")
-    panels = figure.subplots(len(runs), sharex=True)
-    for ax, (name, run) in zip(panels, runs.items(), strict=True):
-        plot_bearing_time(run, snapshots=steps, measurement=measurement, time=run.time, ax=ax)
-        ax.set_title(METHODS[name], loc="left", fontsize=11)
-        ax.set_ylabel("azimuth from north, degrees")
-        ax.label_outer()
-    save(panels[0], path)
+    axes = {"ylabel": "azimuth from north, degrees"}
+    scene = Demonstration("brp2012", measurement, steps, time, axes, prefix="brp2012-")
+    methods = {name: (title, tracker(name, measurement)) for name, title in METHODS.items()}
+    scene.show(out, methods, bar, n_steps)
