@@ -52,8 +52,8 @@ class InterpolationEKF(KalmanType):
     offsets, loading, baselines, both_ways, each_sensor : optional
         In place of the variant's own: taps (of baseline 1), ε_c, distances in sensors between
         which is interpolated, whether backwards too, and whether coefficients are taken anew at
-        every sensor ("B", "Bw" and "D") or once a snapshot (the others). The former costs some
-        nine times the array calls and finds the source from farther off; see Notes.
+        every sensor ("B", "Bw" and "D") or once a snapshot (the others). The former makes four
+        times the array calls and finds the source from farther off; see Notes.
     aligned : bool
         All baselines treat the same snapshot, which makes the longer ones no later than the
         others, and all of them as late as the longest.
@@ -98,9 +98,9 @@ class InterpolationEKF(KalmanType):
     `std` is the filter's own: 1.2 to 1.6 times too large for "B" and "C", whose residuals share
     noise; about right for "D" and "E".
 
-    Of 400 trials of a tone at 60° and 5 dB that start at 0°, those that end within 3° are 64 %
-    with coefficients at every sensor and 6 % with those once a snapshot for "B", 89 and 67 % for
-    "D", 87 and 94 % for "C". From 20° all but 5 % do, with any.
+    Of 400 trials of a tone at 60° and 5 dB that start at 0°, those that end within 3° are 65 %
+    with coefficients at every sensor and 8 % with those once a snapshot for "B", 88 and 64 % for
+    "D", 88 and 93 % for "C". From 20° all but 4 % do, with any (benchmarks/interpolation.py).
 
     The index of the paper's (3) and (11) is one sample off (4); offsets (0, 1) follow (4).
 
