@@ -1,9 +1,7 @@
-"""The contract with filterpy 2.0.0, D1 to D13, and the faults of filterpy that we do not share."""
+"""The contract with filterpy 2.0.0, D7 to D11 and D13: parts of either inside the other."""
 
 import copy
 import pickle
-import subprocess
-import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -20,245 +18,31 @@ from filterpy.kalman import (
     MMAEFilterBank,
     UnscentedKalmanFilter,
 )
-from filterpy.monte_carlo import systematic_resample as their_resample
+from filterpy_twins import (
+    BEARING,
+    SEEN,
+    WALK,
+    M,
+    P,
+    X,
+    assert_twins,
+    plain,
+    stable_system,
+    theirs,
+    track,
+    twins,
+)
 
-from arrivals.measurement_models import Bearing, LinearMeasurement, MeasurementModel
+from arrivals.measurement_models import LinearMeasurement, MeasurementModel
 from arrivals.motion_models import (
     ConstantVelocity,
     CoordinatedTurn,
     LinearMotion,
     MotionModel,
-    RandomWalk,
     VonMisesWalk,
 )
-from arrivals.trackers import EKF, IMM, UKF, Filter, Kalman, KalmanType, Particle, as_filterpy
-from arrivals.trackers.particle import systematic_resample
+from arrivals.trackers import EKF, IMM, UKF, Filter, Kalman, Particle, as_filterpy
 from arrivals.typing import Float
-
-PLACES = [[0.0, 0.0], [20.0, 0.0], [5.0, 15.0]]
-X = np.array([8.0, 0.3, 6.0, -0.2])
-P = np.diag([1.0, 0.1, 1.0, 0.1])
-WALK = ConstantVelocity(q=0.05)
-BEARING = Bearing(PLACES, noise=1e-3)
-SEEN = LinearMeasurement(np.eye(4)[::2], [[0.5, 0.1], [0.1, 0.3]])
-M = np.array([[0.9, 0.1], [0.2, 0.8]])
-
-
-def stable_system(rng: np.random.Generator, n: int, m: int) -> tuple[Float, ...]:
-    F = rng.normal(size=(n, n))
-    F *= 0.95 / np.abs(np.linalg.eigvals(F)).max()
-    B, H = rng.normal(size=(n, 1)), rng.normal(size=(m, n))
-    A, C, D = rng.normal(size=(n, n)), rng.normal(size=(m, m)), rng.normal(size=(n, n))
-    return F, B, H, A @ A.T + 0.1 * np.eye(n), C @ C.T + 0.1 * np.eye(m), D @ D.T
-
-
-def twins(seed: int, n: int = 3, m: int = 2, column: bool = False) -> tuple[Kalman, Any]:
-    rng = np.random.default_rng(seed)
-    F, B, H, Q, R, P0 = stable_system(rng, n, m)
-    x = rng.normal(size=(n, 1) if column else n)
-    kf = KalmanFilter(n, m, 1)
-    kf.x, kf.P, kf.F, kf.B, kf.H, kf.Q, kf.R = x, P0, F, B, H, Q, R
-    return Kalman(LinearMotion(F, Q, control=B), LinearMeasurement(H, R), x, P0), kf
-
-
-def assert_twins(ours: Any, theirs: Any, tolerance: float = 1e-12, names: str = "x P") -> None:
-    for name in names.split():
-        a, b = getattr(ours, name), getattr(theirs, name)
-        assert np.shape(a) == np.shape(b), name
-        np.testing.assert_allclose(a, b, rtol=tolerance, atol=tolerance, err_msg=name)
-
-
-def plain(q: float = 0.05, kind: type[KalmanType] = Kalman) -> KalmanType:
-    return kind(ConstantVelocity(q), SEEN, X, P)
-
-
-def theirs(q: float = 0.05, column: bool = False) -> Any:
-    kf = KalmanFilter(4, 2)
-    kf.x, kf.P = X.reshape(4, 1) if column else X, P
-    walk = ConstantVelocity(q)
-    kf.F, kf.Q, kf.H, kf.R = walk.F(), walk.Q(), SEEN.H(), SEEN.R
-    return kf
-
-
-def track(n: int = 12, seed: int = 0) -> Float:
-    return np.random.default_rng(seed).normal([8.0, 6.0], 1.0, (n, 2))
-
-
-# D1
-
-
-@pytest.mark.parametrize("shape", [(3,), (3, 1)])
-def test_d1_belief_may_be_assigned_between_any_two_calls(shape: tuple[int, ...]) -> None:
-    tracker, kf = twins(0, column=len(shape) == 2)
-    for z in np.ones((3, 2)):
-        for step in ("predict", "update"):
-            for f in (tracker, kf):
-                f.x, f.P = np.full(shape, 2.0), 3 * np.eye(3)
-                getattr(f, step)(*([] if step == "predict" else [z.reshape(2, *shape[1:])]))
-        assert_twins(tracker, kf)
-        assert tracker.x.shape == shape
-
-
-@pytest.mark.parametrize("kind", [Kalman, EKF, UKF])
-def test_d1_x_keeps_the_axes_it_is_given_later(kind: type[KalmanType]) -> None:
-    tracker = plain(kind=kind)
-    tracker.x = X.reshape(4, 1)
-    tracker.predict()
-    tracker.update([8.0, 6.0])
-    assert tracker.x.shape == (4, 1)
-    assert tracker.y.shape == tracker.z.shape == (2, 1)
-
-
-# D2
-
-
-def test_d2_predict_takes_the_control_first_and_none_or_zero_for_none() -> None:
-    tracker, kf = twins(1)
-    for u in (None, 0, 0.0, [0.0], [1.5], 2.0):
-        tracker.predict(u)
-        kf.predict(np.zeros(1) if u is None else np.atleast_1d(u))
-        assert_twins(tracker, kf, names="x P x_prior P_prior")
-    with pytest.raises(TypeError):
-        tracker.predict(None, 0.5)  # type: ignore[call-arg]
-
-
-# D3
-
-
-def test_d3_update_takes_every_shape_of_measurement() -> None:
-    for z in ([1.0, 2.0], (1, 2), np.array([1.0, 2.0]), np.array([[1.0], [2.0]])):
-        tracker = plain()
-        tracker.update(z)
-        assert tracker.z.tolist() == [1.0, 2.0]
-    scalars: list[Any] = [3.0, 3, [3.0], [[3.0]], np.float32(3)]
-    for scalar in scalars:
-        one = Kalman(RandomWalk(1.0, 1), LinearMeasurement([[1.0]], [[1.0]]), [0.0], [[1.0]])
-        one.update(scalar)
-        assert one.x == 1.5
-
-
-@pytest.mark.parametrize("kind", [Kalman, EKF, UKF])
-def test_d3_update_takes_r_and_h_for_once(kind: type[KalmanType]) -> None:
-    tracker, kf = plain(kind=kind), theirs()
-    H = np.array([[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
-    for R, once in ((2.0, None), (np.diag([1.0, 4.0]), None), (None, H), (0.5, H)):
-        tracker.update([0.2, 0.1], R, once)
-        kf.update(np.array([0.2, 0.1]), R, once)
-        assert_twins(tracker, kf, 1e-12 if kind is Kalman else 1e-9)
-    tracker.update([1.0], R=1.0, H=H[:1])
-    assert tracker.S.shape == (1, 1)
-
-
-# D4
-
-
-@pytest.mark.parametrize("column", [False, True])
-@pytest.mark.parametrize("missing", [None, np.nan, [np.nan, np.nan]])
-def test_d4_missed_measurement(column: bool, missing: Any) -> None:
-    tracker, _ = twins(2, column=column)
-    tracker.update(np.ones(2))
-    tracker.predict()
-    x, P = tracker.x.copy(), tracker.P.copy()
-    tracker.update(missing)
-    np.testing.assert_array_equal(tracker.x_post, x)
-    np.testing.assert_array_equal(tracker.P_post, P)
-    shape = (2, 1) if column else (2,)
-    assert tracker.y.shape == tracker.z.shape == shape
-    assert not tracker.y.any()
-    assert np.isnan(tracker.z).all()
-    assert (tracker.log_likelihood, tracker.likelihood) == (0.0, 1.0)
-
-
-# D5
-
-NAMES = [
-    "x",
-    "P",
-    "x_prior",
-    "P_prior",
-    "x_post",
-    "P_post",
-    "z",
-    "y",
-    "S",
-    "SI",
-    "K",
-    "F",
-    "Q",
-    "H",
-    "R",
-    "B",
-    "inv",
-    "dim_x",
-    "dim_z",
-    "dim_u",
-    "likelihood",
-    "log_likelihood",
-    "mahalanobis",
-]
-
-
-@pytest.mark.parametrize("column", [False, True])
-@pytest.mark.parametrize("kind", [Kalman, EKF, UKF])
-def test_d5_attributes_have_their_final_shapes_from_the_start(
-    kind: type[KalmanType], column: bool
-) -> None:
-    tracker = kind(WALK, SEEN, X.reshape(4, 1) if column else X, P)
-    shapes = {name: np.shape(getattr(tracker, name)) for name in NAMES}
-    for z in (None, [8.0, 6.0], [8.0, np.nan]):
-        tracker.predict()
-        tracker.update(z)
-        assert {name: np.shape(getattr(tracker, name)) for name in NAMES} == shapes
-    assert shapes["y"] == ((2, 1) if column else (2,))
-    assert shapes["K"] == (4, 2)
-
-
-def test_d5_likelihood_never_falls_to_zero() -> None:
-    tracker = plain()
-    tracker.update([1e6, 1e6])
-    assert tracker.likelihood == sys.float_info.min
-    assert tracker.log_likelihood < -1e9
-
-
-def test_d5_nonlinear_filters_publish_the_present_jacobians() -> None:
-    tracker = EKF(CoordinatedTurn(0.1, 0.1), BEARING, [*X, 0.1], np.eye(5))
-    tracker.predict(dt=0.5)
-    np.testing.assert_array_equal(tracker.F, tracker.motion.F(tracker.x, 0.5))
-    np.testing.assert_array_equal(tracker.H, BEARING.H(tracker.x))
-
-
-# D6
-
-
-@pytest.mark.parametrize("column", [False, True])
-@pytest.mark.parametrize("kind", [Kalman, EKF, UKF])
-def test_d6_saver_makes_arrays(kind: type[KalmanType], column: bool) -> None:
-    tracker = kind(WALK, SEEN, X.reshape(4, 1) if column else X, P)
-    saver = Saver(tracker, save_current=True)
-    for z in (*track(3), None, [1.0, np.nan]):
-        tracker.predict()
-        tracker.update(z)
-        saver.save()
-    saver.to_array()
-    assert saver.x.shape == (6, *tracker.x.shape)
-    assert saver.K.shape == (6, 4, 2)
-    assert saver.log_likelihood.shape == (6,)
-    assert {"F", "Q", "H", "R"} <= set(saver.keys)
-
-
-def test_d6_saver_takes_imm_and_particle() -> None:
-    for tracker in (
-        IMM([plain(), plain(1.0)], [0.5, 0.5], M),
-        Particle(WALK, SEEN, X, P, n_particles=20, rng=0),
-    ):
-        saver = Saver(tracker, save_current=True)
-        for z in track(3):
-            tracker.predict()
-            tracker.update(z)
-            saver.save()
-        saver.to_array()
-        assert saver.x.shape == (4, 4)
-
 
 # D7
 
@@ -530,29 +314,6 @@ def test_d11_filterpys_filters_inside_our_imm() -> None:
         mixed.predict(dt=0.5)
 
 
-# D12
-
-
-@pytest.mark.parametrize("kind", [Kalman, EKF, UKF])
-def test_d12_copies_and_pickles_go_on(kind: type[KalmanType]) -> None:
-    tracker = plain(kind=kind)
-    tracker.run(track(3))
-    three = (tracker, copy.deepcopy(tracker), pickle.loads(pickle.dumps(tracker)))
-    for f in three:
-        f.predict()
-        f.update([8.0, 6.0])
-        assert_twins(tracker, f, 0, "x P K log_likelihood")
-
-
-def test_d12_filterpy_and_scipy_are_imported_only_where_they_are_used() -> None:
-    code = (
-        "import sys, arrivals.trackers; "
-        "print([name for name in ('filterpy', 'scipy', 'matplotlib') if name in sys.modules])"
-    )
-    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert ran.stdout.strip() == "[]"
-
-
 # D13
 
 
@@ -593,92 +354,3 @@ def test_d13_weights_survive_measurements_that_both_models_deem_impossible() -> 
         bank.update([300.0, 300.0])
     np.testing.assert_allclose(other.mu, [0.5, 0.5])  # both likelihoods are at their floor
     assert ours.mu[1] > 1 - 1e-12
-
-
-# Faults of filterpy 2.0.0, and the right answers
-
-
-def test_fault_mmae_covariance() -> None:
-    """Means (0, 0) and (2, 0): the variances are 0.78 and 2 by moments, filterpy has 1.61, 2.5."""
-
-    def two() -> list[Any]:
-        filters = [KalmanFilter(2, 1) for _ in range(2)]
-        for f, x in zip(filters, ([0.0, 0.0], [2.0, 0.0]), strict=True):
-            f.x, f.P, f.H, f.R = np.array(x), np.eye(2), np.array([[1.0, 0.0]]), np.eye(1)
-        return filters
-
-    bank = MMAEFilterBank(two(), [0.5, 0.5], 2)
-    bank.predict()
-    bank.update(1.0)
-    np.testing.assert_allclose(bank.P, [[1.6111, 0.1667], [0.1667, 2.5]], atol=1e-4)
-    right = sum(
-        p * (f.P + np.outer(f.x - bank.x, f.x - bank.x))
-        for p, f in zip(bank.p, bank.filters, strict=True)
-    )
-    np.testing.assert_allclose(right, [[0.7778, 0.0], [0.0, 2.0]], atol=1e-4)
-    ours = IMM(two(), [0.5, 0.5], np.eye(2))  # an MMAE is an IMM that never switches
-    ours.predict()
-    ours.update(1.0)
-    np.testing.assert_allclose(ours.P, right)
-
-
-def test_fault_imm_averages_angles_to_their_opposite() -> None:
-    members = [KalmanFilter(1, 1), KalmanFilter(1, 1)]
-    for f, x in zip(members, (np.pi - 0.05, -np.pi + 0.05), strict=True):
-        f.x = np.array([x])
-    assert IMMEstimator(members, [0.5, 0.5], M).x == pytest.approx(0.0)
-    ours = IMM(members, [0.5, 0.5], M, angles=(0,))
-    assert abs(ours.x[0]) == pytest.approx(np.pi)
-
-
-def test_fault_ukf_smoother_ignores_qs() -> None:
-    zs = track(6)
-    Qs = [WALK.Q() * scale for scale in (1.0, 1.0, 50.0, 1.0, 1.0, 1.0)]
-    ukf = as_filterpy(WALK, SEEN, "ukf", x=X, P=P)
-    kalman, tracker = plain(), plain(kind=UKF)
-    xs, Ps = kalman.batch_filter(zs, Qs=Qs)[:2]
-    np.testing.assert_array_equal(ukf.rts_smoother(xs, Ps, Qs=Qs)[0], ukf.rts_smoother(xs, Ps)[0])
-    right = theirs().rts_smoother(xs, Ps, Qs=Qs)
-    for ours in (kalman, tracker):
-        for a, b in zip(ours.rts_smoother(xs, Ps, Qs=Qs), right, strict=True):
-            np.testing.assert_allclose(a, b, atol=1e-9)
-
-
-def test_fault_complex_h_fails_silently() -> None:
-    kf = KalmanFilter(1, 1)
-    kf.x, kf.H = np.array([1.0]), np.array([[2j]])
-    kf.update(np.array([1j]))
-    assert kf.P.real < 0 or kf.P.real > 1  # no error, and no covariance any more
-    with pytest.raises(TypeError, match=r"must hold real numbers.*composite"):
-        LinearMeasurement([[1j]], [[1.0]])
-    tracker = Kalman(RandomWalk(1.0, 1), LinearMeasurement([[1.0]], [[1.0]]), [1.0], [[1.0]])
-    with pytest.raises(TypeError, match="H must hold real numbers; got complex128"):
-        tracker.update(1.0, H=[[1j]])
-    with pytest.raises(TypeError, match=r"real numbers.*composite\(z\)"):
-        tracker.update([1j])
-
-
-def test_fault_second_update_uses_stale_sigma_points() -> None:
-    """Two updates by linear measurements are two Kalman updates; not in filterpy's UKF and CKF."""
-    right, ours = plain(), plain(kind=UKF)
-    stale = [as_filterpy(WALK, SEEN, kind, x=X, P=P) for kind in ("ukf", "ckf")]
-    for f in (right, ours, *stale):
-        f.predict()
-        for z in track(2):
-            f.update(z)
-    assert_twins(ours, right, 1e-9)
-    for f in stale:
-        assert np.abs(np.ravel(f.x) - right.x).max() > 0.01
-
-
-def test_fault_resampling_draws_from_the_global_generator() -> None:
-    weights = np.random.default_rng(0).dirichlet(np.ones(50))
-    draws = []
-    for _ in range(2):
-        np.random.seed(3)  # noqa: NPY002
-        draws.append(their_resample(weights))
-    np.testing.assert_array_equal(*draws)
-    before = np.random.get_state()[1].copy()  # type: ignore[index]  # noqa: NPY002
-    ours = systematic_resample(weights, np.random.default_rng(1))
-    np.testing.assert_array_equal(before, np.random.get_state()[1])  # type: ignore[index]  # noqa: NPY002
-    assert np.abs(np.bincount(ours, minlength=50) - 50 * weights).max() < 1

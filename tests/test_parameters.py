@@ -1,0 +1,187 @@
+"""Parameters by name, and configurations."""
+
+import copy
+import dataclasses
+import json
+import pickle
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+from hands import SNAPSHOTS, Hands
+
+from arrivals.measurement_models import ArraySnapshot, MeasurementModel, SensorArray
+from arrivals.motion_models import BernoulliVonMises, LinearMotion, RandomWalk, VonMisesWalk
+from arrivals.params import Configurable, Model
+from arrivals.trackers import (
+    CBF,
+    SVALSE,
+    Tracker,
+    create,
+)
+
+# parameters by name
+
+
+def test_parameters_have_nested_names() -> None:
+    tracker = SVALSE(SNAPSHOTS, VonMisesWalkOfSources)
+    deep, flat = tracker.get_params(), tracker.get_params(deep=False)
+    assert flat["motion"] is tracker.motion
+    assert "motion__kappa" not in flat
+    assert deep["motion__kappa"] == 20.0
+    assert deep["measurement__array__speed"] is None
+    assert set(flat) == {name for name in deep if "__" not in name}
+
+
+VonMisesWalkOfSources = BernoulliVonMises(kappa=20.0)
+
+
+def test_setting_reaches_into_parts_and_leaves_the_old_ones_alone() -> None:
+    tracker = SVALSE(SNAPSHOTS, VonMisesWalkOfSources)
+    old = tracker.measurement
+    tracker.set_params(motion__kappa=30.0, measurement__array__speed=340.0, merge=0.0)
+    assert (tracker.motion.kappa, tracker.merge) == (30.0, 0.0)
+    assert tracker.measurement.array.speed == 340.0
+    assert old.array.speed is None
+    assert VonMisesWalkOfSources.kappa == 20.0
+
+
+def test_setting_a_part_and_its_parameter_changes_the_new_part() -> None:
+    tracker = SVALSE(SNAPSHOTS)
+    tracker.set_params(motion__kappa=30.0, motion=BernoulliVonMises(p_activate=0.2))
+    assert tracker.motion == BernoulliVonMises(kappa=30.0, p_activate=0.2)
+
+
+def test_setting_reaches_into_a_tracker_inside_a_tracker() -> None:
+    inner = Hands(VonMisesWalk(5.0))
+    outer = Hands(inner=inner).set_params(inner__motion__kappa=7.0)
+    assert isinstance(outer.inner, Hands)
+    assert outer.inner.motion == VonMisesWalk(7.0)
+    assert inner.motion == VonMisesWalk(5.0)
+
+
+@pytest.mark.parametrize(
+    ("params", "error", "message"),
+    [
+        (
+            {"kappa": 1.0},
+            ValueError,
+            "SVALSE has no parameter 'kappa'; it has: carry, engine, kl, max_comp",
+        ),
+        ({"motion__kapa": 1.0}, ValueError, "BernoulliVonMises has no parameter 'kapa'"),
+        ({"merge__x": 1.0}, ValueError, "merge of SVALSE has no parameters of its own"),
+        ({"motion__kappa": -1.0}, ValueError, "kappa must be finite and positive; got -1"),
+        ({"motion": VonMisesWalk(1.0)}, TypeError, "motion must be a BernoulliVonMises; got Von"),
+        ({"tolerance": 1e-3, "posterior": "magic"}, ValueError, "posterior must be one of"),
+    ],
+)
+def test_refused_parameters_change_nothing(
+    params: dict[str, Any], error: type[Exception], message: str
+) -> None:
+    tracker = SVALSE(SNAPSHOTS)
+    before = tracker.get_params(deep=False)
+    with pytest.raises(error, match=message):
+        tracker.set_params(**params)
+    assert tracker.get_params(deep=False) == before
+
+
+def test_model_is_replaced_not_changed() -> None:
+    walk = BernoulliVonMises()
+    assert walk.replace(kappa=3.0) == BernoulliVonMises(kappa=3.0)
+    assert walk == BernoulliVonMises()
+    assert SNAPSHOTS.replace(array__speed=2.0).array.speed == 2.0
+    with pytest.raises(ValueError, match="VonMisesWalk has no parameter 'mu'; it has: kappa"):
+        VonMisesWalk(1.0).replace(mu=2.0)
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        walk.kappa = 1.0  # type: ignore[misc]
+
+
+def test_models_are_shared_by_copies_and_remade_by_pickle() -> None:
+    motion = LinearMotion([[1.0, 1.0], [0.0, 1.0]], np.eye(2))
+    for model in (motion, SNAPSHOTS, RandomWalk(q=0.5)):
+        assert copy.copy(model) is model
+        assert copy.deepcopy([model])[0] is model
+        loaded = pickle.loads(pickle.dumps(model))
+        assert loaded.to_dict() == model.to_dict()
+
+
+def test_constructor_must_name_its_parameters() -> None:
+    class Loose(Configurable):
+        def __init__(self, **params: Any) -> None:
+            pass
+
+    with pytest.raises(TypeError, match=r"Loose must name its parameters; it takes \*\*params"):
+        Loose().get_params()
+
+
+# configurations
+
+
+def test_configuration_is_plain_and_complete() -> None:
+    tracker = SVALSE(SNAPSHOTS, VonMisesWalkOfSources, merge=0.0)
+    config = tracker.to_dict()
+    assert config["type"] == "svalse"
+    assert (
+        config["motion"]["type"] == "arrivals.motion_models.bernoulli_von_mises:BernoulliVonMises"
+    )
+    rebuilt = Tracker.from_dict(json.loads(json.dumps(config)))
+    assert isinstance(rebuilt, SVALSE)
+    assert rebuilt.get_params(deep=False) == tracker.get_params(deep=False)
+
+
+def test_configuration_may_hold_a_tracker() -> None:
+    outer = Hands(VonMisesWalk(2.0), inner=CBF(SNAPSHOTS, max_sources=2))
+    config = json.loads(json.dumps(outer.to_dict()))
+    assert config["inner"]["type"] == "cbf"
+    rebuilt = Hands.from_dict(config)
+    assert isinstance(rebuilt.inner, CBF)
+    assert rebuilt.get_params()["inner__max_sources"] == 2
+    assert rebuilt.motion == VonMisesWalk(2.0)
+
+
+@dataclass(frozen=True)
+class Several(Model):
+    parts: Any
+
+
+def test_list_of_parts_makes_the_round_trip() -> None:
+    several = Several([VonMisesWalk(3.0), RandomWalk(q=0.5), 4])
+    assert Several.from_dict(json.loads(json.dumps(several.to_dict()))) == several
+
+
+@pytest.mark.parametrize(
+    ("config", "error", "message"),
+    [
+        ({"kappa": 1.0}, ValueError, "dictionary with the key 'type'"),
+        ("svalse", ValueError, "dictionary with the key 'type'; got 'svalse'"),
+        ({"type": 3}, ValueError, "no tracker '3'"),
+        ({"type": "svals"}, ValueError, "there is no tracker 'svals'; did you mean svalse"),
+        ({"type": "no_module:Thing"}, ValueError, "no class 'no_module:Thing' is installed here"),
+        ({"type": "arrivals:Thing"}, ValueError, "no class 'arrivals:Thing' is installed here"),
+        ({"type": ":Thing"}, ValueError, "no class ':Thing' is installed here"),
+        ({"type": "json:JSONDecoder"}, TypeError, "json:JSONDecoder is not a Tracker"),
+        ({"type": "json:dumps"}, TypeError, "json:dumps is not a Tracker"),
+        ({"type": "cbf", "thresh": 1.0}, ValueError, "cbf has no parameter 'thresh'"),
+        ({"type": "cbf"}, TypeError, "measurement"),
+        ({"type": "cbf", "measurement": 1}, TypeError, "measurement must be a ArraySnapshot|an Ar"),
+    ],
+)
+def test_bad_configuration_is_refused(config: Any, error: type[Exception], message: str) -> None:
+    with pytest.raises(error, match=message):
+        Tracker.from_dict(config)
+
+
+def test_configuration_of_another_kind_is_refused() -> None:
+    with pytest.raises(TypeError, match="is not a MeasurementModel"):
+        MeasurementModel.from_dict(VonMisesWalk(1.0).to_dict())
+
+
+def test_whole_numbers_set_as_parameters_can_be_cloned() -> None:
+    from sklearn.base import clone
+
+    model = ArraySnapshot(SensorArray.ula(5, 0.5), 1.0)
+    for name, params in (("svalse", {"snr_db": 10, "merge": 0}), ("cbf", {"threshold_db": 6})):
+        tracker = create(name, measurement=model).set_params(**params)
+        assert clone(tracker).get_params() == tracker.get_params()
+        assert isinstance(getattr(tracker, next(iter(params))), float)

@@ -1,0 +1,176 @@
+"""The registry of trackers, and entry points of other packages."""
+
+import importlib.metadata
+import sys
+from collections.abc import Iterator
+from importlib.metadata import EntryPoint, EntryPoints
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hands import SNAPSHOTS
+
+from arrivals.trackers import (
+    CBF,
+    available,
+    create,
+    find,
+)
+from arrivals.trackers.registry import Registry
+
+# the registry
+
+
+class Animal:
+    pass
+
+
+class Dog(Animal):
+    pass
+
+
+class Cat(Animal):
+    pass
+
+
+@pytest.fixture
+def animals() -> Registry[Animal]:
+    registry = Registry(Animal, "arrivals.test_animals", "animal")
+    registry.register("dog")(Dog)
+    return registry
+
+
+def test_registered_class_is_found_made_and_given_back_unchanged(
+    animals: Registry[Animal],
+) -> None:
+    assert animals.register("cat")(Cat) is Cat
+    assert animals.available() == ["cat", "dog"]
+    assert animals.find("cat") is Cat
+    assert type(animals.create("cat")) is Cat
+    assert (animals.name_of(Dog), animals.name_of(Animal)) == ("dog", None)
+
+
+def test_taken_name_is_an_error_and_no_overwrite(animals: Registry[Animal]) -> None:
+    with pytest.raises(ValueError, match=r"animal name 'dog' is taken by test_registry\.Dog"):
+        animals.register("dog")(Cat)
+    assert animals.find("dog") is Dog
+    assert animals.register("dog")(Dog) is Dog  # the same again is no conflict
+
+
+@pytest.mark.parametrize("stranger", [int, Dog(), lambda: Dog()])
+def test_only_what_derives_from_the_base_enters(animals: Registry[Animal], stranger: Any) -> None:
+    with pytest.raises(TypeError, match="is no animal: derive it from Animal"):
+        animals.register("stranger")(stranger)
+    assert animals.available() == ["dog"]
+
+
+def test_unknown_name_is_answered_with_the_nearest() -> None:
+    with pytest.raises(ValueError, match="there is no tracker 'svasle'; did you mean svalse"):
+        create("svasle")
+    with pytest.raises(
+        ValueError, match=r"no tracker 'xyz'; known: ar_kalman_qrd_rls, .*cbf, .*svalse"
+    ):
+        find("xyz")
+
+
+def test_built_in_trackers_are_made_by_name() -> None:
+    assert {"cbf", "svalse", "valse"} <= set(available())
+    tracker = create("cbf", measurement=SNAPSHOTS, max_sources=1)
+    assert isinstance(tracker, CBF)
+    assert tracker.max_sources == 1
+
+
+# entry points of other packages
+
+
+@pytest.fixture
+def foreign(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[list[EntryPoint]]:
+    """Pretend that packages are installed which bring animals; the list may be added to."""
+    (tmp_path / "farm.py").write_text(
+        "from test_registry import Animal\nclass Cow(Animal): pass\nclass Rock: pass\n"
+    )
+    (tmp_path / "farm_facade.py").write_text("from farm import Cow\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setitem(sys.modules, "test_registry", sys.modules[__name__])
+    points: list[EntryPoint] = []
+
+    def entry_points(*, group: str) -> EntryPoints:
+        return EntryPoints(points).select(group=group)
+
+    monkeypatch.setattr("arrivals.trackers.registry.entry_points", entry_points)
+    yield points
+    for module in ("farm", "farm_facade"):
+        sys.modules.pop(module, None)
+
+
+def point(name: str, value: str, group: str = "arrivals.test_animals") -> EntryPoint:
+    return EntryPoint(name=name, value=value, group=group)
+
+
+def test_foreign_class_is_listed_unloaded_and_imported_on_demand(
+    animals: Registry[Animal], foreign: list[EntryPoint]
+) -> None:
+    foreign += [point("cow", "farm:Cow"), point("other", "farm:Cow", "another.group")]
+    assert animals.available() == ["cow", "dog"]
+    assert "farm" not in sys.modules
+    cow = animals.find("cow")
+    assert (cow.__module__, cow.__name__) == ("farm", "Cow")
+    assert animals.find("cow") is cow
+    assert type(animals.create("cow")) is cow
+    assert animals.name_of(cow) == "cow"
+
+
+def test_foreign_class_may_be_named_by_another_path(
+    animals: Registry[Animal], foreign: list[EntryPoint]
+) -> None:
+    foreign.append(point("cow", "farm_facade:Cow"))
+    assert animals.find("cow") is animals.find("cow")
+
+
+def test_package_seen_twice_is_no_collision(
+    animals: Registry[Animal], foreign: list[EntryPoint]
+) -> None:
+    foreign += [point("cow", "farm:Cow"), point("cow", "farm:Cow")]
+    assert animals.find("cow").__name__ == "Cow"
+
+
+def test_foreign_class_cannot_take_our_name(
+    animals: Registry[Animal], foreign: list[EntryPoint]
+) -> None:
+    foreign.append(point("dog", "farm:Cow"))
+    with pytest.raises(ValueError, match=r"'dog' is taken twice: farm:Cow, test_registry:Dog"):
+        animals.find("dog")
+    assert animals.available() == ["dog"]
+
+
+def test_two_foreign_classes_cannot_share_a_name(
+    animals: Registry[Animal], foreign: list[EntryPoint]
+) -> None:
+    foreign += [point("cow", "farm:Cow"), point("cow", "byre:Cow")]
+    with pytest.raises(ValueError, match="'cow' is taken twice: farm:Cow, byre:Cow"):
+        animals.create("cow")
+
+
+def test_foreign_thing_of_the_wrong_kind_is_refused(
+    animals: Registry[Animal], foreign: list[EntryPoint]
+) -> None:
+    foreign.append(point("rock", "farm:Rock"))
+    with pytest.raises(TypeError, match=r"Rock.* is no animal: derive it from Animal"):
+        animals.find("rock")
+
+
+def test_our_trackers_come_without_entry_points() -> None:
+    ours = [p for p in importlib.metadata.entry_points(group="arrivals.trackers")
+            if p.value.startswith("arrivals.")]  # fmt: skip
+    assert ours == []
+
+
+def test_a_tracker_that_cannot_be_imported_says_so(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    point = EntryPoint("broken", "no_such_package_here:Thing", "arrivals.trackers")
+    monkeypatch.setattr("arrivals.trackers.registry.entry_points", lambda group: [point])
+    with pytest.raises(ValueError, match="tracker 'broken', no_such_package_here:Thing, cannot"):
+        find("broken")
+    with pytest.raises(TypeError, match="named by a string; got 3"):
+        find(3)  # type: ignore[arg-type]
