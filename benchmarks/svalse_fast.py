@@ -179,7 +179,7 @@ def main() -> None:
         "walk": lambda: accuracy(options.runs, IN_DIRECTION, (4.8, 3.1, 2.3)),
         "valse": lambda: frames(options.runs),
         "snr": lambda: sweep(options.snr_runs),
-        "jump": lambda: jumps(8),
+        "jump": lambda: jumps(40),
     }
     print("| what | ours | limit | |\n|---|---|---|---|")
     for name in options.parts:
