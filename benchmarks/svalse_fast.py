@@ -148,6 +148,7 @@ def jumps(runs: int) -> None:
         ("svalse_scenario2", 40.0, 0.0, "11.9"),
         ("svalse_scenario1", 0.0, 40.0, "0.09"),
         ("svalse_scenario1", 40.0, 0.0, "5.3"),
+        ("svalse_scenario1", 0.0, 0.0, "has none"),
     ):
         after, later = [], []
         for seed in range(1, runs + 1):
