@@ -35,7 +35,8 @@ def cluster(n_workers: int) -> Iterator[list[subprocess.Popen[bytes]]]:
         common = ["--scheduler-file", where, "--no-dashboard"]
         commands = [["scheduler", "--port", "0"]]
         commands += [["worker", "--nthreads", "1", "--no-nanny"]] * n_workers
-        quiet: dict[str, Any] = {"cwd": folder, "stderr": subprocess.DEVNULL,
+        quiet: dict[str, Any] = {"cwd": folder, "stdout": subprocess.DEVNULL,
+                                 "stderr": subprocess.DEVNULL,
                                  "env": os.environ | {"OPENBLAS_NUM_THREADS": "1"}}  # fmt: skip
         started = [subprocess.Popen([DASK, c[0], *common, *c[1:]], **quiet) for c in commands]
         try:
@@ -43,10 +44,18 @@ def cluster(n_workers: int) -> Iterator[list[subprocess.Popen[bytes]]]:
                 client.wait_for_workers(n_workers, timeout=60)
                 yield started[1:]
         finally:
-            for process in started:
-                process.terminate()
-            for process in started:
-                process.wait()
+            for process in reversed(started):  # a worker without its scheduler may not stop
+                stop(process)
+
+
+def stop(process: subprocess.Popen[bytes]) -> None:
+    """End a process, by force if it must be."""
+    process.terminate()
+    try:
+        process.wait(timeout=10)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
 
 
 def numbers(study: Study) -> list[tuple[Any, ...]]:
