@@ -6,10 +6,10 @@ import argparse
 import csv
 import importlib
 import inspect
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import arrivals
 from arrivals.checks import count, one_of
@@ -18,7 +18,6 @@ from arrivals.trackers.recorder import replacing, text
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-T = TypeVar("T")
 QUICK = 10  # runs of a study that is only looked at
 
 # Where each study lives: a function of the number of runs and the seed, and if it likes of `out`, a
@@ -112,22 +111,6 @@ def _cell(value: Any) -> str:
     if isinstance(value, float):
         return "-" if value != value else f"{value:.4g}"
     return str(value)
-
-
-def spread(function: Callable[..., T], cases: Iterable[Sequence[Any]]) -> list[T]:
-    """Call a function with the arguments of every case, on as many processes as joblib is told.
-
-    Inside `joblib.parallel_config(n_jobs=...)` that many, else in this one; the results are those
-    of a loop, in its order.
-
-    Examples
-    --------
-    >>> spread(pow, [(2, 3), (3, 2)])
-    [8, 9]
-    """
-    from joblib import Parallel, delayed
-
-    return list(Parallel()(delayed(function)(*case) for case in cases))
 
 
 def reproduce(

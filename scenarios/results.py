@@ -108,7 +108,7 @@ class Results:
 
         Raises
         ------
-        RuntimeError
+        BlockingIOError
             If another one writes to it now.
         """
         if self.path is None or sys.platform == "win32":
@@ -121,7 +121,7 @@ class Results:
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError:
-                raise RuntimeError(f"another process is writing to {self.path}") from None
+                raise BlockingIOError(f"another process is writing to {self.path}") from None
             try:
                 yield
             finally:

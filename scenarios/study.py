@@ -124,6 +124,9 @@ class Study:
         notes = [row.note for row in found if row.note]
         if notes and len(notes) == len(found):
             raise ValueError(f"{metric} cannot be given: {notes[0]}")
+        failed = [r for r in self.failures() if r.method == method and r.case == case]
+        if not found and failed:
+            raise ValueError(f"every run of {method!r} failed, the first by {failed[0].note}")
         if not found:
             raise ValueError(
                 f"no run has the metric {metric!r} of {method!r}; the study has: "

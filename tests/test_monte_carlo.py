@@ -174,7 +174,7 @@ def test_full_disk_is_said_and_what_was_kept_is_gone_on_with(
 
 def test_two_processes_do_not_write_to_one_file(tmp_path: Path) -> None:
     study = monte_carlo("svalse_fig6", ["cbf"], 1, metrics=["gospa"], out=tmp_path)
-    with study._results.writing(), pytest.raises(RuntimeError, match="another process is writing"):
+    with study._results.writing(), pytest.raises(OSError, match="another process is writing"):
         monte_carlo("svalse_fig6", ["cbf"], 2, metrics=["gospa"], out=tmp_path)
     monte_carlo("svalse_fig6", ["cbf"], 2, metrics=["gospa"], out=tmp_path)
 
