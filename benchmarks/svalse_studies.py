@@ -15,7 +15,8 @@ from pathlib import Path
 from joblib import parallel_config
 
 from arrivals.scenarios import create, monte_carlo
-from arrivals.scenarios.reproduce_svalse import compared, plain, svalse_as_printed
+from arrivals.scenarios.methods import plain
+from arrivals.scenarios.reproduce_svalse import compared, svalse_as_printed
 from arrivals.scenarios.reproduce_svalse_snr import SCENES, SNR_DB, sweep
 from arrivals.scenarios.svalse_figures import ACTIVATION, REBUILT, SWEEP, SWEPT
 

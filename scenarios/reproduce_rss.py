@@ -224,6 +224,9 @@ def _figure4(trials: dict[str, Draws], found: dict[tuple[str, str], Answers]) ->
         ):
             _draw_places(ax, places, drawn.theta[0], disc, f"{case}: {title}")
         _draw_powers(row[3], drawn, vb, ml)
+        row[0].set_ylabel("y, m")
+    axes[0, 0].legend(["edge of the sensors", "one of a trial", "truth"], fontsize=7,
+                      loc="lower left")  # fmt: skip
     for letter, ax in zip("abcdefgh", axes.ravel(), strict=True):
         ax.set_title(f"({letter}) {ax.get_title()}", fontsize=9)
     return figure
@@ -251,7 +254,7 @@ def _draw_powers(ax: Axes, drawn: Draws, vb: Answers, ml: Answers) -> None:
         level = neper_to_db(u).ravel()
         kept = level[np.abs(level - mean) < 30]
         ax.hist(kept, edges.tolist(), histtype="step", linestyle=style, label=name, density=True)
-    ax.set(xlabel="power, dB", title="powers")
+    ax.set(xlabel="power, dB", ylabel="density, 1/dB", title="powers")
     ax.legend(fontsize=8)
 
 

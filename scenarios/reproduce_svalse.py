@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from arrivals.motion_models import BernoulliVonMises
 from arrivals.scenarios.base import Scenario, create
-from arrivals.scenarios.methods import Method, methods
-from arrivals.scenarios.plots import plot_bearing_time
+from arrivals.scenarios.methods import Method, methods, plain
 from arrivals.scenarios.reproduce import Report
 from arrivals.scenarios.runner import monte_carlo
 from arrivals.scenarios.snapshot_bounds import line_bound
 from arrivals.scenarios.study import Study
+from arrivals.scenarios.svalse_drawings import draw_parts, draw_runs
 from arrivals.scenarios.svalse_figures import ACTIVATION, PAPER, REBUILT
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 FAST = ("cbf", "peaks_gnn", "sbl", "ssbl", "valse", "svalse")
 # The paper's form
@@ -44,12 +39,10 @@ PRINTED = (
     svalse_as_printed("svalse as printed"),
 )
 SHOWN = ("valse", "svalse", "sbl", "ssbl", "cbf", "peaks_gnn")
-PARTS = {"distance": "#9aa5b1", "missed": "#1f77b4", "false": "#d62728"}
 NAN = float("nan")
-TRUTH = "#00b050"
 COLUMNS = ("method", "GOSPA", "std of runs", "from", "to", "distance", "missed", "false", "RMSE",
-           "wrong number", "label switches", "track length", "CPU ms a step",
-           "paper's run", "rebuilt", "its std", "rebuilt RMSE")  # fmt: skip
+           "wrong number", "label switches", "track length", "NEES", "in 68 %", "in 95 %",
+           "CPU ms a step", "paper's run", "rebuilt", "its std", "rebuilt RMSE")  # fmt: skip
 
 
 def compared(quick: bool) -> list[Method]:
@@ -81,10 +74,12 @@ def scene(
     study = monte_carlo({name: scenario}, compared(quick), runs, seed, out=out,
                         batch=batch_of(runs))  # fmt: skip
     rows = [_row(study, name, method) for method in study.methods]
-    said = [*remarks, SPREADS, *_order(study), _calibration(study), _bound(scenario, runs, seed)]
+    said = [*remarks, *SPREADS, *_order(study), *_calibration(study), _bound(scenario, runs, seed)]
     figures = {
-        "tracks": draw_runs(scenario, seed, methods(SHOWN)),
-        "gospa": _draw_parts(study, name),
+        "tracks": draw_runs(
+            scenario, seed, methods(SHOWN), [PAPER[name].get(method, NAN) for method in SHOWN]
+        ),
+        "gospa": draw_parts(study, name),
     }
     return Report(f"{title}, {runs} runs at 20 dB, degrees", COLUMNS, rows, said, figures)
 
@@ -101,10 +96,13 @@ def batch_of(runs: int) -> int:
 
 
 SPREADS = (
-    "From, to: 95 % bootstrap interval of the mean. Rebuilt: the published programs of SBL and "
-    "SSBL; VALSE and SVALSE as the paper prints them (coordinate ascent, first sensor as reference "
-    "of the phases, tolerance 1e-6, a walk in the electrical angle). Ours, unless so called, take "
-    "joint Newton steps, count phases from the middle and walk 1.5 degrees in direction."
+    "From, to: 95 % bootstrap interval of the mean. Label switches: in a run. Track length: steps "
+    "for which a source is found under one label without a gap. NEES: squared error over stated "
+    "variance, 1 if right; in 68 %, in 95 %: share of errors within the stated intervals.",
+    "Rebuilt: the published programs of SBL and SSBL; VALSE and SVALSE as the paper prints them "
+    "(coordinate ascent, first sensor as reference of the phases, tolerance 1e-6, a walk in the "
+    "electrical angle). Ours, unless so called, take joint Newton steps, count phases from the "
+    "middle and walk 1.5 degrees in direction.",
 )
 
 
@@ -118,7 +116,7 @@ def _row(study: Study, name: str, method: str) -> tuple[Any, ...]:
     rebuilt = REBUILT[name].get(plain(method))
     known = (rebuilt.gospa, rebuilt.std, rebuilt.rmse) if rebuilt else (NAN,) * 3
     wanted = ("distance", "missed", "false", "rmse", "cardinality", "label_switches",
-              "track_length", "cpu_ms")  # fmt: skip
+              "track_length", "nees", "coverage68", "coverage95", "cpu_ms")  # fmt: skip
     return (
         method,
         study.mean("gospa", method),
@@ -128,17 +126,6 @@ def _row(study: Study, name: str, method: str) -> tuple[Any, ...]:
         PAPER[name].get(plain(method), NAN),
         *known,
     )
-
-
-def plain(method: str) -> str:
-    """Return the tracker that a label begins with.
-
-    Examples
-    --------
-    >>> plain("svalse as printed")
-    'svalse'
-    """
-    return method.partition(" ")[0]
 
 
 def holds(claim: str, fact: bool, numbers: str) -> str:
@@ -167,12 +154,21 @@ def _order(study: Study) -> list[str]:
     return lines
 
 
-def _calibration(study: Study) -> str:
-    nees, c68, c95 = (study.mean(m, "svalse") for m in ("nees", "coverage68", "coverage95"))
-    numbers = f"normalised squared error {nees:.1f} in place of 1; the 68 % and 95 % intervals " \
-              f"cover {100 * c68:.0f} % and {100 * c95:.0f} %"  # fmt: skip
-    fact = abs(c68 - 0.68) < 0.05 and abs(c95 - 0.95) < 0.05
-    return holds("svalse's stated standard deviations are those of its errors", fact, numbers)
+def _calibration(study: Study) -> list[str]:
+    """Tell of each method that states deviations whether they are right."""
+    lines = []
+    for method in study.methods:
+        try:
+            nees, c68, c95 = (study.mean(m, method) for m in ("nees", "coverage68", "coverage95"))
+        except ValueError:  # it states none
+            continue
+        numbers = (
+            f"errors {np.sqrt(nees):.1f} times as large as stated, in rms; the 68 % and 95 % "
+            f"intervals cover {100 * c68:.0f} % and {100 * c95:.0f} %"
+        )
+        fact = abs(c68 - 0.68) < 0.05 and abs(c95 - 0.95) < 0.05
+        lines.append(holds(f"{method} states the standard deviations of its errors", fact, numbers))
+    return lines
 
 
 def _bound(scenario: Scenario, runs: int, seed: int) -> str:
@@ -182,45 +178,6 @@ def _bound(scenario: Scenario, runs: int, seed: int) -> str:
         f"have a GOSPA of {bound.gospa:.2f} and an RMSE of {bound.rmse:.2f} (deterministic "
         f"Cramér-Rao bound, capped at the cut-off)."
     )
-
-
-def draw_runs(scenario: Scenario, seed: int, shown: Sequence[Method]) -> Figure:
-    """Draw run 0 of a study by several methods: the beam behind, the truth in green."""
-    chance = np.random.SeedSequence(seed, spawn_key=(0,))
-    trial = scenario.sample(np.random.default_rng(chance))
-    figure, axes = _figure(-(-len(shown) // 2), 2, (12.0, 3.0 * -(-len(shown) // 2)))
-    for ax, method in zip(axes, shown, strict=False):
-        run = method.make(trial, chance).run(trial.measurements)
-        plot_bearing_time(
-            run, snapshots=trial.measurements, measurement=trial.measurement,  # type: ignore[arg-type]  # complex
-            ax=ax,
-        )  # fmt: skip
-        steps = np.broadcast_to(np.arange(len(trial.truth))[:, None], trial.truth.shape)
-        ax.plot(steps, np.rad2deg(trial.truth), ".", color=TRUTH, markersize=2, zorder=4)
-        ax.set_title(method.label, fontsize=10)
-    for ax in axes[len(shown):]:  # fmt: skip
-        ax.set_axis_off()
-    return figure
-
-
-def _draw_parts(study: Study, name: str) -> Figure:
-    """Draw GOSPA as a bar of its three parts, a bar a method, with the interval of the whole."""
-    figure, (ax,) = _figure(1, 1, (9.0, 3.8))
-    labels = study.methods
-    base = np.zeros(len(labels))
-    for part, colour in PARTS.items():
-        heights = np.array([study.mean(part, method) for method in labels])
-        ax.bar(labels, heights, bottom=base, color=colour, width=0.6, label=part)
-        base += heights
-    ends = np.array([study.interval("gospa", method) for method in labels]).T
-    ax.errorbar(labels, base, yerr=np.abs(ends - base), color="black", fmt="none", capsize=3)
-    for n, method in enumerate(labels):
-        if plain(method) in REBUILT[name]:
-            ax.plot(n, REBUILT[name][plain(method)].gospa, "D", color="black", markersize=4,
-                    label="rebuilt" if method == "svalse" else None)  # fmt: skip
-    ax.set(ylabel="GOSPA, degrees")
-    ax.legend(fontsize=8)
-    return figure
 
 
 # -- Fig. 7 ------------------------------------------------------------------------------------
@@ -239,7 +196,8 @@ def fig7(runs: int, seed: int, out: Path | None = None) -> Report:
     columns = ("p_deactivate", "p_activate", "GOSPA", "std of runs", "missed", "false", "RMSE",
                "converged", "paper's run", "paper's RMSE", "rebuilt", "its std",
                "rebuilt RMSE")  # fmt: skip
-    figures = {"tracks": draw_runs(scenario, seed, settings[:4])}
+    paper = [known.paper for known in ACTIVATION.values()]
+    figures = {"tracks": draw_runs(scenario, seed, settings[:4], paper)}
     title = f"Fig. 7: probabilities of activation, svalse as printed, {runs} runs at 20 dB, degrees"
     return Report(title, columns, rows, _activation_claims(study), figures)
 
@@ -266,10 +224,3 @@ def _activation_row(study: Study, label: str, off: float, on: float) -> tuple[An
     means = [study.mean(metric, label) for metric in ("missed", "false", "rmse", "converged")]
     return (off, on, study.mean("gospa", label), study.spread("gospa", label), *means,
             known.paper, known.paper_rmse, known.gospa, known.std, known.rmse)  # fmt: skip
-
-
-def _figure(n_rows: int, n_columns: int, size: tuple[float, float]) -> tuple[Figure, list[Axes]]:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=size, layout="constrained")
-    return figure, list(figure.subplots(n_rows, n_columns, squeeze=False).ravel())

@@ -7,15 +7,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from arrivals.scenarios.base import create
+from arrivals.scenarios.methods import plain
 from arrivals.scenarios.reproduce import Report
-from arrivals.scenarios.reproduce_svalse import NAN, _figure, batch_of, compared, holds, plain
+from arrivals.scenarios.reproduce_svalse import NAN, batch_of, compared, holds
 from arrivals.scenarios.runner import monte_carlo
 from arrivals.scenarios.snapshot_bounds import LineBound, line_bound
 from arrivals.scenarios.study import Study
-from arrivals.scenarios.study_plots import plot_metric
+from arrivals.scenarios.study_plots import METHOD_COLOURS, plot_metric
+from arrivals.scenarios.svalse_drawings import panels
 from arrivals.scenarios.svalse_figures import SWEEP, SWEPT
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 SCENES = {"svalse_scenario1": "three static sources", "svalse_scenario2": "six static sources"}
@@ -50,7 +53,7 @@ def parts(name: str, figure: str, runs: int, seed: int, out: Path | None, quick:
     remarks = [*_claims(study, name), BOUND]
     bounds = _bounds(name, runs, seed)
     title = f"{figure}: GOSPA against the SNR, {SCENES[name]}, {runs} runs, degrees"
-    return Report(title, columns, rows, remarks, {"parts": _draw_parts(study, bounds)})
+    return Report(title, columns, rows, remarks, {"parts": _draw_parts(study, name, bounds)})
 
 
 BOUND = (
@@ -102,11 +105,21 @@ def _claims(study: Study, name: str) -> list[str]:
     return lines
 
 
-def _draw_parts(study: Study, bounds: dict[str, LineBound]) -> Figure:
-    figure, axes = _figure(2, 2, (11.0, 7.5))
+def _draw_rebuilt(ax: Axes, name: str, part: int) -> None:
+    """Mark the rebuilt GOSPA (part 0) or RMSE (1) by crosses, in the methods' colours."""
+    for n, method in enumerate(SWEPT):
+        values = [known[n][part] for known in SWEEP[name].values()]
+        told = "rebuilt" if n == 0 else None
+        ax.plot(SNR_DB, values, "x", color=METHOD_COLOURS[method], markersize=5, label=told)
+
+
+def _draw_parts(study: Study, name: str, bounds: dict[str, LineBound]) -> Figure:
+    figure, axes = panels(2, 2, (11.0, 7.5))
     titles = {"gospa": "GOSPA", "distance": "distance", "missed": "missed", "false": "false"}
     for ax, (metric, title) in zip(axes, titles.items(), strict=True):
         bound = {case: one.gospa for case, one in bounds.items()} if metric == "gospa" else None
+        if metric == "gospa":
+            _draw_rebuilt(ax, name, 0)
         plot_metric(study, metric, x="snr_db", bound=bound, ax=ax)
         ax.set(xlabel="SNR, dB", ylabel=f"{title}, degrees")
         legend = ax.get_legend()
@@ -118,9 +131,10 @@ def _draw_parts(study: Study, bounds: dict[str, LineBound]) -> Figure:
 def fig10(runs: int, seed: int, out: Path | None = None, quick: bool = False) -> Report:
     """RMSE against the SNR, both scenarios."""
     rows: list[tuple[Any, ...]] = []
-    figure, axes = _figure(1, 2, (11.0, 4.2))
+    figure, axes = panels(1, 2, (11.0, 4.2))
     for ax, name in zip(axes, SCENES, strict=False):
         study, bounds = sweep(name, runs, seed, out, quick), _bounds(name, runs, seed)
+        _draw_rebuilt(ax, name, 1)
         plot_metric(study, "rmse", x="snr_db", ax=ax,
                     bound={case: one.rmse for case, one in bounds.items()})  # fmt: skip
         ax.set(xlabel="SNR, dB", ylabel="RMSE, degrees", yscale="log", title=SCENES[name])
