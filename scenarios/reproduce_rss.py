@@ -225,8 +225,8 @@ def _figure4(trials: dict[str, Draws], found: dict[tuple[str, str], Answers]) ->
             _draw_places(ax, places, drawn.theta[0], disc, f"{case}: {title}")
         _draw_powers(row[3], drawn, vb, ml)
         row[0].set_ylabel("y, m")
-    axes[0, 0].legend(["edge of the sensors", "one of a trial", "truth"], fontsize=7,
-                      loc="lower left")  # fmt: skip
+    figure.legend(axes[0, 0].get_lines(), ["edge of the sensors", "start or estimate", "truth"],
+                  fontsize=8, loc="outside upper center", ncols=3, frameon=False)  # fmt: skip
     for letter, ax in zip("abcdefgh", axes.ravel(), strict=True):
         ax.set_title(f"({letter}) {ax.get_title()}", fontsize=9)
     return figure

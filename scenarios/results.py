@@ -31,8 +31,10 @@ def fingerprint(config: Mapping[str, Any]) -> str:
     return hashlib.sha256(_text(config).encode()).hexdigest()[:10]
 
 
-def code_mark(modules: Iterable[str]) -> str:
+def code_mark(modules: Iterable[str] | None = None) -> str:
     """Return ten letters that differ when trackers, models or the named modules have changed.
+
+    If no modules are given, all scenarios count too.
 
     Examples
     --------
@@ -41,7 +43,9 @@ def code_mark(modules: Iterable[str]) -> str:
     """
     packages = (measurement_models, motion_models, trackers)
     files = {path for package in packages for path in Path(package.__path__[0]).glob("*.py")}
-    named = (getattr(sys.modules.get(name), "__file__", None) for name in modules)
+    if modules is None:
+        files |= set(Path(__file__).parent.glob("*.py"))
+    named = (getattr(sys.modules.get(name), "__file__", None) for name in modules or ())
     files |= {Path(file) for file in named if file}
     contents = hashlib.sha256()
     for path in sorted(files):
