@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from arrivals.scenarios.base import create
 from arrivals.scenarios.methods import plain
 from arrivals.scenarios.reproduce import Report
-from arrivals.scenarios.reproduce_svalse import NAN, batch_of, compared, holds
+from arrivals.scenarios.reproduce_svalse import NAN, batch_of, compared, holds, negative
 from arrivals.scenarios.runner import monte_carlo
 from arrivals.scenarios.snapshot_bounds import LineBound, line_bound
 from arrivals.scenarios.study import Study
@@ -131,6 +132,7 @@ def _draw_parts(study: Study, name: str, bounds: dict[str, LineBound]) -> Figure
 def fig10(runs: int, seed: int, out: Path | None = None, quick: bool = False) -> Report:
     """RMSE against the SNR, both scenarios."""
     rows: list[tuple[Any, ...]] = []
+    said: list[str] = []
     figure, axes = panels(1, 2, (11.0, 4.2))
     for ax, name in zip(axes, SCENES, strict=False):
         study, bounds = sweep(name, runs, seed, out, quick), _bounds(name, runs, seed)
@@ -138,12 +140,25 @@ def fig10(runs: int, seed: int, out: Path | None = None, quick: bool = False) ->
         plot_metric(study, "rmse", x="snr_db", ax=ax,
                     bound={case: one.rmse for case, one in bounds.items()})  # fmt: skip
         ax.set(xlabel="SNR, dB", ylabel="RMSE, degrees", yscale="log", title=SCENES[name])
+        said += _rmse_claims(study, SCENES[name])
         for snr in SNR_DB:
             rows += [(name, *_rmse_row(study, name, snr, method), bounds[f"{snr:g}"].rmse)
                      for method in study.methods]  # fmt: skip
     columns = ("scenario", "snr_db", "method", "RMSE", "std of runs", "rebuilt", "bound")
     title = f"Fig. 10: RMSE against the SNR, {runs} runs, degrees"
-    return Report(title, columns, rows, (BOUND,), {"rmse": figure})
+    return Report(title, columns, rows, (*said, BOUND), {"rmse": figure})
+
+
+def _rmse_claims(study: Study, scene: str) -> Iterator[str]:
+    """Hold that the RMSE, blind to false directions, favours ssbl at low SNR only."""
+    for snr, better, worse in ((0, "ssbl", "svalse"), (20, "svalse", "ssbl"), (20, "ssbl", "sbl")):
+        off = study.paired("rmse", better, worse, f"{snr}")
+        values = [study.mean("rmse", method, f"{snr}") for method in (better, worse)]
+        numbers = (
+            f"{values[0]:.2f} and {values[1]:.2f}, difference {off.mean:.2f} ± {off.error:.2f}"
+        )
+        claim = f"{scene}, {snr} dB: {better} has a lower RMSE than {worse}"
+        yield holds(claim, negative(off.mean, off.error), numbers)
 
 
 def _rmse_row(study: Study, name: str, snr: float, method: str) -> tuple[Any, ...]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from arrivals.scenarios.metrics import mean_gospa, mean_rmse
 from arrivals.scenarios.reproduce import Report
-from arrivals.scenarios.reproduce_svalse import holds
+from arrivals.scenarios.reproduce_svalse import holds, negative
 from arrivals.scenarios.swellex96 import WITHIN_DB, TowPastLine, track
 from arrivals.scenarios.swellex_claims import Claim, claims
 from arrivals.scenarios.swellex_figures import environment_figure, field_figure
@@ -110,9 +110,10 @@ def compared(scenario: TowPastLine, doa: Mapping[str, Sequence[Float]], step: In
         part = 0 if claim == LOWER else 2  # of the scores
         off = (score[better] - score[worse])[:, part]
         numbers = f"{score[better][:, part].mean():.1f} and {score[worse][:, part].mean():.1f}"
-        if len(off) > 1:
-            numbers += f", difference {off.mean():.1f} ± {off.std(ddof=1) / len(off) ** 0.5:.1f}"
-        yield holds(f"in steps 1 to 100 {better} {claim} {worse}", off.mean() < 0, numbers)
+        error = float(off.std(ddof=1)) / len(off) ** 0.5 if len(off) > 1 else np.nan
+        numbers += f", difference {off.mean():.2f} ± {error:.2f}" if len(off) > 1 else ", one draw"
+        fact = negative(float(off.mean()), error)
+        yield holds(f"in steps 1 to 100 {better} {claim} {worse}", fact, numbers)
 
 
 def found(scenario: TowPastLine, name: str, seed: int, draw: int) -> tuple[Run, float]:

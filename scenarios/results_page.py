@@ -11,11 +11,13 @@ import arrivals
 from arrivals.trackers.recorder import replacing
 
 MARK = "<!-- arrivals "
+HOLD, FAIL = ("Holds", "Reproduced"), ("Does not hold", "Not reproduced", "Not confirmed")
+VERDICTS = (*HOLD, *FAIL, "Not decided")
 # What a study's name begins with, and whose claims it holds.
 PAPERS = {
     "svalse": "Park, Meyer and Gerstoft, 2023: SVALSE",
     "swellex96": "Park, Meyer and Gerstoft, 2023: SVALSE at sea",
-    "ar": "Magakian, 2024: directions and signals of autoregressive sources",
+    "ar": "Gu, Chan, Zhu and Swamy, 2013, and Magakian's report, 2024: autoregressive sources",
     "interpolation": "The interpolation-delay filter",
     "rss": "Cevher, Sankaranarayanan and Chellappa, 2008: positions from signal strength",
     "any": "Any array: nothing of it is published",
@@ -100,13 +102,13 @@ def _verdicts(text: str) -> str:
     >>> _verdicts("Holds: a (1).\n\nHolds: b (2).\n\nDoes not hold: c (3).\n")
     ': 2 claims hold, 1 does not'
     """
-    lines = text.splitlines()
-    hold, fail = (sum(line.startswith(said) for line in lines)
-                  for said in ("Holds: ", "Does not hold: "))  # fmt: skip
-    if hold + fail == 0:
+    said = [line.partition(": ")[0] for line in text.splitlines()]
+    hold, fail, open_ = (sum(map(said.count, kind)) for kind in (HOLD, FAIL, ("Not decided",)))
+    if hold + fail + open_ == 0:
         return ""
-    return f": {hold} claim{'s' * (hold != 1)} hold{'s' * (hold == 1)}, {fail} " \
-           f"do{'es' * (fail == 1)} not"  # fmt: skip
+    told = f": {hold} claim{'s' * (hold != 1)} hold{'s' * (hold == 1)}, "
+    told += f"{fail} do{'es' * (fail == 1)} not"
+    return told + (f", {open_} not decided" if open_ else "")
 
 
 def _section(name: str, text: str, stamp: Mapping[str, Any] | None) -> str:
@@ -120,8 +122,7 @@ def _section(name: str, text: str, stamp: Mapping[str, Any] | None) -> str:
     body = "\n".join(kept).strip()
     while "\n\n\n" in body:
         body = body.replace("\n\n\n", "\n\n")
-    for said in ("Holds: ", "Does not hold: "):
-        verdict, _, rest = said.partition(":")
-        body = body.replace(f"\n{said}", f"\n* **{verdict}**:{rest}")
-    body = body.replace(").\n\n* **", ").\n* **")
+    for said in VERDICTS:
+        body = body.replace(f"\n{said}: ", f"\n* **{said}**: ")
+    body = body.replace(".\n\n* **", ".\n* **")
     return f'<a id="{name}"></a>\n\n##{title}\n\n`arrivals reproduce {name}`{told}.\n\n{body}\n'

@@ -45,7 +45,8 @@ def _cause(message: str) -> str:
     'SIGKILL(-9)'
     """
     codes = re.findall(r"\w+\(-?\d+\)", message)
-    return ", ".join(code for code in codes if code != "EXIT(0)") or "killed, or out of memory"
+    bad = dict.fromkeys(code for code in codes if code != "EXIT(0)")
+    return ", ".join(bad) or "killed, or out of memory"
 
 
 def spread(function: Callable[..., T], cases: Iterable[Sequence[Any]]) -> list[T]:
