@@ -168,6 +168,9 @@ def reproduce(
         count("jobs", jobs)
     if runs is not None:
         count("runs", runs, least=min(2, _runs(name, quick=True)))
+    count("seed", seed, least=0)
+    if page is not None and not Path(page).parent.is_dir():  # known before hours of work
+        raise FileNotFoundError(2, "the folder does not exist", str(Path(page).parent))
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     names, written = tuple(STUDIES) if name == "all" else (name,), []

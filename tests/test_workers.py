@@ -121,6 +121,10 @@ def test_full_disk_and_unwritable_folder_are_one_line(tmp_path: Path) -> None:
     assert done.returncode == 2
     assert done.stderr.splitlines() == [f"arrivals: {tmp_path / 'killed.csv'}: File too large"]
     assert list(tmp_path.iterdir()) == []  # nothing half written
+    page = tmp_path / "nowhere" / "page.md"
+    done = called(COMMAND, None, "reproduce", "killed", "--out", str(tmp_path), "--page", str(page))
+    assert done.stderr.splitlines() == [f"arrivals: {page.parent}: the folder does not exist"]
+    assert list(tmp_path.iterdir()) == []  # said before anything was run
     (tmp_path / "file").write_text("")
     done = called(COMMAND, None, "reproduce", "killed", "--out", str(tmp_path / "file"))
     assert done.returncode == 2
