@@ -47,8 +47,8 @@ def monte_carlo(
     runs : int
     seed : int
     metrics : sequence of str, or mapping of str to callable, optional
-        Names out of `scores.METRICS`, or functions of (trial, run); all of `METRICS` if None. Theirs
-        are degrees where the truth is directions, metres where it is positions.
+        Names out of `scores.METRICS`, or functions of (trial, run); all of `METRICS` if
+        None, degrees where the truth is directions, metres where it is positions.
     out : path, optional
         A CSV file that results stream into, or a folder in which each configuration finds its
         own. What is in it already is not computed again; more runs are added to it.
