@@ -15,7 +15,8 @@ from pathlib import Path
 from joblib import parallel_config
 
 from arrivals.scenarios import create, monte_carlo
-from arrivals.scenarios.reproduce_svalse import _activated, compared, plain
+from arrivals.scenarios.methods import plain
+from arrivals.scenarios.reproduce_svalse import compared, svalse_as_printed
 from arrivals.scenarios.reproduce_svalse_snr import SCENES, SNR_DB, sweep
 from arrivals.scenarios.svalse_figures import ACTIVATION, REBUILT, SWEEP, SWEPT
 
@@ -68,7 +69,10 @@ def activations(runs: int, out: Path) -> None:
     """Print the table of section 12.3."""
     print("\n| p_d, p_a | GOSPA | rebuilt | missed | false | RMSE | rebuilt | within |")
     print("|---" * 8 + "|")
-    settings = [_activated(f"{off:g}, {on:g}", off, on) for off, on in ACTIVATION]
+    settings = [
+        svalse_as_printed(f"{off:g}, {on:g}", p_deactivate=off, p_activate=on)
+        for off, on in ACTIVATION
+    ]
     cases = {"svalse_fig6": create("svalse_fig6")}
     study = monte_carlo(cases, settings, runs, 0, out=out, batch=1)
     for method, known in zip(study.methods, ACTIVATION.values(), strict=True):

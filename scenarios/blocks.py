@@ -15,6 +15,7 @@ from arrivals.scenarios.scores import CPU, Metric
 from arrivals.trackers import Run, Tracker
 
 ERROR = "error"  # the metric of a run that failed; its note tells why
+LONGEST = 300  # letters of a note: an error may quote a whole array
 
 
 class Row(NamedTuple):
@@ -114,11 +115,24 @@ class Block:
             try:
                 yield Row(self.case, run, method.label, name, float(metric(trial, found)))
             except Exception as error:
-                note = " ".join(f"{method.label}: {error}".split())
+                note = brief(f"{method.label}: {error}")
                 yield Row(self.case, run, method.label, name, np.nan, note)
         yield Row(self.case, run, method.label, CPU, 1e3 * cpu / max(1, len(found)))
 
     def _failed(self, method: Method, run: int, error: Exception) -> Row:
-        what = " ".join(f"{type(error).__name__}: {error}".split())
+        what = brief(f"{type(error).__name__}: {error}")
         note = f"{what} (SeedSequence({self.seed}, spawn_key=({run},)))"
         return Row(self.case, run, method.label, ERROR, np.nan, note)
+
+
+def brief(text: str) -> str:
+    r"""Return one line; of a long one, its beginning and its end.
+
+    Examples
+    --------
+    >>> brief("a\nb"), len(brief(1000 * "a"))
+    ('a b', 300)
+    """
+    line = " ".join(text.split())
+    end = LONGEST // 4
+    return line if len(line) <= LONGEST else f"{line[: LONGEST - end - 5]} ... {line[-end:]}"

@@ -77,11 +77,89 @@ def coverage(error: ArrayLike, std: ArrayLike, level: float = 0.95) -> float:
     """
     from scipy.special import ndtri
 
-    if not 0 < level < 1:
-        raise ValueError(f"level must lie in (0, 1); got {level}")
+    half = (1 + _level(level)) / 2
     e, s = _stated(error, std)
     e = (e + np.pi) % (2 * np.pi) - np.pi
-    return float(np.mean(np.abs(e) <= ndtri((1 + level) / 2) * s)) if e.size else np.nan
+    return float(np.mean(np.abs(e) <= ndtri(half) * s)) if e.size else np.nan
+
+
+def position_nees(error: ArrayLike, covariance: ArrayLike) -> float:
+    """Average eᵀ P⁻¹ e over positions and their dimensions: 1 if the covariances are right.
+
+    Parameters
+    ----------
+    error : array_like, shape (n, dim)
+        m.
+    covariance : array_like, shape (n, dim, dim)
+        As stated, m².
+
+    Returns
+    -------
+    float
+        NaN for no errors.
+
+    Raises
+    ------
+    ValueError
+        If a covariance is not positive definite, or is NaN where there is an error.
+
+    References
+    ----------
+    Bar-Shalom, Li, Kirubarajan, *Estimation with Applications to Tracking and Navigation*, 2001,
+    (5.4.2-1).
+
+    Examples
+    --------
+    >>> position_nees([[3.0, 4.0]], [[[9.0, 0.0], [0.0, 4.0]]])
+    2.5
+    """
+    squares, dim = _mahalanobis(error, covariance)
+    return float(squares.mean() / dim) if squares.size else np.nan
+
+
+def position_coverage(error: ArrayLike, covariance: ArrayLike, level: float = 0.95) -> float:
+    """Return the share of errors within the normal ellipse of a level about the estimate.
+
+    Parameters
+    ----------
+    error, covariance : array_like, shapes (n, dim), (n, dim, dim)
+        As in `position_nees`.
+    level : float
+        In (0, 1).
+
+    Raises
+    ------
+    ValueError
+        As `position_nees`; if the level is out of range.
+
+    Examples
+    --------
+    >>> position_coverage([[1.0, 0.0], [0.0, 3.0]], [[[1.0, 0.0], [0.0, 1.0]]] * 2)
+    0.5
+    """
+    from scipy.special import chdtri
+
+    squares, dim = _mahalanobis(error, covariance)
+    return float((squares <= chdtri(dim, 1 - _level(level))).mean()) if squares.size else np.nan
+
+
+def _mahalanobis(error: ArrayLike, covariance: ArrayLike) -> tuple[Float, int]:
+    """Return eᵀ P⁻¹ e (n,), and the dimension."""
+    e, P = real("error", error), real("covariance", covariance)
+    if e.ndim != 2 or P.shape != (*e.shape, e.shape[-1]):
+        raise ValueError(
+            "error and covariance must have shapes (n, dim) and (n, dim, dim); "
+            f"got {e.shape} and {P.shape}"
+        )
+    if not (np.isfinite(P).all() and (np.linalg.eigvalsh(P) > 0).all()):
+        raise ValueError("covariance must be positive definite wherever there is an error")
+    return np.einsum("ni,ni->n", e, np.linalg.solve(P, e[..., None])[..., 0]), e.shape[1]
+
+
+def _level(level: float) -> float:
+    if not 0 < level < 1:
+        raise ValueError(f"level must lie in (0, 1); got {level}")
+    return level
 
 
 def _stated(error: ArrayLike, std: ArrayLike) -> tuple[Float, Float]:

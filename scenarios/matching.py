@@ -1,4 +1,4 @@
-"""Which found direction belongs to which true one, and what follows for tracks and their labels."""
+"""Which found point belongs to which true one, and what follows for tracks and their labels."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from arrivals.typing import Float, Int
 
 
 class Matches(NamedTuple):
-    """Pairs of a true and a found direction, step after step.
+    """Pairs of a true and a found direction or position, step after step.
 
     Parameters
     ----------
     step, source, slot : ndarray of int, shape (n_pairs,)
         Time step, column of the truth and column of what was found.
-    error : ndarray, shape (n_pairs,)
+    error : ndarray, shape (n_pairs,) or (n_pairs, dim)
         Found minus true, in the unit given; the shorter way round.
     """
 
@@ -29,12 +29,12 @@ class Matches(NamedTuple):
 
 
 def matches(truth: ArrayLike, found: ArrayLike, c: float, period: float | None = None) -> Matches:
-    """Pair, in each step, true and found directions nearer than `c` as GOSPA with p = 1 does.
+    """Pair, in each step, true and found points nearer than `c` as GOSPA with p = 1 does.
 
     Parameters
     ----------
-    truth, found : array_like, shapes (n_steps, n_sources), (n_steps, n_slots)
-        NaN where there is none.
+    truth, found : array_like, shapes (n_steps, n_sources[, dim]), (n_steps, n_slots[, dim])
+        Directions, or positions; NaN where there is none.
     c : float
         Same unit.
     period : float, optional
@@ -54,16 +54,17 @@ def matches(truth: ArrayLike, found: ArrayLike, c: float, period: float | None =
     from scipy.optimize import linear_sum_assignment
 
     t, f = real("truth", truth), real("found", found)
-    if t.ndim != 2 or f.ndim != 2 or len(t) != len(f):
+    if t.ndim not in (2, 3) or f.ndim != t.ndim or len(t) != len(f) or t.shape[2:] != f.shape[2:]:
         raise ValueError(
-            "truth and found must have shapes (n_steps, n_sources) and (n_steps, n_slots); "
-            f"got {t.shape} and {f.shape}"
+            "truth and found must have shapes (n_steps, n_sources) and (n_steps, n_slots), or "
+            f"(..., dim) of positions; got {t.shape} and {f.shape}"
         )
-    error = f[:, None, :] - t[:, :, None]
+    error = f[:, None] - t[:, :, None]
     if period is not None:
         half = positive("period", period) / 2
         error = (error + half) % period - half
-    cost = np.where(np.isnan(error), np.inf, np.abs(error))
+    far = np.abs(error) if error.ndim == 3 else np.linalg.norm(error, axis=-1)
+    cost = np.where(np.isnan(far), np.inf, far)
     near = np.minimum(cost, positive("c", c))
     rows = []
     for step in range(len(t)):

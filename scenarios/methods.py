@@ -116,3 +116,14 @@ def grid(tracker: str, values: Mapping[str, Sequence[Any]]) -> list[Method]:
     from sklearn.model_selection import ParameterGrid
 
     return [Method(tracker, params) for params in ParameterGrid(values)]
+
+
+def plain(method: str) -> str:
+    """Return the tracker that a label begins with.
+
+    Examples
+    --------
+    >>> plain("svalse as printed")
+    'svalse'
+    """
+    return method.partition(" ")[0]

@@ -179,7 +179,8 @@ def _draw_tracks(ax: Axes, at: Float, run: Run) -> None:
 def _joined(step: Int, label: Int, degrees: Float) -> Bool:
     """Tell which neighbours in a list sorted by label and step belong to one line."""
     same = (np.diff(label) == 0) & (label[1:] >= 0) & (np.diff(step) == 1)
-    return np.asarray(same & (np.abs(np.diff(degrees)) < 180))  # not across ±180°
+    furthest = 180 if (np.abs(degrees) > 90).any() else 90  # not across ±180°, on lines ±90°
+    return np.asarray(same & (np.abs(np.diff(degrees)) < furthest))
 
 
 def _colours(label: Int, existence: Float) -> Float:

@@ -6,19 +6,20 @@ import argparse
 import csv
 import importlib
 import inspect
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import arrivals
 from arrivals.checks import count, one_of
+from arrivals.scenarios.results import code_mark
+from arrivals.scenarios.results_page import stamp_of, stamped, write_page
 from arrivals.trackers.recorder import replacing, text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-T = TypeVar("T")
 QUICK = 10  # runs of a study that is only looked at
 
 # Where each study lives: a function of the number of runs and the seed, and if it likes of `out`, a
@@ -42,6 +43,8 @@ STUDIES: dict[str, str] = {
 }
 # Runs of a study that wants others than 100, and QUICK if it is only looked at.
 RUNS: dict[str, tuple[int, int]] = {
+    "any-array": (100, 3),
+    "ar-kf": (100, 4),
     "svalse-fig4": (20, 4),
     "svalse-fig5": (20, 4),
     "svalse-fig6": (20, 4),
@@ -114,22 +117,6 @@ def _cell(value: Any) -> str:
     return str(value)
 
 
-def spread(function: Callable[..., T], cases: Iterable[Sequence[Any]]) -> list[T]:
-    """Call a function with the arguments of every case, on as many processes as joblib is told.
-
-    Inside `joblib.parallel_config(n_jobs=...)` that many, else in this one; the results are those
-    of a loop, in its order.
-
-    Examples
-    --------
-    >>> spread(pow, [(2, 3), (3, 2)])
-    [8, 9]
-    """
-    from joblib import Parallel, delayed
-
-    return list(Parallel()(delayed(function)(*case) for case in cases))
-
-
 def reproduce(
     name: str,
     out: str | Path,
@@ -147,7 +134,8 @@ def reproduce(
         One of `STUDIES`, or "all".
     out : path
         Folder; it is made if it is not there. Studies of many runs keep theirs in its folder
-        "runs", and go on from there if they were stopped.
+        "runs", and go on from there if they were stopped; "all" runs no study again whose page is
+        there, of the same runs, seed and code.
     runs : int, optional
         Trials of each case; if None what `RUNS` says, else 100, or 10 if `quick`.
     seed : int
@@ -166,6 +154,8 @@ def reproduce(
     ------
     ValueError
         If there is no such study.
+    OSError
+        If something cannot be written, or a process died; what was finished stays.
 
     Examples
     --------
@@ -178,20 +168,45 @@ def reproduce(
         count("jobs", jobs)
     if runs is not None:
         count("runs", runs, least=min(2, _runs(name, quick=True)))
+    count("seed", seed, least=0)
+    if page is not None and not Path(page).parent.is_dir():  # known before hours of work
+        raise FileNotFoundError(2, "the folder does not exist", str(Path(page).parent))
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
-    reports, written = [], []
-    for one in tuple(STUDIES) if name == "all" else (name,):
+    names, written = tuple(STUDIES) if name == "all" else (name,), []
+    for one in names:
         n_runs = _runs(one, quick) if runs is None else runs
-        report = _report(one, folder, n_runs, seed, jobs, quick)
-        written += _write(one, report, folder, f"{one}, seed {seed}, {n_runs} runs")
-        reports.append(report)
+        stamp = {"runs": n_runs, "seed": seed, "quick": quick, "version": arrivals.__version__,
+                 "code": code_mark()}  # fmt: skip
+        if name != "all" or not _is_done(one, folder, stamp):
+            _write(one, _report(one, folder, n_runs, seed, jobs, quick), folder, stamp)
+        written += _files(one, folder)
     if name == "all" or page is not None:
         target = folder / "results.md" if page is None else Path(page)
         options = " --quick" if quick else f" --runs {runs}" if runs is not None else ""
-        _write_page(target, reports, f"arrivals reproduce {name}{options} --seed {seed}")
+        to = "" if page is None else f" --page {_shown(target)}"
+        command = f"arrivals reproduce {name}{options} --seed {seed} --out {_shown(folder)}{to}"
+        write_page(target, names, folder, command)
         written.append(target)
     return written
+
+
+def _shown(path: Path) -> str:
+    """Return a path as a page may show it: of one that only this machine has, the name."""
+    return path.name if path.is_absolute() else path.as_posix()
+
+
+def _is_done(name: str, folder: Path, stamp: Mapping[str, Any]) -> bool:
+    """Tell whether the study's page is there, of the same runs and code, and what it shows."""
+    page = folder / f"{name}.md"
+    return stamp_of(page) == stamp and all(path.exists() for path in _files(name, folder))
+
+
+def _files(name: str, folder: Path) -> list[Path]:
+    """Return what a study has written: table, page, and the pictures that the page shows."""
+    lines = (folder / f"{name}.md").read_text(encoding="utf-8").splitlines()
+    pictures = [line[2:].partition("]")[0] for line in lines if line.startswith("![")]
+    return [folder / part for part in (f"{name}.csv", f"{name}.md", *pictures)]
 
 
 def _runs(name: str, quick: bool) -> int:
@@ -209,27 +224,19 @@ def _report(name: str, folder: Path, runs: int, seed: int, jobs: int, quick: boo
         return study(runs, seed, **{name: offered[name] for name in offered if name in asked})
 
 
-def _write(name: str, report: Report, folder: Path, origin: str) -> list[Path]:
-    """Write a report's table, page and pictures; each picture says where it comes from."""
+def _write(name: str, report: Report, folder: Path, stamp: Mapping[str, Any]) -> None:
+    """Write a report's table, pictures and page; each picture says where it comes from."""
     report.to_csv(folder / f"{name}.csv")
     pictures = [f"{name}-{key}.png" for key in report.figures]
+    runs = f"{stamp['runs']} run{'s' * (stamp['runs'] != 1)}"
+    origin = f"{name}, seed {stamp['seed']}, {runs} · arrivals {stamp['version']}"
     for picture, figure in zip(pictures, report.figures.values(), strict=True):
-        stamp = f"{report.title} · {origin} · arrivals {arrivals.__version__}"
-        figure.supxlabel(stamp, x=0.995, ha="right", fontsize=6, color="0.4")
-        figure.savefig(folder / picture, dpi=130)
+        told = f"{report.title} · {origin}"
+        figure.supxlabel(told, x=0.995, ha="right", fontsize=6, color="0.4")
+        with replacing(folder / picture, binary=True) as file:
+            figure.savefig(file, format="png", dpi=130)
     with replacing(folder / f"{name}.md") as file:
-        file.write(report.markdown(pictures))
-    return [folder / part for part in (f"{name}.csv", f"{name}.md", *pictures)]
-
-
-def _write_page(path: Path, reports: Sequence[Report], command: str) -> None:
-    """Write all tables on one page."""
-    head = (
-        "# Results\n\nOur numbers beside the papers', and a line on each claim. Written by\n\n"
-        f"    {command} --page {path.as_posix()}\n\nwith arrivals {arrivals.__version__}.\n\n"
-    )
-    with replacing(path) as file:
-        file.write(head + "\n".join(f"#{report.markdown()}" for report in reports))
+        file.write(stamped(report.markdown(pictures), stamp))
 
 
 def add_reproduce(commands: Any) -> None:

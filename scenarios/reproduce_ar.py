@@ -20,10 +20,11 @@ from arrivals.scenarios.ar_fields import (
     ThirdOrder,
 )
 from arrivals.scenarios.base import Trial
-from arrivals.scenarios.reproduce import Report, spread
+from arrivals.scenarios.reproduce import Report
 from arrivals.scenarios.separation import nmse
 from arrivals.scenarios.speech import SpeechField, SpeechOfOrderTwo
 from arrivals.scenarios.unlabelled import best_assignment_rmse
+from arrivals.scenarios.workers import spread
 from arrivals.trackers import create
 from arrivals.trackers.recorder import Run
 from arrivals.typing import Float

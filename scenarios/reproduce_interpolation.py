@@ -30,7 +30,8 @@ from arrivals.scenarios.interpolation_trials import (
     rms,
     scanned,
 )
-from arrivals.scenarios.reproduce import Report, spread
+from arrivals.scenarios.reproduce import Report
+from arrivals.scenarios.workers import spread
 from arrivals.typing import Float
 
 if TYPE_CHECKING:

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from arrivals.scenarios.base import create
+from arrivals.scenarios.methods import plain
 from arrivals.scenarios.reproduce import Report
-from arrivals.scenarios.reproduce_svalse import NAN, _figure, batch_of, compared, holds, plain
+from arrivals.scenarios.reproduce_svalse import NAN, batch_of, compared, holds, negative
 from arrivals.scenarios.runner import monte_carlo
 from arrivals.scenarios.snapshot_bounds import LineBound, line_bound
 from arrivals.scenarios.study import Study
-from arrivals.scenarios.study_plots import plot_metric
+from arrivals.scenarios.study_plots import METHOD_COLOURS, plot_metric
+from arrivals.scenarios.svalse_drawings import panels
 from arrivals.scenarios.svalse_figures import SWEEP, SWEPT
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 SCENES = {"svalse_scenario1": "three static sources", "svalse_scenario2": "six static sources"}
@@ -50,7 +54,7 @@ def parts(name: str, figure: str, runs: int, seed: int, out: Path | None, quick:
     remarks = [*_claims(study, name), BOUND]
     bounds = _bounds(name, runs, seed)
     title = f"{figure}: GOSPA against the SNR, {SCENES[name]}, {runs} runs, degrees"
-    return Report(title, columns, rows, remarks, {"parts": _draw_parts(study, bounds)})
+    return Report(title, columns, rows, remarks, {"parts": _draw_parts(study, name, bounds)})
 
 
 BOUND = (
@@ -102,11 +106,21 @@ def _claims(study: Study, name: str) -> list[str]:
     return lines
 
 
-def _draw_parts(study: Study, bounds: dict[str, LineBound]) -> Figure:
-    figure, axes = _figure(2, 2, (11.0, 7.5))
+def _draw_rebuilt(ax: Axes, name: str, part: int) -> None:
+    """Mark the rebuilt GOSPA (part 0) or RMSE (1) by crosses, in the methods' colours."""
+    for n, method in enumerate(SWEPT):
+        values = [known[n][part] for known in SWEEP[name].values()]
+        told = "rebuilt" if n == 0 else None
+        ax.plot(SNR_DB, values, "x", color=METHOD_COLOURS[method], markersize=5, label=told)
+
+
+def _draw_parts(study: Study, name: str, bounds: dict[str, LineBound]) -> Figure:
+    figure, axes = panels(2, 2, (11.0, 7.5))
     titles = {"gospa": "GOSPA", "distance": "distance", "missed": "missed", "false": "false"}
     for ax, (metric, title) in zip(axes, titles.items(), strict=True):
         bound = {case: one.gospa for case, one in bounds.items()} if metric == "gospa" else None
+        if metric == "gospa":
+            _draw_rebuilt(ax, name, 0)
         plot_metric(study, metric, x="snr_db", bound=bound, ax=ax)
         ax.set(xlabel="SNR, dB", ylabel=f"{title}, degrees")
         legend = ax.get_legend()
@@ -118,18 +132,33 @@ def _draw_parts(study: Study, bounds: dict[str, LineBound]) -> Figure:
 def fig10(runs: int, seed: int, out: Path | None = None, quick: bool = False) -> Report:
     """RMSE against the SNR, both scenarios."""
     rows: list[tuple[Any, ...]] = []
-    figure, axes = _figure(1, 2, (11.0, 4.2))
+    said: list[str] = []
+    figure, axes = panels(1, 2, (11.0, 4.2))
     for ax, name in zip(axes, SCENES, strict=False):
         study, bounds = sweep(name, runs, seed, out, quick), _bounds(name, runs, seed)
+        _draw_rebuilt(ax, name, 1)
         plot_metric(study, "rmse", x="snr_db", ax=ax,
                     bound={case: one.rmse for case, one in bounds.items()})  # fmt: skip
         ax.set(xlabel="SNR, dB", ylabel="RMSE, degrees", yscale="log", title=SCENES[name])
+        said += _rmse_claims(study, SCENES[name])
         for snr in SNR_DB:
             rows += [(name, *_rmse_row(study, name, snr, method), bounds[f"{snr:g}"].rmse)
                      for method in study.methods]  # fmt: skip
     columns = ("scenario", "snr_db", "method", "RMSE", "std of runs", "rebuilt", "bound")
     title = f"Fig. 10: RMSE against the SNR, {runs} runs, degrees"
-    return Report(title, columns, rows, (BOUND,), {"rmse": figure})
+    return Report(title, columns, rows, (*said, BOUND), {"rmse": figure})
+
+
+def _rmse_claims(study: Study, scene: str) -> Iterator[str]:
+    """Hold that the RMSE, blind to false directions, favours ssbl at low SNR only."""
+    for snr, better, worse in ((0, "ssbl", "svalse"), (20, "svalse", "ssbl"), (20, "ssbl", "sbl")):
+        off = study.paired("rmse", better, worse, f"{snr}")
+        values = [study.mean("rmse", method, f"{snr}") for method in (better, worse)]
+        numbers = (
+            f"{values[0]:.2f} and {values[1]:.2f}, difference {off.mean:.2f} ± {off.error:.2f}"
+        )
+        claim = f"{scene}, {snr} dB: {better} has a lower RMSE than {worse}"
+        yield holds(claim, negative(off.mean, off.error), numbers)
 
 
 def _rmse_row(study: Study, name: str, snr: float, method: str) -> tuple[Any, ...]:

@@ -31,8 +31,10 @@ def fingerprint(config: Mapping[str, Any]) -> str:
     return hashlib.sha256(_text(config).encode()).hexdigest()[:10]
 
 
-def code_mark(modules: Iterable[str]) -> str:
+def code_mark(modules: Iterable[str] | None = None) -> str:
     """Return ten letters that differ when trackers, models or the named modules have changed.
+
+    If no modules are given, all scenarios count too.
 
     Examples
     --------
@@ -41,7 +43,9 @@ def code_mark(modules: Iterable[str]) -> str:
     """
     packages = (measurement_models, motion_models, trackers)
     files = {path for package in packages for path in Path(package.__path__[0]).glob("*.py")}
-    named = (getattr(sys.modules.get(name), "__file__", None) for name in modules)
+    if modules is None:
+        files |= set(Path(__file__).parent.glob("*.py"))
+    named = (getattr(sys.modules.get(name), "__file__", None) for name in modules or ())
     files |= {Path(file) for file in named if file}
     contents = hashlib.sha256()
     for path in sorted(files):
@@ -80,12 +84,17 @@ class Results:
             self._check(read_config(self.path))
 
     def _check(self, other: Mapping[str, Any]) -> None:
+        """Refuse a file of another study, or with rows that its own first line does not know."""
         differ = sorted(k for k in {*self.config, *other} if self.config.get(k) != other.get(k))
         if differ:
             raise ValueError(
                 f"{self.path} holds another study: {', '.join(differ)} differ(s); name another "
                 "file, or a folder, in which each study finds its own"
             )
+        known = other.get("scenarios", {})
+        strange = next((row.case for row in self.rows() if row.case not in known), None)
+        if strange is not None:
+            raise ValueError(f"{self.path} has rows of the case {strange!r}: its study has none")
 
     def rows(self) -> Iterator[Row]:
         """Give the rows there are, in order of arrival."""
@@ -108,7 +117,7 @@ class Results:
 
         Raises
         ------
-        RuntimeError
+        BlockingIOError
             If another one writes to it now.
         """
         if self.path is None or sys.platform == "win32":
@@ -121,7 +130,7 @@ class Results:
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError:
-                raise RuntimeError(f"another process is writing to {self.path}") from None
+                raise BlockingIOError(f"another process is writing to {self.path}") from None
             try:
                 yield
             finally:
@@ -138,13 +147,15 @@ class Results:
         if self.path is None:
             self._rows.extend(rows)
             return
-        new = not self.path.exists()
+        new = not self.path.exists()  # such a one goes again if it cannot be begun
         lines = io.StringIO()
         csv.writer(lines, lineterminator="\n").writerows(rows)
         try:
             with open(self.path, "ab") as file:
                 file.write(((self._head() if new else "") + lines.getvalue()).encode())
         except OSError as error:
+            if new:
+                self.path.unlink(missing_ok=True)
             raise OSError(
                 error.errno,
                 f"{error.strerror}: what was finished before is kept; call again to go on",
@@ -191,12 +202,25 @@ def read_config(path: Path) -> dict[str, Any]:
 
 
 def read_rows(path: Path) -> Iterator[Row]:
-    """Give the rows of a file; a line that was cut off at its end does not count."""
+    """Give the rows of a file; a line that was cut off at its end does not count.
+
+    Raises
+    ------
+    ValueError
+        If another line is no row.
+    """
     if not path.exists():
         return
-    with open(path, encoding="utf-8", newline="") as file:
+    with open(path, encoding="utf-8", errors="replace", newline="") as file:
         file.readline()
         file.readline()
-        for cells in csv.reader(line for line in file if line.endswith("\n")):
-            case, run, method, metric, value, note = cells
-            yield Row(case, int(run), method, metric, float(value), note)
+        lines = csv.reader(line for line in file if line.endswith("\n"))
+        for number, cells in enumerate(lines, start=3):
+            try:
+                case, run, method, metric, value, note = cells
+                row = Row(case, int(run), method, metric, float(value), note)
+            except ValueError:
+                raise ValueError(
+                    f"line {number} of {path} is no row of a study: take it out to go on"
+                ) from None
+            yield row

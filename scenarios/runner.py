@@ -16,6 +16,7 @@ from arrivals.scenarios.methods import Method, methods
 from arrivals.scenarios.results import Results, code_mark
 from arrivals.scenarios.scores import CPU, METRICS, Metric
 from arrivals.scenarios.study import Study
+from arrivals.scenarios.workers import deaths_told
 
 Metrics = Sequence[str] | Mapping[str, Metric]
 
@@ -46,7 +47,8 @@ def monte_carlo(
     runs : int
     seed : int
     metrics : sequence of str, or mapping of str to callable, optional
-        Names out of `scores.METRICS`, or functions of (trial, run); all of `METRICS` if None.
+        Names out of `scores.METRICS`, or functions of (trial, run); all of `METRICS` if
+        None, degrees where the truth is directions, metres where it is positions.
     out : path, optional
         A CSV file that results stream into, or a folder in which each configuration finds its
         own. What is in it already is not computed again; more runs are added to it.
@@ -66,9 +68,9 @@ def monte_carlo(
     ValueError
         If there is no such scenario, tracker or metric, or `out` is the file of another study.
     OSError
-        If the file cannot be written.
-    RuntimeError
-        If a process died. What was in the file before any of these is kept.
+        If the file cannot be written, or another process writes to it.
+    ChildProcessError
+        If a worker process died, an OSError too. What was in the file before any of these is kept.
 
     Notes
     -----
@@ -151,16 +153,14 @@ def _finished(results: Results, n_methods: int) -> set[tuple[str, int]]:
 def _computed(blocks: Iterable[Block], n_jobs: int | None, results: Results) -> Iterator[list[Row]]:
     """Give the rows of the blocks as they come, whoever computes them."""
     from joblib import Parallel, delayed
-    from joblib.externals.loky.process_executor import TerminatedWorkerError
 
     parallel = Parallel(n_jobs=n_jobs, return_as="generator_unordered", pre_dispatch="2*n_jobs",
                         batch_size=1)  # fmt: skip
-    try:
+    kept = "nothing is kept: no file was named"
+    if results.path is not None:
+        kept = f"finished runs are kept in {results.path}: call again to go on"
+    with deaths_told(kept):
         yield from parallel(delayed(Block.rows)(block) for block in blocks)
-    except TerminatedWorkerError as error:
-        kept = "nothing was kept: no file was named" if results.path is None else (
-            f"what was finished is in {results.path}: call again to go on")  # fmt: skip
-        raise RuntimeError(f"a worker process died; {kept}. {error}") from None
 
 
 def _bar(progress: bool, total: int, done: int) -> Any:

@@ -1,77 +1,103 @@
-"""What a run is worth, held against the truth of its trial: one number each, degrees and steps."""
+"""What a run is worth, held against the truth of its trial: one number each.
+
+Directions are scored in degrees, positions in metres; the trial's truth says which.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from arrivals.measurement_models import LogNormalRSS
 from arrivals.scenarios.base import Trial
-from arrivals.scenarios.calibration import circular_nees, coverage
+from arrivals.scenarios.calibration import (
+    circular_nees,
+    coverage,
+    position_coverage,
+    position_nees,
+)
 from arrivals.scenarios.matching import Matches, label_switches, matches, track_lengths
 from arrivals.scenarios.metrics import Gospa, mean_gospa, mean_rmse, ospa
 from arrivals.trackers.recorder import Run
 from arrivals.typing import Float
 
 Metric: TypeAlias = Callable[[Trial, Run], float]
-CUT_OFF = 10.0  # degrees: the paper's c
+CUT_OFF = 10.0  # degrees: the paper's c; and metres
 
 
-def angles(trial: Trial, run: Run) -> tuple[Float, Float, float | None]:
-    """Return true and found directions, degrees, and their period: None on a line.
+class Sets(NamedTuple):
+    """True and found directions, degrees, or positions, m; NaN where there is none.
+
+    Parameters
+    ----------
+    truth, found : ndarray, shapes (n_steps, n_sources) and (n_steps, n_slots); positions (..., 2)
+    period : float or None
+        Of directions all around, degrees.
+    """
+
+    truth: Float
+    found: Float
+    period: float | None
+
+
+def sets(trial: Trial, run: Run) -> Sets:
+    """Return what is compared: directions if the trial's truth is directions, else positions.
 
     Raises
     ------
     ValueError
-        If the run holds no directions, or not as many steps as the trial.
+        If the run holds none of that kind.
     """
-    if "doa" not in run.fields:
-        raise ValueError(f"a run of {run.kind.__name__}s holds no directions")
-    if isinstance(trial.measurement, LogNormalRSS):
-        raise ValueError("a trial of signal strength has positions for truth, no directions")
-    period = 360.0 if trial.measurement.array.dim > 1 else None
-    return np.rad2deg(trial.truth), np.rad2deg(run.doa), period
+    noun, name = ("positions", "position") if trial.truth.ndim == 3 else ("directions", "doa")
+    if name not in run.fields:
+        raise ValueError(f"the trial's truth is {noun}; a run of {run.kind.__name__}s holds none")
+    if name == "position":
+        return Sets(trial.truth, np.asarray(run.fields[name]), None)
+    period = 360.0 if trial.measurement.array.dim > 1 else None  # type: ignore[union-attr]  # heard by an array
+    return Sets(np.rad2deg(trial.truth), np.rad2deg(run.fields[name]), period)
 
 
 @lru_cache(maxsize=1)  # the parts are asked for one after the other
 def gospa_of(trial: Trial, run: Run) -> Gospa:
-    """Return GOSPA and its parts, degrees, means over the steps."""
-    truth, found, period = angles(trial, run)
+    """Return GOSPA and its parts, degrees or m, means over the steps."""
+    truth, found, period = sets(trial, run)
     return mean_gospa(truth, found, c=CUT_OFF, period=period)
 
 
 @lru_cache(maxsize=1)
 def pairs_of(trial: Trial, run: Run) -> Matches:
-    """Return the pairs of true and found directions, errors in rad."""
-    truth, found, period = angles(trial, run)
+    """Return the pairs of true and found ones, errors in rad or m."""
+    truth, found, period = sets(trial, run)
     pairs = matches(truth, found, CUT_OFF, period)
-    return pairs._replace(error=np.deg2rad(pairs.error))
+    return pairs if truth.ndim == 3 else pairs._replace(error=np.deg2rad(pairs.error))
 
 
 def _rmse(trial: Trial, run: Run) -> float:
-    truth, found, period = angles(trial, run)
+    truth, found, period = sets(trial, run)
     return mean_rmse(truth, found, CUT_OFF, period)
 
 
 def _ospa(trial: Trial, run: Run) -> float:
-    truth, found, period = angles(trial, run)
+    truth, found, period = sets(trial, run)
     steps = [ospa(t, f, CUT_OFF, period=period) for t, f in zip(truth, found, strict=True)]
     return float(np.mean(steps))
 
 
 def _cardinality(trial: Trial, run: Run) -> float:
-    true = (~np.isnan(angles(trial, run)[0])).sum(axis=1)
-    return float(np.abs(run.n_found - true).mean())
+    truth = sets(trial, run).truth
+    there = ~np.isnan(truth if truth.ndim == 2 else truth[..., 0])
+    return float(np.abs(run.n_found - there.sum(axis=1)).mean())
 
 
 def _stated(trial: Trial, run: Run) -> tuple[Float, Float]:
+    """Return errors, and the deviations (n,), rad, or covariances (n, 2, 2), m², stated."""
     pairs = pairs_of(trial, run)
-    if run.n_found.any() and np.isnan(run.fields["std"]).all():
+    spread = run.fields["std" if pairs.error.ndim == 1 else "covariance"]
+    if run.n_found.any() and np.isnan(spread).all():
         raise ValueError("the tracker states no standard deviations")
-    return pairs.error, np.asarray(run.fields["std"][pairs.step, pairs.slot])
+    return pairs.error, np.asarray(spread[pairs.step, pairs.slot])
 
 
 def _labels(trial: Trial, run: Run) -> Matches:
@@ -97,15 +123,21 @@ def _false(trial: Trial, run: Run) -> float:
 
 
 def _nees(trial: Trial, run: Run) -> float:
-    return circular_nees(*_stated(trial, run))
+    error, spread = _stated(trial, run)
+    return (circular_nees if error.ndim == 1 else position_nees)(error, spread)
+
+
+def _covered(trial: Trial, run: Run, level: float) -> float:
+    error, spread = _stated(trial, run)
+    return (coverage if error.ndim == 1 else position_coverage)(error, spread, level=level)
 
 
 def _coverage68(trial: Trial, run: Run) -> float:
-    return coverage(*_stated(trial, run), level=0.68)
+    return _covered(trial, run, 0.68)
 
 
 def _coverage95(trial: Trial, run: Run) -> float:
-    return coverage(*_stated(trial, run), level=0.95)
+    return _covered(trial, run, 0.95)
 
 
 def _label_switches(trial: Trial, run: Run) -> float:

@@ -125,10 +125,12 @@ class Study:
         if notes and len(notes) == len(found):
             raise ValueError(f"{metric} cannot be given: {notes[0]}")
         if not found:
+            failed = [r for r in self.failures() if r.method == method and r.case == case]
             raise ValueError(
+                f"every run of {method!r} failed, the first by {failed[0].note}" if failed else
                 f"no run has the metric {metric!r} of {method!r}; the study has: "
                 f"{', '.join([*self.config['metrics'], 'cpu_ms'])}"
-            )
+            )  # fmt: skip
         return {row.run: row.value for row in sorted(found) if row.value == row.value}
 
     def _one(self, noun: str, name: str | None, known: list[str]) -> str:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from arrivals.scenarios.methods import plain
 from arrivals.scenarios.plots import NEUTRAL, PALETTE
 from arrivals.scenarios.study import Study
 
@@ -104,13 +105,15 @@ def _draw(
     means = np.array([study.mean(metric, label, case) for case in places])
     ends = np.array([study.interval(metric, label, case) for case in places])
     ends = np.where(np.isnan(ends), means[:, None], ends)
+    any_colour = (*PALETTE, NEUTRAL)[n % (len(PALETTE) + 1)]
+    variant = plain(label) != label  # of a method: its colour, dashed
     style: dict[str, Any] = {
-        "color": METHOD_COLOURS.get(label, (*PALETTE, NEUTRAL)[n % (len(PALETTE) + 1)]),
+        "color": METHOD_COLOURS.get(plain(label), any_colour),
         "marker": "o",
         "markersize": 4,
         "linewidth": 1.2,
         "capsize": 2,
-        "linestyle": "-" if len(places) > 1 else "",
+        "linestyle": "" if len(places) == 1 else "--" if variant else "-",
     }
     reach = np.abs(ends.T - means)
     ax.errorbar(np.array(list(places.values())), means, yerr=reach, label=label, **style)

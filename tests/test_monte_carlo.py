@@ -3,13 +3,14 @@
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import ArrayLike
+from scipy.optimize import linear_sum_assignment
 
 from arrivals.measurement_models import ArraySnapshot
 from arrivals.scenarios import Method, PairsInTurn, Study, Trial, create, grid, monte_carlo
@@ -172,9 +173,50 @@ def test_full_disk_is_said_and_what_was_kept_is_gone_on_with(
     assert numbers(small(out=tmp_path)) == serial
 
 
+@pytest.mark.parametrize(
+    ("harm", "message"),
+    [
+        (lambda text: text[:40], "is no file of a study"),  # cut off in its first line
+        (lambda text: "", "is no file of a study"),
+        (lambda text: text.replace(",1,", ",one,", 1), r"line \d+ of .* is no row of a study"),
+        (lambda text: text + "\x00\xff,\n", r"line \d+ of .* is no row of a study"),
+        (lambda text: text.replace("fig6,0", "fig66,0"), "has rows of the case 'fig66'"),
+    ],
+)
+def test_damaged_file_is_refused_and_kept(
+    tmp_path: Path, harm: Callable[[str], str], message: str
+) -> None:
+    path = tmp_path / "study.csv"
+    small(2, out=path)
+    path.write_text(harm(path.read_text()), encoding="latin-1")
+    before = path.read_bytes()
+    with pytest.raises(ValueError, match=message):
+        small(3, out=path)
+    assert path.read_bytes() == before
+
+
+def test_disk_that_is_full_at_once_leaves_no_file(
+    tmp_path: Path, serial: list[tuple[Any, ...]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from arrivals.scenarios import results
+
+    def full(*arguments: Any, **options: Any) -> Any:
+        file = open(*arguments, **options)  # noqa: SIM115  (given back)
+        file.write(b"# arrivals st")
+        file.close()
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(results, "open", full, raising=False)
+        with pytest.raises(OSError, match=r"No space left .* kept; call again"):
+            results.Results({}, tmp_path / "study.csv").add([Row("a", 0, "b", "c", 1.0)])
+    assert not (tmp_path / "study.csv").exists()
+    assert numbers(small(out=tmp_path / "study.csv")) == serial
+
+
 def test_two_processes_do_not_write_to_one_file(tmp_path: Path) -> None:
     study = monte_carlo("svalse_fig6", ["cbf"], 1, metrics=["gospa"], out=tmp_path)
-    with study._results.writing(), pytest.raises(RuntimeError, match="another process is writing"):
+    with study._results.writing(), pytest.raises(OSError, match="another process is writing"):
         monte_carlo("svalse_fig6", ["cbf"], 2, metrics=["gospa"], out=tmp_path)
     monte_carlo("svalse_fig6", ["cbf"], 2, metrics=["gospa"], out=tmp_path)
 
@@ -229,20 +271,6 @@ def test_failed_batch_is_done_one_by_one_and_failed_draws_are_recorded() -> None
     study = monte_carlo(cases, ["batch_fails", "ssbl"], 2, metrics=["gospa"])
     assert study.paired("gospa", "batch_fails", "ssbl", "short").mean == 0
     assert [row.case for row in study.failures()] == ["drawless"] * 4
-
-
-@register("kills_its_process")
-class KillsItsProcess(CBF):
-    """Takes the process along."""
-
-    def update(self, z: ArrayLike | None) -> None:
-        os._exit(1)
-
-
-def test_worker_that_dies_is_said_and_nothing_is_lost(tmp_path: Path) -> None:
-    trackers = ["kills_its_process"]
-    with pytest.raises(RuntimeError, match=r"a worker process died; what was finished is in .*csv"):
-        monte_carlo(SHORT["fig6"], trackers, 4, metrics=["gospa"], n_jobs=2, out=tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -364,6 +392,48 @@ def test_what_a_study_does_not_have_is_said() -> None:
         study.mean("gospa", "mvdr")
     with pytest.raises(ValueError, match="case must be one of"):
         small(1).mean("gospa", "cbf")
+
+
+def test_positions_are_scored_in_metres() -> None:
+    scenario = create("rss_crossing")
+    study = monte_carlo(scenario, ["rss_vb", "cbf"], 2)
+    trial = scenario.sample(np.random.default_rng(np.random.SeedSequence(0, spawn_key=(0,))))
+    run = trial.tracker("rss_vb").run(trial.measurements)
+    far = np.linalg.norm(run.position[:, :, None] - trial.truth[:, None], axis=-1)
+    pairs = [linear_sum_assignment(np.minimum(step, 10.0)) for step in far]
+    by_hand = np.mean([step[pair].sum() for step, pair in zip(far, pairs, strict=True)])
+    assert study.values("distance", "rss_vb")[0] == pytest.approx(by_hand)
+    assert study.mean("cardinality", "rss_vb") == study.mean("missed", "rss_vb") == 0.0
+    assert 0.5 < study.mean("nees", "rss_vb") < 2.0
+    assert study.mean("coverage95", "rss_vb") > 0.85
+    with pytest.raises(ValueError, match="every run of 'cbf' failed, the first by TypeError"):
+        study.mean("gospa", "cbf")
+    assert max(len(row.note) for row in study.failures()) < 400
+
+
+@pytest.mark.parametrize(
+    ("scenario", "tracker"),
+    [
+        (create("ar_fig1", n_intervals=4), "ar_kalman_qrd_rls"),
+        (create("interpolation_tone", n_steps=60), "interpolation_ekf"),
+        (create("circle", n_steps=3), "peaks_gnn"),
+    ],
+)
+def test_other_scenes_of_directions_run(scenario: scenarios.Scenario, tracker: str) -> None:
+    study = monte_carlo(scenario, [tracker], 2)
+    assert not study.failures()
+    assert 0.0 <= study.mean("rmse", tracker) <= 10.0
+    assert study.mean("gospa", tracker) == pytest.approx(
+        sum(study.mean(part, tracker) for part in ("distance", "missed", "false"))
+    )
+
+
+def test_a_metric_of_directions_refuses_positions() -> None:
+    trial = create("rss_crossing", n_steps=2).sample(np.random.default_rng(0))
+    run = PairsInTurn(n_steps=2).sample(np.random.default_rng(0))
+    found = run.tracker("cbf").run(run.measurements)
+    with pytest.raises(ValueError, match="truth is positions; a run of DirectionEstimates holds"):
+        KNOWN["gospa"](trial, found)
 
 
 def own(trial: Trial, run: Run) -> float:

@@ -57,6 +57,13 @@ def test_a_label_is_one_line_of_one_colour_and_another_label_has_another() -> No
     assert len(dots(ax).get_offsets()) == 0
 
 
+def test_a_track_on_a_line_is_not_drawn_from_endfire_to_endfire() -> None:
+    steps: list[list[tuple[float, int, float]]] = [[(d, 0, 1)] for d in (85, 88, -87, -85)]
+    _, tracks = lines(plot_bearing_time(found(steps)))
+    ends = [segment[:, 1] for segment in tracks.get_segments()]
+    np.testing.assert_allclose(ends, [[85, 88], [-87, -85]])
+
+
 def test_existence_is_opacity_and_without_it_all_is_opaque() -> None:
     ax = plot_bearing_time(found([[(10, 0, 0.25), (20, -1, np.nan)]]))
     assert dots(ax).get_facecolors()[:, 3].tolist() == [1.0, 0.25]

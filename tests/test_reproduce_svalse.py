@@ -4,9 +4,18 @@ import csv
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
-from arrivals.scenarios import base, reproduce, reproduce_svalse, reproduce_svalse_snr
+from arrivals.scenarios import (
+    Study,
+    base,
+    reproduce,
+    reproduce_any_array,
+    reproduce_svalse,
+    reproduce_svalse_snr,
+    reproduce_swellex,
+)
 from arrivals.scenarios.reproduce import RUNS, STUDIES, Report
 from arrivals.scenarios.svalse_figures import ACTIVATION, REBUILT, SWEEP
 
@@ -44,6 +53,10 @@ def test_scenes_make_table_claims_and_pictures(number: int, tmp_path: Path) -> N
         assert [float(row["paper's run"]) for row in rows] == [
             known.paper for known in ACTIVATION.values()
         ]
+        (path,) = (tmp_path / "runs").glob("study-*.csv")
+        params = [method["params"] for method in Study.read(path).config["methods"]]
+        assert [one["motion"]["p_activate"] for one in params] == [0.1, 0.1, 0.0, 1.0, 0.1]
+        assert {one["engine"] for one in params} == {"coordinate"}
     page = (tmp_path / f"{name}.md").read_text()
     assert "Holds: " in page or "Does not hold: " in page
     assert list((tmp_path / "runs").glob("study-*.csv"))
@@ -71,8 +84,37 @@ def test_sweeps_are_computed_once_for_three_figures(
     ]
 
 
+@pytest.mark.usefixtures("short")
+def test_pictures_of_runs_name_their_marks_and_tell_the_paper_s_number(tmp_path: Path) -> None:
+    report = reproduce_svalse.fig4(2, 0, tmp_path, quick=True)
+    figure = report.figures["tracks"]
+    titles = [ax.get_title() for ax in figure.axes]
+    assert "(paper 4.87°)" in titles[list(reproduce_svalse.SHOWN).index("svalse")]
+    assert figure.legends[0].get_texts()[0].get_text() == "truth"
+    bars = [ax for ax in figure.axes if ax.get_ylabel() == "beam power, dB re maximum"]
+    assert len(bars) == 1
+    columns = list(report.columns)
+    rows = {row[0]: row for row in report.rows}
+    for wanted in ("label switches", "track length", "NEES", "in 68 %", "in 95 %"):
+        assert np.isnan(rows["cbf"][columns.index(wanted)])
+    assert rows["svalse"][columns.index("NEES")] > 0
+    told = [line for line in report.remarks if "svalse states the standard deviations" in line]
+    assert len(told) == 1
+
+
+def test_what_a_user_would_write_stands_in_every_table_of_directions() -> None:
+    for methods in (reproduce_svalse.FAST, reproduce_swellex.METHODS):
+        assert set(methods) >= {"cbf", "peaks_gnn", "sbl", "ssbl", "valse", "svalse"}
+    scenes = {case.told for case in reproduce_any_array.CASES if not case.params.get("carry")}
+    assert {c.told for c in reproduce_any_array.CASES if c.method == "peaks_gnn"} == scenes
+
+
 def brief(runs: int, seed: int) -> Report:
-    return Report(f"Brief, {runs}", ["a"], [(1.0,)], ["Holds: it is brief."])
+    calls.append(runs)
+    return Report(f"Brief, {runs}", ["a"], [(1.0,)], ["Holds: it is brief (1).", "A word."])
+
+
+calls: list[int] = []
 
 
 def test_all_writes_every_study_and_one_page(
@@ -87,9 +129,34 @@ def test_all_writes_every_study_and_one_page(
     written = reproduce.reproduce("all", tmp_path / "out", quick=True, seed=7, page=page)
     assert [path.name for path in written] == ["one.csv", "one.md", "two.csv", "two.md", "page.md"]
     text = page.read_text()
-    assert "    arrivals reproduce all --quick --seed 7 --page page.md\n" in text
-    assert text.index("## Brief, 10") < text.index("## Brief, 3\n")
-    assert text.count("Holds: it is brief.") == 2
+    assert "    arrivals reproduce all --quick --seed 7 --out out --page page.md\n" in text
+    assert text.index("### Brief, 10\n") < text.index("### Brief, 3\n")
+    assert text.count("* **Holds**: it is brief (1).") == 2
+    assert "* [Brief, 3](#two): 1 claim holds, 0 do not" in text
+    assert "`arrivals reproduce two`, seed 7, 3 runs, arrivals " in text
+    assert str(tmp_path) not in text
+
+
+def test_page_is_made_again_without_what_is_finished(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        reproduce, "STUDIES", {"one": f"{__name__}:brief", "two": f"{__name__}:brief"}
+    )
+    calls.clear()
+    first = reproduce.reproduce("all", tmp_path, runs=2)
+    page = first[-1].read_text()
+    assert reproduce.reproduce("all", tmp_path, runs=2) == first
+    assert calls == [2, 2]
+    assert first[-1].read_text() == page
+    (tmp_path / "two.csv").unlink()
+    reproduce.reproduce("all", tmp_path, runs=2)
+    reproduce.reproduce("one", tmp_path, runs=2)  # by its name: again
+    assert calls == [2, 2, 2, 2]
+    reproduce.reproduce("all", tmp_path, runs=2, seed=1)
+    monkeypatch.setattr(reproduce, "code_mark", lambda: "other")
+    reproduce.reproduce("all", tmp_path, runs=2, seed=1)
+    assert len(calls) == 8
 
 
 def test_every_study_of_other_runs_exists() -> None:

@@ -276,6 +276,17 @@ def test_certain_births_and_deaths_are_allowed(
         assert set(run.label[0][run.label[0] >= 0]) <= set(run.label[-1])
 
 
+def test_certain_birth_is_the_limit_of_one_that_is_nearly_so() -> None:
+    """Coordinate ascent, the paper's form; Fig. 7 (d) has a probability of 1."""
+    trial = short(5, 5, "svalse_fig6")
+    found = [
+        SVALSE(LINE, BernoulliVonMises(p_activate=p), max_iterations=100, **COORDINATE)
+        .run(trial.measurements[:3]).doa
+        for p in (1.0, 1 - 1e-12)
+    ]  # fmt: skip
+    assert found[0] == pytest.approx(found[1], abs=1e-3, nan_ok=True)
+
+
 def test_crossing_sources_are_merged_into_one_while_they_are_too_near() -> None:
     z = tone([[0.0, np.deg2rad(1.0)]], noise=1e-7)
     apart = SVALSE(LINE, merge=0.0).run(z)

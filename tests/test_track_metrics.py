@@ -7,7 +7,12 @@ from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
 from arrivals.scenarios import SixSources, create, gospa
-from arrivals.scenarios.calibration import circular_nees, coverage
+from arrivals.scenarios.calibration import (
+    circular_nees,
+    coverage,
+    position_coverage,
+    position_nees,
+)
 from arrivals.scenarios.matching import label_switches, matches, track_lengths
 from arrivals.scenarios.scores import METRICS
 from arrivals.trackers import SVALSE
@@ -47,6 +52,31 @@ def test_right_deviations_have_nees_one_and_cover_what_they_say(std: float) -> N
     if std < 1:  # wider ones wrap
         assert coverage(error, stated, 0.68) == pytest.approx(0.68, abs=0.005)
         assert coverage(error, stated, 0.95) == pytest.approx(0.95, abs=0.005)
+
+
+@given(st.integers(0, 5), st.integers(0, 5), st.integers(0, 10_000))
+def test_pairs_of_positions_are_those_of_gospa(n_true: int, n_found: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    truth, found = rng.uniform(0, 20, (1, n_true, 2)), rng.uniform(0, 20, (1, n_found, 2))
+    pairs = matches(truth, found, c=10.0)
+    whole = gospa(truth[0], found[0], c=10.0)
+    assert np.linalg.norm(pairs.error, axis=-1).sum() == pytest.approx(whole.distance)
+    assert 5.0 * (n_true - len(pairs.step)) == pytest.approx(whole.missed)
+
+
+def test_right_covariances_have_nees_one_and_cover_what_they_say() -> None:
+    P = np.array([[4.0, 1.5], [1.5, 1.0]])
+    error = np.random.default_rng(0).multivariate_normal([0, 0], P, 100_000)
+    stated = np.broadcast_to(P, (len(error), 2, 2))
+    assert position_nees(error, stated) == pytest.approx(1.0, abs=0.02)
+    assert position_nees(error, stated / 4) == pytest.approx(4.0, abs=0.08)
+    assert position_coverage(error, stated, 0.68) == pytest.approx(0.68, abs=0.005)
+    assert position_coverage(error, stated, 0.95) == pytest.approx(0.95, abs=0.005)
+    for bad in (-P, P * np.nan):
+        with pytest.raises(ValueError, match="positive definite"):
+            position_nees(error[:1], bad[None])
+    with pytest.raises(ValueError, match=r"\(n, dim\) and \(n, dim, dim\); got \(2,\)"):
+        position_coverage(error[0], P)
 
 
 def test_nees_of_von_mises_errors_is_one() -> None:

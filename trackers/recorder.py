@@ -145,8 +145,10 @@ def replacing(path: str | os.PathLike[str], *, binary: bool = False) -> Iterator
         with open(part, "wb" if binary else "w", **text_mode) as file:
             yield file
         os.replace(part, target)
-    except BaseException:
+    except BaseException as error:
         part.unlink(missing_ok=True)
+        if isinstance(error, OSError) and error.filename in (None, str(part)):
+            error.filename = str(target)
         raise
 
 
