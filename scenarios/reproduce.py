@@ -43,15 +43,15 @@ STUDIES: dict[str, str] = {
 }
 # Runs of a study that wants others than 100, and QUICK if it is only looked at.
 RUNS: dict[str, tuple[int, int]] = {
-    "any-array": (100, 3),
+    "any-array": (20, 3),
     "ar-kf": (100, 4),
     "svalse-fig4": (20, 4),
     "svalse-fig5": (20, 4),
     "svalse-fig6": (20, 4),
     "svalse-fig7": (6, 2),
-    "svalse-fig8": (20, 2),
-    "svalse-fig9": (20, 2),
-    "svalse-fig10": (20, 2),
+    "svalse-fig8": (5, 2),
+    "svalse-fig9": (5, 2),
+    "svalse-fig10": (5, 2),
     "swellex96": (4, 1),
 }
 
