@@ -12,11 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from arrivals.measurement_models.manifolds import Manifold
-from arrivals.trackers.joint_elbo import Response
 from arrivals.trackers.joint_moves import Bursts, Moves
 from arrivals.trackers.joint_newton import ascend
 from arrivals.trackers.joint_work import Problem, Work, result, silence, start
 from arrivals.trackers.line_spectrum import Fit, Prediction
+from arrivals.trackers.noise_start import NOISE_FLOOR
+from arrivals.trackers.responses import Response
 from arrivals.trackers.support_moves import Grid, removal_gains
 from arrivals.typing import Complex
 
@@ -57,6 +58,13 @@ class JointNewton:
         Angles for each sensor at which components may be born.
     max_moves : int
         Changes of the support at most.
+    temper : float
+        Looks of a step that count as one.
+    power_floor : float or None
+        Power, in units of one look's noise after beamforming, below which nothing is a source;
+        None is 0 for one look and 3 for several.
+    max_snr_db : float or None
+        Signal-to-noise ratio beyond which what is left of the data is laid to the model.
     """
 
     tolerance: float = 1e-4
@@ -75,9 +83,12 @@ class JointNewton:
     far: float = 10.0
     grid: int = 4
     max_moves: int = 60
+    temper: float = 1.0
+    power_floor: float | None = None
+    max_snr_db: float | None = None
 
     def fit(self, Y: Complex, manifold: Manifold, prediction: Prediction | None) -> Fit:
-        """Fit one snapshot, (1, n_sensors, 1); no prediction: nothing is known."""
+        """Fit looks (n_bins, n_sensors, n_snapshots); no prediction: nothing is known."""
         return self.fit_batch([Y], manifold, [prediction])[0]
 
     def fit_batch(
@@ -89,10 +100,10 @@ class JointNewton:
         """Fit independent snapshots of one array, as one array program."""
         most = min(manifold.n_sensors, self.max_components or manifold.n_sensors)
         problems = [
-            Problem(Y[0, :, 0], known, most) for Y, known in zip(Ys, predictions, strict=True)
+            Problem(Y, known, most) for Y, known in zip(Ys, predictions, strict=True)
         ]
         fits = [silence(problem, self.max_age) for problem in problems]
-        heard = [i for i, problem in enumerate(problems) if problem.power > 0]
+        heard = [i for i, problem in enumerate(problems) if not problem.silent]
         if heard and manifold.n_sensors > 1:
             for i, fit in zip(
                 heard, self._solved([problems[i] for i in heard], manifold, most), strict=True
@@ -102,7 +113,7 @@ class JointNewton:
 
     def _solved(self, problems: list[Problem], manifold: Manifold, most: int) -> list[Fit]:
         """Fit snapshots that have power: moves and Newton steps in turn until all rest."""
-        moves = self.moves(manifold, most)
+        moves = self.moves(manifold, most, problems[0].Y.shape[2])
         work = start(problems, moves.response, self.snr_db, len(moves.grid.theta), most)
         work.left[:] = np.where(work.free, 0, self.inner)
         work.tolerance[:] = self.inner_tolerance
@@ -114,10 +125,12 @@ class JointNewton:
                 moves.choose(part)
                 work = work.put(over, part)
                 if work.done.any():
-                    gains = removal_gains(work.state, self.kl)
+                    gains = removal_gains(moves.response, work.state, self.kl)
                     for i in map(int, np.flatnonzero(work.done)):
                         n = int(work.row[i])
-                        fits[n] = result(work, i, problems[n], gains, self.keep, self.max_age)
+                        fits[n] = result(
+                            work, i, problems[n], manifold, gains, self.keep, self.max_age
+                        )
                     if work.done.all():
                         break
                     work = work.take(~work.done)
@@ -125,9 +138,13 @@ class JointNewton:
             self.climb(moves.response, work)
         return [fits[n] for n in range(len(problems))]
 
-    def moves(self, manifold: Manifold, most: int) -> Moves:
-        """Return the moves between Newton steps, for an array."""
-        response = Response(manifold)
+    def moves(self, manifold: Manifold, most: int, n_snapshots: int) -> Moves:
+        """Return the moves between Newton steps, for an array and so many snapshots a step."""
+        floor = self.power_floor
+        if floor is None:
+            floor = 0.0 if manifold.n_bins * n_snapshots == 1 else 3.0
+        noise_floor = NOISE_FLOOR if self.max_snr_db is None else 10 ** (-self.max_snr_db / 10)
+        response = Response(manifold, self.temper, floor, noise_floor)
         M = manifold.n_sensors
         return Moves(
             response,

@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from arrivals.trackers.joint_elbo import MU, ODDS, PLACE, Response, State, evaluate
+from arrivals.trackers.joint_elbo import MU, ODDS, PLACE, State, evaluate
 from arrivals.trackers.joint_work import Work, log_odds
+from arrivals.trackers.responses import Response
 from arrivals.trackers.rows import enlarged
 from arrivals.trackers.support_moves import (
     Grid,
@@ -106,7 +107,7 @@ class Moves:
         """Remove the component whose removal gains most, if it gains; tell where one was."""
         if not rows.any():
             return rows
-        gains = removal_gains(work.state, self.kl)
+        gains = removal_gains(self.response, work.state, self.kl)
         k = gains.argmax(axis=1)
         rows = rows & (gains[np.arange(len(work)), k] > 0)
         if rows.any():
@@ -193,7 +194,7 @@ class Moves:
             rest = np.where(free, absent, rest)
         L = max(int(K.max()), 1)
         facts = facts[:, :, :L]
-        new = evaluate(self.response, old.y, facts, K, old.nu, old.tau, rest)
+        new = evaluate(self.response, old.Y, facts, K, old.nu, old.tau, rest)
         work.state = work.state.put(rows, new)
 
     def learned(self, K: Int) -> Float:

@@ -152,28 +152,24 @@ class VALSE(Tracker):
             "merge": self.merge,
             "snr_db": snr_db,
             "max_components": self.max_components,
+            "temper": self.temper,
+            "power_floor": self.power_floor,
+            "max_snr_db": self.max_snr_db,
         }
         if self.tolerance is not None:
             settings["tolerance"] = self.tolerance
         if self.is_fast and n_moments == 0:
             return JointNewton(kl=self.kl, **settings)
         return CoordinateAscent(
-            self.posterior,
-            descending=descending,
-            temper=self.temper,
-            power_floor=self.power_floor,
-            max_snr_db=self.max_snr_db,
-            n_moments=n_moments,
-            **settings,
+            self.posterior, descending=descending, n_moments=n_moments, **settings
         )
 
     @property
     def is_fast(self) -> bool:
-        """Whether the fast engine is wanted, and serves this measurement and these settings."""
-        plain = self.temper == 1 and not self.power_floor and self.max_snr_db is None
-        if self.engine != "fast" or not plain or not self.measurement.is_single:
+        """Whether the fast engine is wanted, and serves this measurement."""
+        if self.engine != "fast":
             return False
-        return self.measurement.manifold(self.reference).coefficients is None
+        return len(self.measurement.manifold(self.reference).nuisance_weights) == 1
 
     @property
     def n_slots(self) -> int:
