@@ -156,6 +156,7 @@ class JointNewton:
             fill_to=min(int(np.ceil(round(self.fill * response.extent, 6))), most, M - 1),
             max_moves=self.max_moves,
             max_iterations=self.max_iterations,
+            several=manifold.n_bins * n_snapshots > 1,
         )
 
     def climb(self, response: Response, work: Work) -> None:

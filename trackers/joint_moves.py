@@ -15,6 +15,7 @@ from arrivals.trackers.support_moves import (
     births,
     joined,
     nearest_later,
+    relearned,
     removal_gains,
     without,
 )
@@ -61,6 +62,7 @@ class Moves:
     fill_to: int
     max_moves: int
     max_iterations: int
+    several: bool = False
 
     def choose(self, work: Work) -> None:
         """Judge what is on trial, and choose the next burst of each problem: one pass 1-4."""
@@ -108,6 +110,8 @@ class Moves:
         if not rows.any():
             return rows
         gains = removal_gains(self.response, work.state, self.kl)
+        if self.several:
+            gains = gains + relearned(self.response, work.state)
         k = gains.argmax(axis=1)
         rows = rows & (gains[np.arange(len(work)), k] > 0)
         if rows.any():

@@ -90,6 +90,20 @@ def removal_gains(response: Response, state: State, kl: float) -> Float:
     return np.where(state.used, gain, -np.inf)
 
 
+def relearned(response: Response, state: State) -> Float:
+    """Return what F would rise further after each removal if ν were learned again, (B, L).
+
+    A bin of d' degrees of freedom without the component, whose noise would be x times ν, gains
+    d' (x - 1 - ln x).
+    """
+    M, N = state.Y.shape[2:]
+    G = np.where(state.used[:, None], state.G.diagonal(axis1=2, axis2=3).real, 1.0)
+    w2 = (state.W.real**2 + state.W.imag**2).sum(axis=3)
+    freedom = N * (M - state.K[:, None, None])
+    x = (freedom + w2 / (G * state.nu[:, :, None])) / (freedom + N)
+    return response.total((freedom + N) * (x - 1 - np.log(np.maximum(x, 1e-3))))
+
+
 @dataclass(frozen=True, eq=False)
 class Births:
     """The best component to add to each problem, and its rivals.
