@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from arrivals.trackers.joint_work import Problem, Work, result, silence, start
 from arrivals.trackers.line_spectrum import Fit, Prediction
 from arrivals.trackers.noise_start import NOISE_FLOOR
 from arrivals.trackers.responses import Response
+from arrivals.trackers.rows import every, some
 from arrivals.trackers.support_moves import Grid, removal_gains
 from arrivals.typing import Complex
 
@@ -113,51 +115,30 @@ class JointNewton:
 
     def _solved(self, problems: list[Problem], manifold: Manifold, most: int) -> list[Fit]:
         """Fit snapshots that have power: moves and Newton steps in turn until all rest."""
-        moves = self.moves(manifold, most, problems[0].Y.shape[2])
+        moves = moves_on(self, manifold, problems[0].Y.shape[2])
         work = start(problems, moves.response, self.snr_db, len(moves.grid.theta), most)
         work.left[:] = np.where(work.free, 0, self.inner)
         work.tolerance[:] = self.inner_tolerance
         fits: dict[int, Fit] = {}
         while len(work):
             over = work.left == 0
-            if over.any():
+            if some(over):
                 part = work.take(over)
                 moves.choose(part)
                 work = work.put(over, part)
-                if work.done.any():
+                if some(work.done):
                     gains = removal_gains(moves.response, work.state, self.kl)
                     for i in map(int, np.flatnonzero(work.done)):
                         n = int(work.row[i])
                         fits[n] = result(
                             work, i, problems[n], manifold, gains, self.keep, self.max_age
                         )
-                    if work.done.all():
+                    if every(work.done):
                         break
                     work = work.take(~work.done)
                 work.state, work.saved = work.state.trimmed(), work.saved.trimmed()
             self.climb(moves.response, work)
         return [fits[n] for n in range(len(problems))]
-
-    def moves(self, manifold: Manifold, most: int, n_snapshots: int) -> Moves:
-        """Return the moves between Newton steps, for an array and so many snapshots a step."""
-        floor = self.power_floor
-        if floor is None:
-            floor = 0.0 if manifold.n_bins * n_snapshots == 1 else 3.0
-        noise_floor = NOISE_FLOOR if self.max_snr_db is None else 10 ** (-self.max_snr_db / 10)
-        response = Response(manifold, self.temper, floor, noise_floor)
-        M = manifold.n_sensors
-        return Moves(
-            response,
-            Grid(response, self.grid, self.merge),
-            Bursts(self.inner, self.fill_inner, self.final, self.inner_tolerance, self.tolerance),
-            self.kl,
-            places=most,
-            most=min(most, M - 1),
-            fill_to=min(int(np.ceil(round(self.fill * response.extent, 6))), most, M - 1),
-            max_moves=self.max_moves,
-            max_iterations=self.max_iterations,
-            several=manifold.n_bins * n_snapshots > 1,
-        )
 
     def climb(self, response: Response, work: Work) -> None:
         """Take one Newton step in every problem; a burst goes on while its steps gain much."""
@@ -168,3 +149,29 @@ class JointNewton:
         left = np.where(gain > self.far, np.maximum(work.left, 2), work.left)
         work.left = np.where(gain < work.tolerance, 0, left - 1)
         work.left = np.minimum(work.left, self.max_iterations - work.iterations)
+
+
+@lru_cache(maxsize=64)
+def moves_on(engine: JointNewton, manifold: Manifold, n_snapshots: int) -> Moves:
+    """Return the moves between Newton steps, for an array and so many snapshots a step."""
+    M, several = manifold.n_sensors, manifold.n_bins * n_snapshots > 1
+    most = min(M, engine.max_components or M)
+    floor = engine.power_floor
+    if floor is None:
+        floor = 3.0 if several else 0.0
+    noise_floor = NOISE_FLOOR if engine.max_snr_db is None else 10 ** (-engine.max_snr_db / 10)
+    response = Response(manifold, engine.temper, floor, noise_floor)
+    return Moves(
+        response,
+        Grid(response, engine.grid, engine.merge),
+        Bursts(
+            engine.inner, engine.fill_inner, engine.final, engine.inner_tolerance, engine.tolerance
+        ),
+        engine.kl,
+        places=most,
+        most=min(most, M - 1),
+        fill_to=min(int(np.ceil(round(engine.fill * response.extent, 6))), most, M - 1),
+        max_moves=engine.max_moves,
+        max_iterations=engine.max_iterations,
+        relearn=several or manifold.coefficients is not None,
+    )

@@ -162,8 +162,10 @@ def amplitudes(
     M, N = response.n_sensors, H.shape[3]
     ratio = nu / tau
     regularised = J.copy()
-    # 1 where unused: no part in the determinant
-    diagonals(regularised)[...] += np.where(used[:, None], ratio[:, :, None], 1.0)
+    ridge = ratio[:, :, None]
+    if min(K.tolist()) < J.shape[3]:  # 1 where unused: no part in the determinant
+        ridge = np.where(used[:, None], ridge, 1.0)
+    diagonals(regularised)[...] += ridge
     G = np.asarray(np.linalg.inv(regularised), dtype=np.complex128)
     W = G @ H
     explained = (H.conj() * W).real.sum(axis=(2, 3))

@@ -9,6 +9,7 @@ import numpy as np
 
 from arrivals.trackers.joint_elbo import MU, S, State, diagonals, evaluate, with_variances
 from arrivals.trackers.responses import Response, over_snapshots
+from arrivals.trackers.rows import some
 from arrivals.typing import Bool, Complex, Float
 
 LARGEST_VARIANCE = 0.3  # rad²: a wrapped normal density of more is no longer normal
@@ -80,9 +81,9 @@ def ascend(response: Response, state: State, learn: Bool) -> State:
     s = 1 / np.maximum(curvature, 1 / LARGEST_VARIANCE)
     best = moved(response, state, d, s)
     worse = fell(best, state)
-    if worse.any():
+    if some(worse):
         best = best.put(worse, shortened(response, state.take(worse), d[worse], s[worse]))
-    if learn.any():
+    if some(learn):
         best = best.put(learn, learned(response, best.take(learn)))
     return best
 
@@ -105,10 +106,10 @@ def shortened(response: Response, state: State, d: Float, s: Float) -> State:
         good = ~fell(trial, part)
         rows = left.copy()
         rows[left] = good
-        if good.any():
+        if some(good):
             best = best.put(rows, trial.take(good))
         left = left & ~rows
-        if not left.any():
+        if not some(left):
             break
     return best
 
@@ -126,7 +127,7 @@ def learned(response: Response, state: State) -> State:
     """
     M, N = state.Y.shape[2:]
     K, ratio, T = state.K[:, None], state.nu / state.tau, response.temper
-    w2 = (state.W.real**2 + state.W.imag**2).sum(axis=3)
+    w2 = over_snapshots(state.W.real**2 + state.W.imag**2)
     energy = w2.sum(axis=2)
     trace = (state.G.diagonal(axis1=2, axis2=3).real * state.used[:, None]).sum(axis=2)
     # ‖Y‖² - 2 Re tr HᴴŴ + tr ŴᴴJŴ, since JŴ = H - ν/τ Ŵ and ‖Y‖² = M N
@@ -138,7 +139,7 @@ def learned(response: Response, state: State) -> State:
     tau = (energy + N * state.nu * trace) / np.maximum(N * K, 1)
     new = with_variances(response, state, nu, floored(response, state, nu, tau))
     worse = fell(new, state)
-    if worse.any():
+    if some(worse):
         em = np.maximum((E + state.nu * gamma) / (M * N), response.noise_floor)[worse]
         part = state.take(worse)
         tau = floored(response, part, em, tau[worse])

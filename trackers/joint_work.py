@@ -23,7 +23,7 @@ from arrivals.trackers.joint_elbo import (
 )
 from arrivals.trackers.joint_newton import LARGEST_VARIANCE
 from arrivals.trackers.line_spectrum import Fit, Prediction
-from arrivals.trackers.noise_start import NOISE_FLOOR, first_noise
+from arrivals.trackers.noise_start import NOISE_FLOOR, first_noise, quiet_noise
 from arrivals.trackers.responses import Response
 from arrivals.trackers.rows import Rows
 from arrivals.trackers.support_moves import LOG_2PI
@@ -59,13 +59,16 @@ class Problem:
         age = self.known.age
         self.age = np.zeros(self.n, dtype=np.int64) if age is None else age[: self.n]
 
-    def snr_db(self, manifold: Manifold, otherwise: float | None) -> float:
+    def snr_db(self, manifold: Manifold, temper: float, otherwise: float | None) -> float:
         """Return the signal-to-noise ratio at which the noise starts."""
         if self.known.snr_db is not None:
             return self.known.snr_db
         if otherwise is not None:
             return otherwise
-        if manifold.coefficients is not None or self.Y.shape[2] > 1:
+        M, N = self.Y.shape[1:]
+        if N >= M * temper:
+            return -10 * float(np.log10(quiet_noise(self.Y)).mean())
+        if manifold.coefficients is not None or N > 1:
             return 20.0
         return -10 * float(np.log10(first_noise(self.Y[0, :, 0], manifold.harmonics, None)))
 
@@ -139,7 +142,7 @@ def start(
     facts = carried(problems, response.extent)
     K = np.array([p.n for p in problems])
     free = K == 0
-    snr = np.array([p.snr_db(response.manifold, snr_db) for p in problems])
+    snr = np.array([p.snr_db(response.manifold, response.temper, snr_db) for p in problems])
     nu = np.maximum(10 ** (-snr / 10), response.noise_floor)
     K_active = np.array([np.count_nonzero(p.age == 0) for p in problems])
     share = np.where(free, max(most // 2, 1), np.maximum(K_active, 1))

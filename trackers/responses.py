@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 import numpy as np
 
 from arrivals.measurement_models.manifolds import Manifold
 from arrivals.trackers.noise_start import NOISE_FLOOR
 from arrivals.typing import Bool, Complex, Float
+
+Array = TypeVar("Array", Float, Complex)
 
 
 class Response:
@@ -126,6 +130,6 @@ class Response:
         return x if self.temper == 1 else x / self.temper
 
 
-def over_snapshots(x: Complex) -> Complex:
+def over_snapshots(x: Array) -> Array:
     """Return the sum over the last axis, of snapshots."""
-    return np.asarray(x[..., 0] if x.shape[-1] == 1 else x.sum(axis=-1))
+    return x[..., 0] if x.shape[-1] == 1 else x.sum(axis=-1)

@@ -11,6 +11,16 @@ from numpy.typing import NDArray
 from arrivals.typing import Bool
 
 
+def some(rows: Bool) -> bool:
+    """Tell whether any of some rows, (B,), is on: of few, a list is quicker than an array."""
+    return True in rows.tolist()
+
+
+def every(rows: Bool) -> bool:
+    """Tell whether all rows, (B,), are on."""
+    return False not in rows.tolist()
+
+
 @dataclass(eq=False)
 class Rows:
     """A record whose fields are arrays, or such records, with the same leading axis.
@@ -24,7 +34,7 @@ class Rows:
 
     def take(self, rows: Bool) -> Self:
         """Return some of the rows."""
-        if rows.all():
+        if every(rows):
             return self
         parts = vars(self).items()
         return type(self)(
@@ -36,7 +46,7 @@ class Rows:
 
     def put(self, rows: Bool, other: Self) -> Self:
         """Return the record with those rows replaced; what is too short is filled up with 0."""
-        if rows.all():
+        if every(rows):
             return other
         return type(self)(
             **{name: _put(part, rows, getattr(other, name)) for name, part in vars(self).items()}

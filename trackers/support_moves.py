@@ -22,7 +22,8 @@ from arrivals.trackers.joint_elbo import (
     State,
 )
 from arrivals.trackers.joint_newton import LARGEST_VARIANCE
-from arrivals.trackers.responses import Response
+from arrivals.trackers.responses import Response, over_snapshots
+from arrivals.trackers.rows import some
 from arrivals.typing import Bool, Float, Int
 
 LOG_2PI = float(np.log(2 * np.pi))
@@ -84,7 +85,7 @@ def removal_gains(response: Response, state: State, kl: float) -> Float:
     """
     C = state.nu[:, :, None] * state.G.diagonal(axis1=2, axis2=3).real
     C = np.where(state.used[:, None], C, 1.0)
-    w2 = (state.W.real**2 + state.W.imag**2).sum(axis=3)
+    w2 = over_snapshots(state.W.real**2 + state.W.imag**2)
     looks = state.W.shape[3] * (np.log(state.tau)[:, :, None] - np.log(C)) - w2 / C
     gain = response.total(looks) - state.facts[:, ODDS] + kl * state.D
     return np.where(state.used, gain, -np.inf)
@@ -98,7 +99,7 @@ def relearned(response: Response, state: State) -> Float:
     """
     M, N = state.Y.shape[2:]
     G = np.where(state.used[:, None], state.G.diagonal(axis1=2, axis2=3).real, 1.0)
-    w2 = (state.W.real**2 + state.W.imag**2).sum(axis=3)
+    w2 = over_snapshots(state.W.real**2 + state.W.imag**2)
     freedom = N * (M - state.K[:, None, None])
     x = (freedom + w2 / (G * state.nu[:, :, None])) / (freedom + N)
     return response.total((freedom + N) * (x - 1 - np.log(np.maximum(x, 1e-3))))
@@ -173,7 +174,7 @@ def evidence(grid: Grid, state: State) -> tuple[Float, Float, Float]:
     P = state.A.conj() @ grid.A.swapaxes(1, 2)  # âᴴa
     residual = state.Y - state.A.swapaxes(2, 3) @ state.W
     z = grid.A.conj() @ residual
-    z2 = (z.real**2 + z.imag**2).sum(axis=3)
+    z2 = over_snapshots(z.real**2 + z.imag**2)
     GP = state.G @ P
     nu, tau = state.nu[:, :, None], state.tau[:, :, None]
     d = grid.norm2 + nu / tau - (P.real * GP.real + P.imag * GP.imag).sum(axis=2)
@@ -196,7 +197,7 @@ def rivals(
         near = np.cos(grid.theta - grid.theta[last][:, None]) > grid.cos_apart
         open_ = open_ & ~near & (i < room)[:, None]
         found = open_.any(axis=1) & (n == i)
-        if not found.any():
+        if not some(found):
             break
         last = np.where(open_, fresh, -np.inf).argmax(axis=1)
         facts[:, MU, i], facts[:, S, i] = grid.theta[last], variance[rows, last]
@@ -225,7 +226,7 @@ def revive(
     back = np.where(revivable[:, :, None], back, -np.inf).reshape(len(n), -1)
     best = back.argmax(axis=1)
     better = back[rows, best] > np.maximum(gain, 0)
-    if better.any():
+    if some(better):
         who, where = np.divmod(best[better], len(grid.theta))
         facts[better, :, 0] = memory[better, :, who]
         facts[better, MU, 0] = grid.theta[where]
