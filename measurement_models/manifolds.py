@@ -20,8 +20,12 @@ class Manifold(Protocol):
 
     The axes of data are (n_bins, n_sensors, n_snapshots); those of `coefficients` are
     (n_nuisance, n_bins, n_sensors, n_harmonics). A tracker that works on this protocol sees no
-    positions, wavelengths or signs.
+    positions, wavelengths or signs. Manifolds never change, so that what follows from one may be
+    remembered.
     """
+
+    def __hash__(self) -> int:
+        """Return the same for the same manifold."""
 
     @property
     def n_sensors(self) -> int:

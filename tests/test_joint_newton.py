@@ -243,7 +243,8 @@ def test_unused_places_and_other_problems_make_no_difference() -> None:
         facts[i, :, : state.facts.shape[2]] = state.facts[0]
     response, K = Response(MODEL.manifold()), np.array([5, 3, 4])
     y = np.concatenate([state.Y for state in states])
-    batch = evaluate(response, y, facts, K, np.full((3, 1), 0.01), np.full((3, 1), 0.2), np.zeros(3))
+    nu, tau = np.full((3, 1), 0.01), np.full((3, 1), 0.2)
+    batch = evaluate(response, y, facts, K, nu, tau, np.zeros(3))
     learn = np.array([True, False, True])
     for _ in range(4):
         batch = ascend(response, batch, learn)

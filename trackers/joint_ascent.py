@@ -101,9 +101,7 @@ class JointNewton:
     ) -> list[Fit]:
         """Fit independent snapshots of one array, as one array program."""
         most = min(manifold.n_sensors, self.max_components or manifold.n_sensors)
-        problems = [
-            Problem(Y, known, most) for Y, known in zip(Ys, predictions, strict=True)
-        ]
+        problems = [Problem(Y, known, most) for Y, known in zip(Ys, predictions, strict=True)]
         fits = [silence(problem, self.max_age) for problem in problems]
         heard = [i for i, problem in enumerate(problems) if not problem.silent]
         if heard and manifold.n_sensors > 1:

@@ -46,7 +46,7 @@ def negative_hessian(response: Response, state: State, P: Complex, curvature: Fl
     """
     TA, W = state.X[:, :, 1], state.W
     # a matrix for each look, row l: the derivative of h - (J + ν/τ I) w with respect to μₗ
-    B = np.multiply(TA.conj()[:, :, None], -W.swapaxes(2, 3)[..., None], order="C")
+    B: Complex = np.multiply(TA.conj()[:, :, None], -W.swapaxes(2, 3)[..., None], order="C")
     diagonals(B)[...] += (state.h[:, :, 1] - TA @ W).swapaxes(2, 3)
     gained = (B.conj() @ state.G[:, :, None] @ B.swapaxes(3, 4)).real
     gained = gained[:, :, 0] if gained.shape[2] == 1 else gained.sum(axis=2)

@@ -45,8 +45,8 @@ class Problem:
     most : int
         Components that may be used at once.
     snr_db : float or None
-        Where the noise starts if `known` does not say so; None: from the lags of one look of a
-        line, elsewhere 20.
+        Where the noise starts if `known` does not say so; None: from the covariance of many
+        snapshots or the lags of one look of a line, else 20.
     """
 
     def __init__(self, Y: Complex, known: Prediction | None, most: int) -> None:
@@ -66,7 +66,7 @@ class Problem:
         if otherwise is not None:
             return otherwise
         M, N = self.Y.shape[1:]
-        if N >= M * temper:
+        if M * temper <= N:  # looks enough for a covariance
             return -10 * float(np.log10(quiet_noise(self.Y)).mean())
         if manifold.coefficients is not None or N > 1:
             return 20.0
@@ -198,7 +198,13 @@ def log_odds(rho: Float) -> Float:
 
 
 def result(
-    work: Work, i: int, problem: Problem, manifold: Manifold, gains: Float, keep: float, max_age: int
+    work: Work,
+    i: int,
+    problem: Problem,
+    manifold: Manifold,
+    gains: Float,
+    keep: float,
+    max_age: int,
 ) -> Fit:
     """Return the fit of the i-th row, whose components would gain so much by removal."""
     state, K, n = work.state, int(work.state.K[i]), int(work.n_known[i])
@@ -237,7 +243,7 @@ def amplitudes_of(W: Complex, power: Float) -> Complex:
     W = W * np.sqrt(power)[:, None, None]
     if W.shape[0] == W.shape[2] == 1:
         return np.asarray(W[0, :, 0])
-    return np.sqrt((W.real**2 + W.imag**2).mean(axis=(0, 2))) + 0j
+    return np.asarray(np.sqrt((W.real**2 + W.imag**2).mean(axis=(0, 2))) + 0j)
 
 
 def front(manifold: Manifold, mu: Float) -> Float:
