@@ -169,7 +169,7 @@ class GridLine:
         """
         sine = np.asarray(theta, dtype=np.float64) / self.step
         beyond = np.abs(sine) > 1 + np.asarray(slack) / self.step + 1e-9
-        return np.where(beyond, np.nan, np.arcsin(np.clip(sine, -1, 1)))
+        return np.where(beyond, np.nan, np.arcsin(np.minimum(np.maximum(sine, -1), 1)))
 
     def doa_std(self, theta: ArrayLike, std: ArrayLike) -> Float:
         """Return half the width of the directions of θ ± std, which stays finite at endfire."""

@@ -151,4 +151,4 @@ def floored(response: Response, state: State, nu: Float, tau: Float) -> Float:
     """Return τ, not below the power that counts as a source; the old one where there is none."""
     if response.power_floor:
         tau = np.maximum(tau, response.power_floor * nu / response.mean_norm2)
-    return np.where(state.K[:, None] > 0, tau, state.tau)
+    return np.where(state.K[:, None] > 0, tau, state.tau) if 0 in state.K.tolist() else tau

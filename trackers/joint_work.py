@@ -218,7 +218,7 @@ def result(
     age[: problem.n] = problem.age + 1
     age[age > max_age] = -1
     age[place] = 0
-    newest = -10 * float(np.log10(state.nu[i]).mean())
+    newest = -10 * mean(np.log10(state.nu[i]))
     noise, power = state.nu[i] * problem.power, state.tau[i] * problem.power
     snr_db = (1 - keep) * work.snr_db[i] + keep * newest
     return Fit(
@@ -229,13 +229,18 @@ def result(
         age=age,
         amplitude=amplitude,
         evidence=evidence,
-        noise=float(noise.mean()),
-        power=float(power.mean()),
+        noise=mean(noise),
+        power=mean(power),
         iterations=int(work.iterations[i]),
         converged=bool(work.finished[i]),
-        snr_db=float(np.clip(snr_db, NOISIEST_DB, CLEANEST_DB)),
+        snr_db=min(max(float(snr_db), NOISIEST_DB), CLEANEST_DB),
         bin_noise=noise,
     )
+
+
+def mean(values: Float) -> float:
+    """Return the mean over bins: of one or a few, a list is quicker than an array."""
+    return sum(values.tolist()) / len(values)
 
 
 def amplitudes_of(W: Complex, power: Float) -> Complex:
