@@ -50,8 +50,8 @@ class JointNewton:
         Steps that a component is remembered without being active.
     keep : float
         Weight of the newest signal-to-noise ratio in the start of the next step.
-    inner, fill_inner, final : int
-        Newton steps after a move, after one while filling, and at the end.
+    inner, removal, fill_inner, final : int
+        Newton steps after a move, after a removal, after a move while filling, and at the end.
     inner_tolerance : float
         Change of the ELBO, nats, at which those after a move rest.
     far : float
@@ -79,6 +79,7 @@ class JointNewton:
     max_age: int = 3
     keep: float = 0.3
     inner: int = 3
+    removal: int = 1
     fill_inner: int = 2
     final: int = 12
     inner_tolerance: float = 1e-2
@@ -163,7 +164,12 @@ def moves_on(engine: JointNewton, manifold: Manifold, n_snapshots: int) -> Moves
         response,
         Grid(response, engine.grid, engine.merge),
         Bursts(
-            engine.inner, engine.fill_inner, engine.final, engine.inner_tolerance, engine.tolerance
+            engine.inner,
+            engine.removal,
+            engine.fill_inner,
+            engine.final,
+            engine.inner_tolerance,
+            engine.tolerance,
         ),
         engine.kl,
         places=most,

@@ -29,6 +29,7 @@ class Bursts:
     """How many Newton steps follow a move, and the change of F, nats, at which they rest."""
 
     inner: int
+    removal: int
     fill_inner: int
     final: int
     inner_tolerance: float
@@ -118,7 +119,7 @@ class Moves:
         rows = rows & (gains[np.arange(len(work)), k] > 0)
         if some(rows):
             self.drop(work, rows, k, revivable=True)
-            self.burst(work, rows, self.bursts.inner, self.bursts.inner_tolerance)
+            self.burst(work, rows, self.bursts.removal, self.bursts.inner_tolerance)
         return rows
 
     def drop(self, work: Work, rows: Bool, k: Int, revivable: bool) -> None:
