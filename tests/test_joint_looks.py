@@ -31,7 +31,14 @@ from arrivals.trackers.joint_work import Problem, log_odds
 from arrivals.trackers.line_spectrum import Fit, Prediction
 from arrivals.trackers.noise_start import quiet_noise
 from arrivals.trackers.responses import Response
-from arrivals.trackers.support_moves import Grid, evidence, relearned, removal_gains, without
+from arrivals.trackers.support_moves import (
+    Grid,
+    evidence,
+    nearest_later,
+    relearned,
+    removal_gains,
+    without,
+)
 from arrivals.typing import Complex, Float
 
 CIRCLE = ArraySnapshot(SensorArray.uca(8, radius=0.65), wavelength=1.0)
@@ -156,6 +163,25 @@ def test_what_learning_the_noise_again_gives_back_is_never_negative() -> None:
     for seed in range(4):
         response, state = scene(LOOKS, seed)
         assert (relearned(response, state) >= 0).all()
+
+
+@pytest.mark.parametrize(
+    ("model", "doa", "nearest"),
+    [
+        (CIRCLE, [3.13, 0.4, -3.14], 2),
+        (CIRCLE, [3.10, 0.4, -3.14], -1),
+        (SPARSE, [1.56, 0.4, np.pi - 1.56], 2),  # two angles of a line for one direction
+        (SPARSE, [1.40, 0.4, -1.40], -1),
+    ],
+)
+def test_the_nearest_are_found_across_the_cut_and_in_the_mirror(
+    model: ArraySnapshot, doa: list[float], nearest: int
+) -> None:
+    response, state = scene(model)
+    facts = state.facts.copy()
+    facts[0, MU] = doa
+    state = evaluate(response, state.Y, facts, state.K, state.nu, state.tau, state.rest)
+    assert nearest_later(Grid(response, 4, merge=np.deg2rad(1.5)), state).tolist() == [nearest]
 
 
 # -- the objective ------------------------------------------------------------------------------

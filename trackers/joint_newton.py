@@ -129,7 +129,7 @@ def learned(response: Response, state: State) -> State:
     K, ratio, T = state.K[:, None], state.nu / state.tau, response.temper
     w2 = over_snapshots(state.W.real**2 + state.W.imag**2)
     energy = w2.sum(axis=2)
-    trace = (state.G.diagonal(axis1=2, axis2=3).real * state.used[:, None]).sum(axis=2)
+    trace = (diagonals(state.G).real * state.used[:, None]).sum(axis=2)
     # ‖Y‖² - 2 Re tr HᴴŴ + tr ŴᴴJŴ, since JŴ = H - ν/τ Ŵ and ‖Y‖² = M N
     E = M * N - state.explained - ratio * energy
     gamma = N * (K - ratio * trace)  # N tr JG

@@ -240,7 +240,7 @@ def result(
 
 def mean(values: Float) -> float:
     """Return the mean over bins: of one or a few, a list is quicker than an array."""
-    return sum(values.tolist()) / len(values)
+    return float(sum(values.tolist()) / len(values))
 
 
 def amplitudes_of(W: Complex, power: Float) -> Complex:

@@ -58,6 +58,9 @@ class Grid:
         two_beams = 4 * np.pi / response.extent
         self.cos_apart = np.cos(two_beams) + 1e-9 if two_beams < np.pi + 1e-9 else -2.0
         self.merge, self.cos_merge = merge, np.cos(min(merge, np.pi))
+        # of angles whose directions may be near: with a mirror, of any
+        reach = 1.01 * merge * float(self.manifold.slope(self.theta).max())
+        self.cos_reach = -2.0 if self.manifold.mirror else np.cos(min(reach, np.pi)) - 1e-12
 
     def near(self, doa: Float) -> Bool:
         """Tell which angles are too near to directions (..., n): (..., n, n_angles)."""
@@ -70,10 +73,12 @@ def nearest_later(grid: Grid, state: State) -> Int:
     L = state.facts.shape[2]
     if L < 2 or grid.merge == 0:
         return none
-    doa = np.where(state.used, grid.manifold.to_doa(state.facts[:, MU]), np.nan)
-    near = np.cos(doa[:, :, None] - doa[:, None, :]) > grid.cos_merge  # round the circle, too
-    if np.count_nonzero(near) == np.count_nonzero(doa == doa):  # but for itself, none
+    theta = np.where(state.used, state.facts[:, MU], np.nan)
+    near = np.cos(theta[:, :, None] - theta[:, None, :]) > grid.cos_reach
+    if np.count_nonzero(near) == sum(state.K.tolist()):  # but for itself, none
         return none
+    doa = grid.manifold.to_doa(theta)
+    near = np.cos(doa[:, :, None] - doa[:, None, :]) > grid.cos_merge  # round the circle, too
     later = np.tril(near, -1).any(axis=2)
     return np.where(later.any(axis=1), later.argmax(axis=1), -1)
 
