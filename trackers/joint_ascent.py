@@ -37,8 +37,9 @@ class JointNewton:
     merge : float
         Two active components nearer than this, rad of direction, become one; 0 for never.
     snr_db : float or None
-        Signal-to-noise ratio from which the noise starts where the prediction has none; None
-        estimates it from the lags.
+        Signal-to-noise ratio from which the noise starts where the prediction has none. None
+        estimates it from the covariance of as many snapshots as sensors, or from the lags of one
+        look of a line; elsewhere it is 20.
     max_components : int or None
         As many as there are sensors if None.
     kl : float

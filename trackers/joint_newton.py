@@ -1,4 +1,4 @@
-"""One damped Newton step on all angles of a line spectrum together, amplitudes eliminated.
+"""One damped Newton step on all angles together, amplitudes eliminated.
 
 The derivatives are those of the ELBO in `joint_elbo`; η and B are the letters of the derivation.
 """

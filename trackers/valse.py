@@ -39,9 +39,10 @@ class VALSE(Tracker):
         the method estimates it.
     engine : {"fast", "coordinate"}
         What maximises the bound: joint Newton steps on all angles, or the paper's coordinate
-        ascent, which takes some thirty times as long and integrates the angles' densities. The
-        fast one is for one look a step of a line on a uniform grid within half of one wavelength;
-        everything else is fitted by coordinate ascent.
+        ascent, which takes three to thirty times as long and integrates the angles' densities.
+        The fast one serves every array, with any number of frequencies and snapshots; an unknown
+        slowness or elevation, or a whole posterior that is carried, is for coordinate ascent,
+        which then steps in.
     reference : {"middle", "first"}
         The sensor at which the amplitudes' phases are counted. "first" is the paper's; with the
         middle one phase and angle are uncorrelated, which saves most of the iterations.
@@ -166,7 +167,7 @@ class VALSE(Tracker):
 
     @property
     def is_fast(self) -> bool:
-        """Whether the fast engine is wanted, and serves this measurement."""
+        """Whether the fast engine is wanted, and serves this measurement: no second unknown."""
         if self.engine != "fast":
             return False
         return len(self.measurement.manifold(self.reference).nuisance_weights) == 1
