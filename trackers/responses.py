@@ -36,6 +36,15 @@ class Response:
         ‖a(θ)‖², the mean over all angles where it changes.
     mean_norm2 : ndarray, shape (n_bins,), or float
         The same.
+
+    Examples
+    --------
+    >>> from arrivals.measurement_models.manifolds import GridLine
+    >>> response = Response(GridLine(np.arange(3), step=np.pi, origin=1.0))
+    >>> response(np.zeros((1, 1)), np.full((1, 1), 0.2))[0, 0, 0].real.round(4)
+    array([[0.9048, 1.    , 0.9048]])
+    >>> round(float(response.extent), 6)
+    3.0
     """
 
     def __init__(
@@ -50,6 +59,8 @@ class Response:
         self.n_sensors, self.n_bins = manifold.n_sensors, manifold.n_bins
         k = manifold.harmonics.astype(np.float64)
         self.jk, self.half_k2 = 1j * k, k * k / 2
+        self.paired = bool((k == -k[::-1]).all())  # k and -k: ⟨d⟩ of one is the other's conjugate
+        self.first = len(k) // 2 if self.paired else 0
         self.factors = np.stack([np.ones(len(k)), 1j * k, -k * k])[:, None]
         self.G: Complex | None = None
         weight = np.ones(len(k))
@@ -70,7 +81,10 @@ class Response:
 
     def __call__(self, mu: Float, s: Float) -> Complex:
         """Return â, ∂â/∂μ and ∂²â/∂μ² = 2 ∂â/∂s for angles (B, L): (B, F, 3, L, n_sensors)."""
-        d = np.exp(mu[..., None] * self.jk - s[..., None] * self.half_k2)
+        jk, half_k2 = self.jk[self.first :], self.half_k2[self.first :]
+        d = np.exp(mu[..., None] * jk - s[..., None] * half_k2)
+        if self.paired:
+            d = np.concatenate([d[..., :0:-1].conj(), d], axis=-1)
         d = d[:, None] * self.factors
         if self.G is None:
             return d[:, None]
@@ -131,5 +145,11 @@ class Response:
 
 
 def over_snapshots(x: Array) -> Array:
-    """Return the sum over the last axis, of snapshots."""
+    """Return the sum over the last axis, of snapshots.
+
+    Examples
+    --------
+    >>> over_snapshots(np.ones((2, 3)))
+    array([3., 3.])
+    """
     return x[..., 0] if x.shape[-1] == 1 else x.sum(axis=-1)

@@ -12,7 +12,13 @@ from arrivals.typing import Bool, Int
 
 
 def some(rows: Bool) -> bool:
-    """Tell whether any of some rows, (B,), is on: of few, a list is quicker than an array."""
+    """Tell whether any of some rows, (B,), is on: of few, a list is quicker than an array.
+
+    Examples
+    --------
+    >>> some(np.array([False, True])), every(np.array([False, True]))
+    (True, False)
+    """
     return True in rows.tolist()
 
 

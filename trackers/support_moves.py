@@ -243,7 +243,8 @@ def without(facts: Float, k: Int) -> Float:
     """Return the components (B, 7, L) less the k-th of each problem, the last place empty."""
     L = facts.shape[2]
     order = np.arange(L) + (np.arange(L) >= k[:, None])
-    return np.take_along_axis(facts, np.minimum(order, L - 1)[:, None], axis=2)
+    rows = np.arange(len(k))[:, None]
+    return np.asarray(facts[rows, :, np.minimum(order, L - 1)].swapaxes(1, 2))
 
 
 def joined(facts: Float, K: Int, new: Births) -> tuple[Float, Int]:
