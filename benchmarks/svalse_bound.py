@@ -28,12 +28,12 @@ from arrivals.trackers.joint_elbo import (
     ODDS,
     PRIOR_KAPPA,
     PRIOR_MU,
-    Response,
     S,
     evaluate,
 )  # fmt: skip
 from arrivals.trackers.joint_work import log_odds
 from arrivals.trackers.line_spectrum import Fit, Prediction
+from arrivals.trackers.responses import Response
 from arrivals.trackers.support_moves import LOG_2PI
 from arrivals.typing import Complex
 
@@ -103,11 +103,9 @@ def bound(y: Complex, manifold: Manifold, known: Prediction, fit: Fit) -> float:
     facts[0, KL_CONSTANT, : len(on)][old] += log_i0(known.kappa[on[old]])
     facts[0, ODDS, : len(on)][old] = log_odds(known.existence[on[old]])
     power = float(np.vdot(y, y).real) / len(y)
-    nu, tau = np.array([fit.noise / power]), np.array([fit.power / power])
-    state = evaluate(
-        Response(manifold), y[None] / np.sqrt(power), facts, np.array([len(on)]), nu, tau,
-        np.zeros(1),
-    )  # fmt: skip
+    nu, tau = np.array([[fit.noise / power]]), np.array([[fit.power / power]])
+    Y = (y / np.sqrt(power))[None, None, :, None]
+    state = evaluate(Response(manifold), Y, facts, np.array([len(on)]), nu, tau, np.zeros(1))
     return float(state.F[0] - len(y) * np.log(power))
 
 

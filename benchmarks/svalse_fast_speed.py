@@ -22,8 +22,9 @@ from arrivals.measurement_models import ArraySnapshot
 from arrivals.motion_models import BernoulliVonMises
 from arrivals.scenarios import create
 from arrivals.trackers import SVALSE
-from arrivals.trackers.joint_elbo import KL_CONSTANT, MU, N_FACTS, Response, S, evaluate
+from arrivals.trackers.joint_elbo import KL_CONSTANT, MU, N_FACTS, S, evaluate
 from arrivals.trackers.joint_newton import ascend
+from arrivals.trackers.responses import Response
 from arrivals.trackers.support_moves import LOG_2PI
 from arrivals.typing import Complex, Float
 
@@ -157,8 +158,8 @@ def calls() -> None:
     facts[0, MU] = manifold.from_doa(truth[0])
     facts[0, S], facts[0, KL_CONSTANT] = 1e-3, LOG_2PI
     given: list[Any] = [
-        y / np.sqrt((np.abs(y) ** 2).mean()), facts, np.array([6]), np.full(1, 0.01),
-        np.full(1, 0.2), np.zeros(1),
+        (y / np.sqrt((np.abs(y) ** 2).mean()))[:, None, :, None], facts, np.array([6]),
+        np.full((1, 1), 0.01), np.full((1, 1), 0.2), np.zeros(1),
     ]  # fmt: skip
     response = Response(manifold)
     state = evaluate(response, *[array.view(Counted) for array in given])

@@ -20,8 +20,12 @@ class Manifold(Protocol):
 
     The axes of data are (n_bins, n_sensors, n_snapshots); those of `coefficients` are
     (n_nuisance, n_bins, n_sensors, n_harmonics). A tracker that works on this protocol sees no
-    positions, wavelengths or signs.
+    positions, wavelengths or signs. Manifolds never change, so that what follows from one may be
+    remembered.
     """
+
+    def __hash__(self) -> int:
+        """Return the same for the same manifold."""
 
     @property
     def n_sensors(self) -> int:
@@ -165,7 +169,7 @@ class GridLine:
         """
         sine = np.asarray(theta, dtype=np.float64) / self.step
         beyond = np.abs(sine) > 1 + np.asarray(slack) / self.step + 1e-9
-        return np.where(beyond, np.nan, np.arcsin(np.clip(sine, -1, 1)))
+        return np.where(beyond, np.nan, np.arcsin(np.minimum(np.maximum(sine, -1), 1)))
 
     def doa_std(self, theta: ArrayLike, std: ArrayLike) -> Float:
         """Return half the width of the directions of θ ± std, which stays finite at endfire."""

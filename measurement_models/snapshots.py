@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -226,13 +227,10 @@ class ArraySnapshot(MeasurementModel):
         """
         one_of("reference", reference, ("middle", "first"))
         self._check_directions()
-        spacing = self.array.spacing if self.angle == "auto" and self.n_bins == 1 else None
-        if spacing is None or self.slowness or self.wavelengths[0] < 2 * spacing * (1 - 1e-6):
-            return fourier_manifold(self.waves, reference)
-        coordinates = self.array.positions[:, 0]
-        places = np.rint((coordinates - coordinates.min()) / spacing).astype(np.int64)
-        step = min(2 * np.pi * spacing / self.wavelengths[0], np.pi)
-        return GridLine(places, step, -float(coordinates.min()) / spacing, reference)
+        line = None
+        if self.angle == "auto" and self.n_bins == 1 and not self.slowness:
+            line = grid_line(self.array, self.wavelengths[0], reference)
+        return fourier_manifold(self.waves, reference) if line is None else line
 
     def ambiguity(self) -> tuple[float, float] | None:
         """Return the first two directions, rad, that look alike at every frequency, or None."""
@@ -331,6 +329,18 @@ class ArraySnapshot(MeasurementModel):
                 + ("" if self.slowness is self.elevation else " and a second unknown")
             )
         return self.steering_vector(doa)
+
+
+@lru_cache(maxsize=256)
+def grid_line(array: SensorArray, wavelength: float, reference: Reference) -> GridLine | None:
+    """Return the manifold of a line on a uniform grid within half a wavelength; else None."""
+    spacing = array.spacing
+    if spacing is None or wavelength < 2 * spacing * (1 - 1e-6):
+        return None
+    coordinates = array.positions[:, 0]
+    places = np.rint((coordinates - coordinates.min()) / spacing).astype(np.int64)
+    step = min(2 * np.pi * spacing / wavelength, np.pi)
+    return GridLine(places, step, -float(coordinates.min()) / spacing, reference)
 
 
 def _log_marginal(Y: Complex, A: Complex, noise: float, power: float) -> Float:

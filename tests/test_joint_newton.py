@@ -19,7 +19,6 @@ from arrivals.trackers.joint_elbo import (
     PLACE,
     PRIOR_KAPPA,
     PRIOR_MU,
-    Response,
     S,
     State,
     evaluate,
@@ -32,6 +31,7 @@ from arrivals.trackers.joint_newton import (
     weights,
 )
 from arrivals.trackers.line_spectrum import Prediction
+from arrivals.trackers.responses import Response
 from arrivals.trackers.support_moves import Grid, births, evidence, removal_gains, without
 from arrivals.typing import Complex, Float
 
@@ -56,20 +56,20 @@ def scene(seed: int, model: ArraySnapshot = MODEL, K: int = 5) -> State:
     facts[0, PRIOR_KAPPA] = np.where(np.arange(K) % 2, 120.0, 0.0)
     facts[0, KL_CONSTANT] = np.log(2 * np.pi * np.i0(facts[0, PRIOR_KAPPA]))
     facts[0, ODDS] = np.where(np.arange(K) % 2, np.log(3.0), -2.2)
-    return with_facts(Response(model.manifold()), unit(y)[None], facts)
+    return with_facts(Response(model.manifold()), unit(y)[None, None, :, None], facts)
 
 
 def with_facts(
     response: Response, y: Complex, facts: Float, nu: float = 0.01, tau: float = 0.2
 ) -> State:
     K = np.array([facts.shape[2]])
-    return evaluate(response, y, facts, K, np.array([nu]), np.array([tau]), np.zeros(1))
+    return evaluate(response, y, facts, K, np.array([[nu]]), np.array([[tau]]), np.zeros(1))
 
 
 def shifted(state: State, row: int, k: int, by: float, response: Response) -> State:
     facts = state.facts.copy()
     facts[0, row, k] += by
-    return with_facts(response, state.y, facts, state.nu[0], state.tau[0])
+    return with_facts(response, state.Y, facts, state.nu[0, 0], state.tau[0, 0])
 
 
 def slope_of(state: State, row: int, k: int, h: float, response: Response) -> float:
@@ -85,7 +85,7 @@ def slope_of(state: State, row: int, k: int, h: float, response: Response) -> fl
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_gradients_are_slopes(seed: int, model: ArraySnapshot) -> None:
     state, response = scene(seed, model), Response(model.manifold())
-    g, curvature = slopes(state, *weights(state))
+    g, curvature = slopes(response, state, *weights(state))
     of_s = 0.5 / state.facts[0, S] - 0.5 * curvature[0]
     for k in range(5):
         s = float(state.facts[0, S, k])
@@ -104,11 +104,11 @@ def test_hessian_is_the_slope_of_the_gradient_to_a_hundredth(model: ArraySnapsho
     for _ in range(5):
         state = ascend(response, state, NONE)
     v, P = weights(state)
-    N = negative_hessian(state, P, slopes(state, v, P)[1])
+    N = negative_hessian(response, state, P, slopes(response, state, v, P)[1])
     np.testing.assert_allclose(N, N.swapaxes(1, 2), atol=1e-9 * np.abs(N).max())
     for k in range(5):
         ends = [shifted(state, MU, k, h, response) for h in (1e-6, -1e-6)]
-        up, down = (slopes(end, *weights(end))[0][0] for end in ends)
+        up, down = (slopes(response, end, *weights(end))[0][0] for end in ends)
         np.testing.assert_allclose(N[0, :, k], (down - up) / 2e-6, atol=0.01 * np.abs(N).max())
 
 
@@ -117,11 +117,11 @@ def test_hessian_is_the_slope_of_the_gradient_to_a_hundredth(model: ArraySnapsho
 
 def written_out(state: State, w: Complex, C: Complex) -> float:
     """The bound for any means and covariance of the amplitudes, from the model."""
-    A, M, K = state.A[0], state.y.shape[1], state.A.shape[1]
+    A, M, K = state.A[0, 0], state.Y.shape[2], state.A.shape[2]
     J = A.conj() @ A.T
     np.fill_diagonal(J, M)
-    nu, tau = float(state.nu[0]), float(state.tau[0])
-    misfit = M - 2 * np.vdot(A.conj() @ state.y[0], w).real + np.vdot(w, J @ w).real
+    nu, tau = float(state.nu[0, 0]), float(state.tau[0, 0])
+    misfit = M - 2 * np.vdot(A.conj() @ state.Y[0, 0, :, 0], w).real + np.vdot(w, J @ w).real
     likelihood = -M * np.log(np.pi * nu) - (misfit + np.trace(J @ C).real) / nu
     amplitudes = -K * np.log(np.pi * tau) - (np.vdot(w, w).real + C.trace().real) / tau
     entropy = K * np.log(np.pi * np.e) + np.linalg.slogdet(C)[1]
@@ -133,7 +133,7 @@ def written_out(state: State, w: Complex, C: Complex) -> float:
 @given(st.integers(0, 10**6))
 def test_the_objective_is_the_bound_at_its_best_amplitudes(seed: int) -> None:
     state, rng = scene(seed), np.random.default_rng(seed)
-    w, C = state.w[0], state.nu[0] * state.G[0]
+    w, C = state.W[0, 0, :, 0], state.nu[0, 0] * state.G[0, 0]
     assert written_out(state, w, C) == pytest.approx(state.F[0], abs=1e-8)
     other = w * (1 + 0.01 * rng.standard_normal(5))
     assert written_out(state, other, C) < state.F[0]
@@ -159,7 +159,7 @@ def test_the_objective_never_falls_in_a_newton_step(seed: int, learn: bool, nu: 
     state = scene(seed)
     facts = state.facts.copy()
     facts[0, MU] += 0.3 * rng.standard_normal(5)  # far from the top
-    state = with_facts(response, state.y, facts, nu)
+    state = with_facts(response, state.Y, facts, nu)
     F = [state.F[0]]
     for _ in range(15):
         state = ascend(response, state, np.array([learn]))
@@ -172,13 +172,13 @@ def test_noise_and_power_end_at_the_fixed_points_of_em() -> None:
     state, response = scene(4), Response(MODEL.manifold())
     for _ in range(40):
         state = ascend(response, state, np.ones(1, dtype=np.bool_))
-    A, w, M = state.A[0], state.w[0], 15
+    A, w, M = state.A[0, 0], state.W[0, 0, :, 0], 15
     J = A.conj() @ A.T
     np.fill_diagonal(J, M)
-    C = state.nu[0] * state.G[0]
-    misfit = M - 2 * np.vdot(A.conj() @ state.y[0], w).real + np.vdot(w, J @ w).real
-    assert state.nu[0] == pytest.approx((misfit + np.trace(J @ C).real) / M, rel=0.02)  # (58)
-    assert state.tau[0] == pytest.approx((np.vdot(w, w) + C.trace()).real / 5, rel=1e-4)  # (59)
+    C = state.nu[0, 0] * state.G[0, 0]
+    misfit = M - 2 * np.vdot(A.conj() @ state.Y[0, 0, :, 0], w).real + np.vdot(w, J @ w).real
+    assert state.nu[0, 0] == pytest.approx((misfit + np.trace(J @ C).real) / M, rel=0.02)  # (58)
+    assert state.tau[0, 0] == pytest.approx((np.vdot(w, w) + C.trace()).real / 5, rel=1e-4)  # (59)
     assert learned(response, state).F[0] == pytest.approx(state.F[0], abs=1e-4)
 
 
@@ -189,10 +189,10 @@ def test_noise_and_power_end_at_the_fixed_points_of_em() -> None:
 @given(st.integers(0, 10**6), st.floats(0, 1))
 def test_a_removal_changes_the_criterion_by_exactly_its_gain(seed: int, kl: float) -> None:
     state, response = scene(seed), Response(MODEL.manifold())
-    gains = removal_gains(state, kl)[0]
+    gains = removal_gains(Response(MODEL.manifold()), state, kl)[0]
     for k in range(5):
         facts = without(state.facts, np.array([k]))[:, :, :4]
-        rest = with_facts(response, state.y, facts, state.nu[0], state.tau[0])
+        rest = with_facts(response, state.Y, facts, state.nu[0, 0], state.tau[0, 0])
         change = rest.criterion(kl) - state.criterion(kl)
         assert change[0] == pytest.approx(gains[k], abs=1e-7)
 
@@ -205,7 +205,7 @@ def test_an_addition_changes_the_evidence_by_exactly_its_gain() -> None:
         new = np.zeros((1, N_FACTS, 1))
         new[0, [MU, S], 0] = grid.theta[g], 1e-14  # a point
         facts = np.concatenate([state.facts, new], axis=2)
-        more = with_facts(response, state.y, facts, state.nu[0], state.tau[0])
+        more = with_facts(response, state.Y, facts, state.nu[0, 0], state.tau[0, 0])
         assert more.criterion(0.0)[0] - state.criterion(0.0)[0] == pytest.approx(gain[g], abs=1e-6)
 
 
@@ -214,7 +214,7 @@ def test_nothing_is_born_near_what_is_there_and_what_was_removed_comes_back() ->
     for _ in range(5):
         state = ascend(response, state, NONE)
     facts = without(state.facts, np.array([3]))[:, :, :4]
-    rest = with_facts(response, state.y, facts, state.nu[0], state.tau[0])
+    rest = with_facts(response, state.Y, facts, state.nu[0, 0], state.tau[0, 0])
     grid = Grid(response, 8, merge=np.deg2rad(1.5))
     barred, room = np.zeros((1, len(grid.theta)), dtype=np.bool_), np.ones(1, dtype=np.int64)
     memory = state.facts.copy()
@@ -242,8 +242,9 @@ def test_unused_places_and_other_problems_make_no_difference() -> None:
     for i, state in enumerate(states):
         facts[i, :, : state.facts.shape[2]] = state.facts[0]
     response, K = Response(MODEL.manifold()), np.array([5, 3, 4])
-    y = np.concatenate([state.y for state in states])
-    batch = evaluate(response, y, facts, K, np.full(3, 0.01), np.full(3, 0.2), np.zeros(3))
+    y = np.concatenate([state.Y for state in states])
+    nu, tau = np.full((3, 1), 0.01), np.full((3, 1), 0.2)
+    batch = evaluate(response, y, facts, K, nu, tau, np.zeros(3))
     learn = np.array([True, False, True])
     for _ in range(4):
         batch = ascend(response, batch, learn)
@@ -251,7 +252,7 @@ def test_unused_places_and_other_problems_make_no_difference() -> None:
         for i, (state, k) in enumerate(zip(states, K, strict=True)):
             assert batch.F[i] == pytest.approx(state.F[0], abs=1e-9)
             np.testing.assert_allclose(batch.facts[i, MU, :k], state.facts[0, MU], atol=1e-11)
-            np.testing.assert_allclose(batch.w[i, :k], state.w[0], atol=1e-10)
+            np.testing.assert_allclose(batch.W[i, 0, :k], state.W[0, 0], atol=1e-10)
 
 
 @dataclass(frozen=True, eq=False)
@@ -270,7 +271,7 @@ def test_a_response_with_coefficients_takes_the_same_steps() -> None:
     state = scene(0, GAPS)
     one, other = Response(line), Response(explicit)
     assert other.extent == pytest.approx(one.extent)
-    state2 = with_facts(other, state.y, state.facts)
+    state2 = with_facts(other, state.Y, state.facts)
     for _ in range(4):
         state, state2 = ascend(one, state, NONE), ascend(other, state2, NONE)
         np.testing.assert_allclose(state2.facts, state.facts, atol=1e-10)

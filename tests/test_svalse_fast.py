@@ -21,12 +21,12 @@ from arrivals.trackers.joint_elbo import (
     ODDS,
     PRIOR_KAPPA,
     PRIOR_MU,
-    Response,
     S,
     evaluate,
 )
 from arrivals.trackers.joint_work import log_odds
 from arrivals.trackers.line_spectrum import Fit, Prediction
+from arrivals.trackers.responses import Response
 from arrivals.trackers.valse import reported
 from arrivals.typing import Complex, Float
 
@@ -181,9 +181,9 @@ def bound(y: Complex, manifold: Any, known: Prediction, fit: Fit) -> float:
     ):
         facts[0, row, old] = values[on[old]]
     power = float(np.vdot(y, y).real) / len(y)
-    nu, tau = np.array([fit.noise]) / power, np.array([fit.power]) / power
+    nu, tau = np.array([[fit.noise]]) / power, np.array([[fit.power]]) / power
     K = np.array([len(on)])
-    z = y[None] / np.sqrt(power)
+    z = y[None, None, :, None] / np.sqrt(power)
     return float(evaluate(Response(manifold), z, facts, K, nu, tau, np.zeros(1)).F[0])
 
 

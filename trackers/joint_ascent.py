@@ -8,15 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from arrivals.measurement_models.manifolds import Manifold
-from arrivals.trackers.joint_elbo import Response
 from arrivals.trackers.joint_moves import Bursts, Moves
 from arrivals.trackers.joint_newton import ascend
 from arrivals.trackers.joint_work import Problem, Work, result, silence, start
 from arrivals.trackers.line_spectrum import Fit, Prediction
+from arrivals.trackers.noise_start import NOISE_FLOOR
+from arrivals.trackers.responses import Response
+from arrivals.trackers.rows import every, some
 from arrivals.trackers.support_moves import Grid, removal_gains
 from arrivals.typing import Complex
 
@@ -34,8 +37,9 @@ class JointNewton:
     merge : float
         Two active components nearer than this, rad of direction, become one; 0 for never.
     snr_db : float or None
-        Signal-to-noise ratio from which the noise starts where the prediction has none; None
-        estimates it from the lags.
+        Signal-to-noise ratio from which the noise starts where the prediction has none. None
+        estimates it from the covariance of as many snapshots as sensors, or from the lags of one
+        look of a line; elsewhere it is 20.
     max_components : int or None
         As many as there are sensors if None.
     kl : float
@@ -47,8 +51,8 @@ class JointNewton:
         Steps that a component is remembered without being active.
     keep : float
         Weight of the newest signal-to-noise ratio in the start of the next step.
-    inner, fill_inner, final : int
-        Newton steps after a move, after one while filling, and at the end.
+    inner, removal, fill_inner, final : int
+        Newton steps after a move, after a removal, after a move while filling, and at the end.
     inner_tolerance : float
         Change of the ELBO, nats, at which those after a move rest.
     far : float
@@ -57,6 +61,13 @@ class JointNewton:
         Angles for each sensor at which components may be born.
     max_moves : int
         Changes of the support at most.
+    temper : float
+        Looks of a step that count as one.
+    power_floor : float or None
+        Power, in units of one look's noise after beamforming, below which nothing is a source;
+        None is 0 for one look and 3 for several.
+    max_snr_db : float or None
+        Signal-to-noise ratio beyond which what is left of the data is laid to the model.
     """
 
     tolerance: float = 1e-4
@@ -69,15 +80,19 @@ class JointNewton:
     max_age: int = 3
     keep: float = 0.3
     inner: int = 3
+    removal: int = 1
     fill_inner: int = 2
     final: int = 12
     inner_tolerance: float = 1e-2
     far: float = 10.0
     grid: int = 4
     max_moves: int = 60
+    temper: float = 1.0
+    power_floor: float | None = None
+    max_snr_db: float | None = None
 
     def fit(self, Y: Complex, manifold: Manifold, prediction: Prediction | None) -> Fit:
-        """Fit one snapshot, (1, n_sensors, 1); no prediction: nothing is known."""
+        """Fit looks (n_bins, n_sensors, n_snapshots); no prediction: nothing is known."""
         return self.fit_batch([Y], manifold, [prediction])[0]
 
     def fit_batch(
@@ -88,11 +103,9 @@ class JointNewton:
     ) -> list[Fit]:
         """Fit independent snapshots of one array, as one array program."""
         most = min(manifold.n_sensors, self.max_components or manifold.n_sensors)
-        problems = [
-            Problem(Y[0, :, 0], known, most) for Y, known in zip(Ys, predictions, strict=True)
-        ]
+        problems = [Problem(Y, known, most) for Y, known in zip(Ys, predictions, strict=True)]
         fits = [silence(problem, self.max_age) for problem in problems]
-        heard = [i for i, problem in enumerate(problems) if problem.power > 0]
+        heard = [i for i, problem in enumerate(problems) if not problem.silent]
         if heard and manifold.n_sensors > 1:
             for i, fit in zip(
                 heard, self._solved([problems[i] for i in heard], manifold, most), strict=True
@@ -102,44 +115,30 @@ class JointNewton:
 
     def _solved(self, problems: list[Problem], manifold: Manifold, most: int) -> list[Fit]:
         """Fit snapshots that have power: moves and Newton steps in turn until all rest."""
-        moves = self.moves(manifold, most)
+        moves = moves_on(self, manifold, problems[0].Y.shape[2])
         work = start(problems, moves.response, self.snr_db, len(moves.grid.theta), most)
         work.left[:] = np.where(work.free, 0, self.inner)
         work.tolerance[:] = self.inner_tolerance
         fits: dict[int, Fit] = {}
         while len(work):
             over = work.left == 0
-            if over.any():
+            if some(over):
                 part = work.take(over)
                 moves.choose(part)
                 work = work.put(over, part)
-                if work.done.any():
-                    gains = removal_gains(work.state, self.kl)
+                if some(work.done):
+                    gains = removal_gains(moves.response, work.state, self.kl)
                     for i in map(int, np.flatnonzero(work.done)):
                         n = int(work.row[i])
-                        fits[n] = result(work, i, problems[n], gains, self.keep, self.max_age)
-                    if work.done.all():
+                        fits[n] = result(
+                            work, i, problems[n], manifold, gains, self.keep, self.max_age
+                        )
+                    if every(work.done):
                         break
                     work = work.take(~work.done)
                 work.state, work.saved = work.state.trimmed(), work.saved.trimmed()
             self.climb(moves.response, work)
         return [fits[n] for n in range(len(problems))]
-
-    def moves(self, manifold: Manifold, most: int) -> Moves:
-        """Return the moves between Newton steps, for an array."""
-        response = Response(manifold)
-        M = manifold.n_sensors
-        return Moves(
-            response,
-            Grid(response, self.grid, self.merge),
-            Bursts(self.inner, self.fill_inner, self.final, self.inner_tolerance, self.tolerance),
-            self.kl,
-            places=most,
-            most=min(most, M - 1),
-            fill_to=min(int(np.ceil(round(self.fill * response.extent, 6))), most, M - 1),
-            max_moves=self.max_moves,
-            max_iterations=self.max_iterations,
-        )
 
     def climb(self, response: Response, work: Work) -> None:
         """Take one Newton step in every problem; a burst goes on while its steps gain much."""
@@ -150,3 +149,34 @@ class JointNewton:
         left = np.where(gain > self.far, np.maximum(work.left, 2), work.left)
         work.left = np.where(gain < work.tolerance, 0, left - 1)
         work.left = np.minimum(work.left, self.max_iterations - work.iterations)
+
+
+@lru_cache(maxsize=64)
+def moves_on(engine: JointNewton, manifold: Manifold, n_snapshots: int) -> Moves:
+    """Return the moves between Newton steps, for an array and so many snapshots a step."""
+    M, several = manifold.n_sensors, manifold.n_bins * n_snapshots > 1
+    most = min(M, engine.max_components or M)
+    floor = engine.power_floor
+    if floor is None:
+        floor = 3.0 if several else 0.0
+    noise_floor = NOISE_FLOOR if engine.max_snr_db is None else 10 ** (-engine.max_snr_db / 10)
+    response = Response(manifold, engine.temper, floor, noise_floor)
+    return Moves(
+        response,
+        Grid(response, engine.grid, engine.merge),
+        Bursts(
+            engine.inner,
+            engine.removal,
+            engine.fill_inner,
+            engine.final,
+            engine.inner_tolerance,
+            engine.tolerance,
+        ),
+        engine.kl,
+        places=most,
+        most=min(most, M - 1),
+        fill_to=min(int(np.ceil(round(engine.fill * response.extent, 6))), most, M - 1),
+        max_moves=engine.max_moves,
+        max_iterations=engine.max_iterations,
+        relearn=several or manifold.coefficients is not None,
+    )

@@ -6,14 +6,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from arrivals.trackers.joint_elbo import MU, ODDS, PLACE, Response, State, evaluate
+from arrivals.trackers.joint_elbo import MU, ODDS, PLACE, State, evaluate
 from arrivals.trackers.joint_work import Work, log_odds
-from arrivals.trackers.rows import enlarged
+from arrivals.trackers.responses import Response
+from arrivals.trackers.rows import enlarged, some
 from arrivals.trackers.support_moves import (
     Grid,
     births,
     joined,
     nearest_later,
+    relearned,
     removal_gains,
     without,
 )
@@ -27,6 +29,7 @@ class Bursts:
     """How many Newton steps follow a move, and the change of F, nats, at which they rest."""
 
     inner: int
+    removal: int
     fill_inner: int
     final: int
     inner_tolerance: float
@@ -49,6 +52,8 @@ class Moves:
     most, fill_to : int
         Active ones at most, and in the fill stage.
     max_moves, max_iterations : int
+    relearn : bool
+        Whether a removal counts what the noise gains by being learned again.
     """
 
     response: Response
@@ -60,13 +65,14 @@ class Moves:
     fill_to: int
     max_moves: int
     max_iterations: int
+    relearn: bool = False
 
     def choose(self, work: Work) -> None:
         """Judge what is on trial, and choose the next burst of each problem: one pass 1-4."""
         exhausted = self.judge(work)
         stop = (work.moves >= self.max_moves) | (work.iterations >= self.max_iterations)
         open_ = ~(exhausted | stop)
-        if open_.any():
+        if some(open_):
             self.merge(work, open_)
         removed = self.remove(work, open_ & ~work.filling)
         added = self.add(work, open_ & ~removed)
@@ -76,16 +82,16 @@ class Moves:
 
     def judge(self, work: Work) -> Bool:
         """Keep additions that raise the record, undo the others and tell which they are."""
-        if not work.trial.any():
+        if not some(work.trial):
             return np.zeros(len(work), dtype=np.bool_)
         now = work.state.criterion(self.kl)
         better = work.trial & (now > np.maximum(work.before, work.record) + MARGIN)
         worse = work.trial & ~better
-        if better.any():
+        if some(better):
             work.record = np.where(better, now, work.record)
             changed(work, better)
             remember(work, better)
-        if worse.any():
+        if some(worse):
             work.state = work.state.put(worse, work.saved.take(worse))
             work.rejected = np.where(worse, work.state.F, work.rejected)
         return worse
@@ -93,7 +99,7 @@ class Moves:
     def merge(self, work: Work, rows: Bool) -> None:
         """Switch off every component too near to an earlier one, and let none be born there."""
         later = nearest_later(self.grid, work.state)
-        while (rows & (later >= 0)).any():
+        while some(rows & (later >= 0)):
             near = rows & (later >= 0)
             doa = self.grid.manifold.to_doa(work.state.facts[near, MU, later[near]])
             barred = work.barred.copy()
@@ -104,14 +110,16 @@ class Moves:
 
     def remove(self, work: Work, rows: Bool) -> Bool:
         """Remove the component whose removal gains most, if it gains; tell where one was."""
-        if not rows.any():
+        if not some(rows):
             return rows
-        gains = removal_gains(work.state, self.kl)
+        gains = removal_gains(self.response, work.state, self.kl)
+        if self.relearn:
+            gains = gains + relearned(self.response, work.state)
         k = gains.argmax(axis=1)
         rows = rows & (gains[np.arange(len(work)), k] > 0)
-        if rows.any():
+        if some(rows):
             self.drop(work, rows, k, revivable=True)
-            self.burst(work, rows, self.bursts.inner, self.bursts.inner_tolerance)
+            self.burst(work, rows, self.bursts.removal, self.bursts.inner_tolerance)
         return rows
 
     def drop(self, work: Work, rows: Bool, k: Int, revivable: bool) -> None:
@@ -133,11 +141,11 @@ class Moves:
         room = np.where(work.filling, self.fill_to, self.most) - state.K
         same = np.abs(state.F - work.rejected) < self.bursts.inner_tolerance
         rows = rows & (room > 0) & ~same
-        if not rows.any():
+        if not some(rows):
             return rows
         part = work.take(rows)
         odds = part.birth
-        if part.free.any():
+        if some(part.free):
             odds = np.where(part.free & ~part.filling, self.learned(part.state.K + 1), odds)
         new = births(
             self.grid, part.state, odds, part.memory[:, :, : part.revivable.shape[1]],
@@ -145,7 +153,7 @@ class Moves:
         )  # fmt: skip
         found = rows.copy()
         found[rows] = new.n > 0
-        if found.any():
+        if some(found):
             work.saved = work.saved.put(found, state.take(found))
             work.before = np.where(found, state.criterion(self.kl), work.before)
             facts, K = joined(part.state.facts, part.state.K, new)
@@ -160,17 +168,17 @@ class Moves:
         work.finished = work.finished & ~(stop & ~work.finished)
         idle = idle & ~work.done
         filled = idle & work.filling
-        if filled.any():
+        if some(filled):
             work.filling = work.filling & ~filled
             work.learn = work.learn | filled
             work.record = np.where(filled, -np.inf, work.record)
             work.rejected = np.where(filled, np.nan, work.rejected)
             free = filled & work.free
-            if free.any():
+            if some(free):
                 self.evaluated(work, free, work.state.facts[free], work.state.K[free])
             self.burst(work, filled, self.bursts.inner, self.bursts.inner_tolerance)
         final = idle & ~filled
-        if final.any():
+        if some(final):
             work.finished = work.finished | final
             self.burst(work, final, self.bursts.final, self.bursts.tolerance)
 
@@ -184,7 +192,7 @@ class Moves:
         old = work.state.take(rows)
         rest = old.rest
         learning = (work.free & ~work.filling)[rows]
-        if work.free.any():
+        if some(work.free):
             facts = facts.copy()
             odds = np.where(learning, self.learned(K), work.birth[rows])
             free = work.free[rows]
@@ -193,7 +201,7 @@ class Moves:
             rest = np.where(free, absent, rest)
         L = max(int(K.max()), 1)
         facts = facts[:, :, :L]
-        new = evaluate(self.response, old.y, facts, K, old.nu, old.tau, rest)
+        new = evaluate(self.response, old.Y, facts, K, old.nu, old.tau, rest)
         work.state = work.state.put(rows, new)
 
     def learned(self, K: Int) -> Float:

@@ -1,4 +1,4 @@
-"""One damped Newton step on all angles of a line spectrum together, amplitudes eliminated.
+"""One damped Newton step on all angles together, amplitudes eliminated.
 
 The derivatives are those of the ELBO in `joint_elbo`; η and B are the letters of the derivation.
 """
@@ -7,50 +7,51 @@ from __future__ import annotations
 
 import numpy as np
 
-from arrivals.trackers.joint_elbo import (
-    MU,
-    Response,
-    S,
-    State,
-    diagonals,
-    evaluate,
-    with_variances,
-)
-from arrivals.trackers.noise_start import NOISE_FLOOR
+from arrivals.trackers.joint_elbo import MU, S, State, diagonals, evaluate, with_variances
+from arrivals.trackers.responses import Response, over_snapshots
+from arrivals.trackers.rows import some
 from arrivals.typing import Bool, Complex, Float
 
 LARGEST_VARIANCE = 0.3  # rad²: a wrapped normal density of more is no longer normal
 ROUNDING = 1e-7  # nats
+# Shares of the way of the angles, and of the logarithms of their variances, which in full can make
+# F fall however short the step of the angles.
+SHORTER = ((1 / 4, 1.0), (1 / 16, 1.0), (1 / 64, 1.0), (1 / 16, 1 / 16), (1 / 256, 1 / 256))
 SMALLEST_CURVATURE = 1e-3  # of the largest: what is flatter is no direction to run along
 
 
 def weights(state: State) -> tuple[Complex, Complex]:
-    """Return ŵ*/ν, (B, L), and Pₗₗ' = ŵ*ₗ ŵₗ'/ν + Gₗ'ₗ, (B, L, L)."""
-    v = state.w.conj() / state.nu[:, None]
-    return v, v[:, :, None] * state.w[:, None] + state.G.swapaxes(1, 2)
+    """Return Ŵ*/ν, (B, F, L, N), and Pₗₗ' = Σ ŵ*ₗ ŵₗ'/ν + N Gₗ'ₗ, (B, F, L, L)."""
+    v = state.W.conj() / state.nu[:, :, None, None]
+    G, N = state.G.swapaxes(2, 3), v.shape[3]
+    return v, v @ state.W.swapaxes(2, 3) + (G if N == 1 else N * G)
 
 
-def slopes(state: State, v: Complex, P: Complex) -> tuple[Float, Float]:
+def slopes(response: Response, state: State, v: Complex, P: Complex) -> tuple[Float, Float]:
     """Return ∂F/∂μ and the curvature with the amplitudes held, -∂²F/∂μ², both (B, L).
 
     The fixed point of the variances is s = 1/curvature: ∂F/∂s = 1/2s - curvature/2.
     """
-    # Re (∂â)ᴴη and Re (∂²â)ᴴη, with ηₗ = 2/ν w*ₗ y - 2 Σ Pₗₗ' âₗ' over all others (33)
-    others = (P[:, None] * state.X[:, 1:3]).sum(axis=3)
-    both = 2 * (v[:, None] * state.h[:, 1:] - others).real
+    # Re (∂â)ᴴη and Re (∂²â)ᴴη, with ηₗ = 2/ν Σ w*ₗ y - 2 Σ Pₗₗ' âₗ' over all others (33)
+    alone = over_snapshots(v[:, :, None] * state.h[:, :, 1:])
+    others = (P[:, :, None] * state.X[:, :, 1:3]).sum(axis=4)
+    both = 2 * response.total((alone - others).real)
     return both[:, 0] - state.pull.imag, state.pull.real - both[:, 1]
 
 
-def negative_hessian(state: State, P: Complex, curvature: Float) -> Float:
+def negative_hessian(response: Response, state: State, P: Complex, curvature: Float) -> Float:
     """Return -∂²F/∂μ∂μ' with the amplitudes eliminated, (B, L, L).
 
     One term of second order, tr(G ∂J G ∂J), is left out.
     """
-    TA, w = state.X[:, 1], state.w[:, :, None]
-    B = TA.conj() * -w  # row l: the derivative of h - (J + ν/τ I) w with respect to μₗ
-    diagonals(B)[...] = state.h[:, 1] - (TA @ w)[:, :, 0]
-    gained = (B.conj() @ state.G @ B.swapaxes(1, 2)).real / state.nu[:, None, None]
-    N = np.asarray(2 * ((P * state.TT).real - gained))
+    TA, W = state.X[:, :, 1], state.W
+    # a matrix for each look, row l: the derivative of h - (J + ν/τ I) w with respect to μₗ
+    B: Complex = np.multiply(TA.conj()[:, :, None], -W.swapaxes(2, 3)[..., None], order="C")
+    diagonals(B)[...] += (state.h[:, :, 1] - TA @ W).swapaxes(2, 3)
+    gained = (B.conj() @ state.G[:, :, None] @ B.swapaxes(3, 4)).real
+    gained = gained[:, :, 0] if gained.shape[2] == 1 else gained.sum(axis=2)
+    looks = (P * state.TT).real - gained / state.nu[:, :, None, None]
+    N = 2 * response.total(looks)
     diagonals(N)[...] += curvature
     return N
 
@@ -75,14 +76,14 @@ def ascend(response: Response, state: State, learn: Bool) -> State:
     learn : ndarray of bool, shape (B,)
     """
     v, P = weights(state)
-    g, curvature = slopes(state, v, P)
-    d = direction(g, negative_hessian(state, P, curvature), 2 / response.extent)
+    g, curvature = slopes(response, state, v, P)
+    d = direction(g, negative_hessian(response, state, P, curvature), 2 / response.extent)
     s = 1 / np.maximum(curvature, 1 / LARGEST_VARIANCE)
     best = moved(response, state, d, s)
     worse = fell(best, state)
-    if worse.any():
+    if some(worse):
         best = best.put(worse, shortened(response, state.take(worse), d[worse], s[worse]))
-    if learn.any():
+    if some(learn):
         best = best.put(learn, learned(response, best.take(learn)))
     return best
 
@@ -92,21 +93,23 @@ def moved(response: Response, state: State, d: Float, s: Float) -> State:
     facts = state.facts.copy()
     facts[:, MU] += d
     facts[:, S] = s
-    return evaluate(response, state.y, facts, state.K, state.nu, state.tau, state.rest)
+    return evaluate(response, state.Y, facts, state.K, state.nu, state.tau, state.rest)
 
 
 def shortened(response: Response, state: State, d: Float, s: Float) -> State:
-    """Return the state after the longest of three shorter steps that does not make F fall."""
+    """Return the state after the first of some shorter steps that does not make F fall."""
     best, left = state, np.ones(len(state), dtype=np.bool_)
-    for alpha in (1 / 4, 1 / 16, 1 / 64):
-        trial = moved(response, state.take(left), alpha * d[left], s[left])
-        good = ~fell(trial, state.take(left))
+    way = s / np.where(state.used, state.facts[:, S], s)
+    for alpha, beta in SHORTER:
+        part = state.take(left)
+        trial = moved(response, part, alpha * d[left], part.facts[:, S] * way[left] ** beta)
+        good = ~fell(trial, part)
         rows = left.copy()
         rows[left] = good
-        if good.any():
+        if some(good):
             best = best.put(rows, trial.take(good))
         left = left & ~rows
-        if not left.any():
+        if not some(left):
             break
     return best
 
@@ -122,22 +125,30 @@ def learned(response: Response, state: State) -> State:
     It has the fixed points of (58) and (59), and is some 1.5 K/M times nearer to them. Where F
     falls the EM step (58) is taken, for which it cannot.
     """
-    M, K, ratio = state.y.shape[1], state.K, state.nu / state.tau
-    w2 = state.w.real**2 + state.w.imag**2
-    energy = w2.sum(axis=1)
-    trace = (state.G.diagonal(axis1=1, axis2=2).real * state.used).sum(axis=1)
-    # ‖y‖² - 2 Re hᴴŵ + ŵᴴJŵ, since Jŵ = h - ν/τ ŵ and ‖y‖² = M
-    E = M - state.explained - ratio * energy
-    gamma = K - ratio * trace  # tr JG
-    lost = (w2 * (response.norm2 - state.size)).sum(axis=1)
-    S = np.minimum(lost, 0.5 * K * state.nu)
-    freedom = np.maximum(M - gamma - S / state.nu, 0.15 * M)
-    nu = np.maximum((E - S) / freedom, NOISE_FLOOR)
-    tau = np.where(K > 0, (energy + state.nu * trace) / np.maximum(K, 1), state.tau)
-    new = with_variances(state, nu, tau)
+    M, N = state.Y.shape[2:]
+    K, ratio, T = state.K[:, None], state.nu / state.tau, response.temper
+    w2 = over_snapshots(state.W.real**2 + state.W.imag**2)
+    energy = w2.sum(axis=2)
+    trace = (diagonals(state.G).real * state.used[:, None]).sum(axis=2)
+    # ‖Y‖² - 2 Re tr HᴴŴ + tr ŴᴴJŴ, since JŴ = H - ν/τ Ŵ and ‖Y‖² = M N
+    E = M * N - state.explained - ratio * energy
+    gamma = N * (K - ratio * trace)  # N tr JG
+    S = np.minimum((w2 * state.lost).sum(axis=2), 0.5 * T * K * state.nu)
+    freedom = np.maximum(M * N - gamma - S / state.nu, 0.15 * M * N)
+    nu = np.maximum((E - S) / freedom, response.noise_floor)
+    tau = (energy + N * state.nu * trace) / np.maximum(N * K, 1)
+    new = with_variances(response, state, nu, floored(response, state, nu, tau))
     worse = fell(new, state)
-    if worse.any():
-        em = np.maximum((E + state.nu * gamma) / M, NOISE_FLOOR)
-        slow = with_variances(state.take(worse), em[worse], tau[worse])
-        new = new.put(worse, slow)
+    if some(worse):
+        em = np.maximum((E + state.nu * gamma) / (M * N), response.noise_floor)[worse]
+        part = state.take(worse)
+        tau = floored(response, part, em, tau[worse])
+        new = new.put(worse, with_variances(response, part, em, tau))
     return new
+
+
+def floored(response: Response, state: State, nu: Float, tau: Float) -> Float:
+    """Return τ, not below the power that counts as a source; the old one where there is none."""
+    if response.power_floor:
+        tau = np.maximum(tau, response.power_floor * nu / response.mean_norm2)
+    return np.where(state.K[:, None] > 0, tau, state.tau) if 0 in state.K.tolist() else tau

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from arrivals.measurement_models.manifolds import Manifold
 from arrivals.motion_models.bessel import bessel_ratio, log_i0
 from arrivals.trackers.joint_elbo import (
     KL_CONSTANT,
@@ -16,14 +17,14 @@ from arrivals.trackers.joint_elbo import (
     PLACE,
     PRIOR_KAPPA,
     PRIOR_MU,
-    Response,
     S,
     State,
     evaluate,
 )
 from arrivals.trackers.joint_newton import LARGEST_VARIANCE
 from arrivals.trackers.line_spectrum import Fit, Prediction
-from arrivals.trackers.noise_start import NOISE_FLOOR, first_noise
+from arrivals.trackers.noise_start import NOISE_FLOOR, first_noise, quiet_noise
+from arrivals.trackers.responses import Response
 from arrivals.trackers.rows import Rows
 from arrivals.trackers.support_moves import LOG_2PI
 from arrivals.typing import Bool, Complex, Float, Int
@@ -35,32 +36,41 @@ NOTHING = Prediction(np.zeros(0), np.zeros(0), np.zeros(0), 0.5)
 
 
 class Problem:
-    """One snapshot, scaled to unit power, and what is known of its components.
+    """The looks of a step, each bin scaled to unit power, and what is known of its components.
 
     Parameters
     ----------
-    y : ndarray, shape (n_sensors,)
+    Y : ndarray, shape (n_bins, n_sensors, n_snapshots)
     known : Prediction or None
     most : int
         Components that may be used at once.
     snr_db : float or None
-        Where the noise starts if `known` does not say so; None: from the lags.
+        Where the noise starts if `known` does not say so; None: from the covariance of many
+        snapshots or the lags of one look of a line, else 20.
     """
 
-    def __init__(self, y: Complex, known: Prediction | None, most: int) -> None:
+    def __init__(self, Y: Complex, known: Prediction | None, most: int) -> None:
         self.known = NOTHING if known is None else known
-        self.power = float(np.vdot(y, y).real) / len(y)
-        self.y = y / np.sqrt(self.power) if self.power > 0 else y
+        self.power = (Y.real**2 + Y.imag**2).sum(axis=(1, 2)) / (Y.shape[1] * Y.shape[2])
+        self.silent = not self.power.any()
+        scale = np.sqrt(np.where(self.power > 0, self.power, 1.0))
+        self.Y = Y / scale[:, None, None]
         self.n = min(len(self.known.mu), most)
         age = self.known.age
         self.age = np.zeros(self.n, dtype=np.int64) if age is None else age[: self.n]
 
-    def snr_db(self, places: Int, otherwise: float | None) -> float:
+    def snr_db(self, manifold: Manifold, temper: float, otherwise: float | None) -> float:
         """Return the signal-to-noise ratio at which the noise starts."""
         if self.known.snr_db is not None:
             return self.known.snr_db
-        nu = 10 ** (-otherwise / 10) if otherwise is not None else first_noise(self.y, places, None)
-        return -10 * float(np.log10(nu))
+        if otherwise is not None:
+            return otherwise
+        M, N = self.Y.shape[1:]
+        if M * temper <= N:  # looks enough for a covariance
+            return -10 * float(np.log10(quiet_noise(self.Y)).mean())
+        if manifold.coefficients is not None or N > 1:
+            return 20.0
+        return -10 * float(np.log10(first_noise(self.Y[0, :, 0], manifold.harmonics, None)))
 
 
 @dataclass(eq=False)
@@ -132,17 +142,18 @@ def start(
     facts = carried(problems, response.extent)
     K = np.array([p.n for p in problems])
     free = K == 0
-    places = response.manifold.harmonics
-    snr = np.array([p.snr_db(places, snr_db) for p in problems])
-    nu = 10 ** (-snr / 10)
+    snr = np.array([p.snr_db(response.manifold, response.temper, snr_db) for p in problems])
+    nu = np.maximum(10 ** (-snr / 10), response.noise_floor)
     K_active = np.array([np.count_nonzero(p.age == 0) for p in problems])
     share = np.where(free, max(most // 2, 1), np.maximum(K_active, 1))
     tau = np.maximum(1 - nu, NOISE_FLOOR) / share
     rho = np.array([p.known.birth for p in problems])
     rho[free] = max(most // 2, 1) / max(most, 2)
     rest = np.where(free, most * np.log1p(-np.minimum(rho, 0.999)), 0.0)
-    y = np.stack([p.y for p in problems])
-    state = evaluate(response, y, facts, K, nu, tau, rest)
+    Y = np.stack([p.Y for p in problems])
+    bins = np.ones(response.n_bins)
+    tau = np.outer(tau, bins * response.n_sensors / response.mean_norm2)
+    state = evaluate(response, Y, facts, K, np.outer(nu, bins), tau, rest)
     off, zero, nan = np.zeros(B, dtype=np.bool_), np.zeros(B, dtype=np.int64), np.full(B, np.nan)
     return Work(
         row=np.arange(B), state=state, saved=state, memory=facts, n_known=K,
@@ -186,35 +197,64 @@ def log_odds(rho: Float) -> Float:
         return np.asarray(np.clip(np.log(rho) - np.log1p(-rho), -SURE, SURE))
 
 
-def result(work: Work, i: int, problem: Problem, gains: Float, keep: float, max_age: int) -> Fit:
+def result(
+    work: Work,
+    i: int,
+    problem: Problem,
+    manifold: Manifold,
+    gains: Float,
+    keep: float,
+    max_age: int,
+) -> Fit:
     """Return the fit of the i-th row, whose components would gain so much by removal."""
     state, K, n = work.state, int(work.state.K[i]), int(work.n_known[i])
     memory = work.memory[i, :, :n].copy()
     place = state.facts[i, PLACE, :K].astype(np.int64)
     memory[:, place] = state.facts[i, :, :K]
     amplitude, evidence = np.zeros(n, dtype=np.complex128), np.full(n, -np.inf)
-    amplitude[place] = state.w[i, :K] * np.sqrt(problem.power)
+    amplitude[place] = amplitudes_of(state.W[i, :, :K], problem.power)
     evidence[place] = -gains[i, :K]
     age = np.ones(n, dtype=np.int64)
     age[: problem.n] = problem.age + 1
     age[age > max_age] = -1
     age[place] = 0
-    newest = -10 * np.log10(work.state.nu[i])
+    newest = -10 * mean(np.log10(state.nu[i]))
+    noise, power = state.nu[i] * problem.power, state.tau[i] * problem.power
     snr_db = (1 - keep) * work.snr_db[i] + keep * newest
     return Fit(
-        theta=np.angle(np.exp(1j * memory[MU])),
+        theta=front(manifold, memory[MU]),
         resultant=np.exp(-memory[S] / 2),
         kappa=1 / memory[S],
         active=age == 0,
         age=age,
         amplitude=amplitude,
         evidence=evidence,
-        noise=float(state.nu[i]) * problem.power,
-        power=float(state.tau[i]) * problem.power,
+        noise=mean(noise),
+        power=mean(power),
         iterations=int(work.iterations[i]),
         converged=bool(work.finished[i]),
-        snr_db=float(np.clip(snr_db, NOISIEST_DB, CLEANEST_DB)),
+        snr_db=min(max(float(snr_db), NOISIEST_DB), CLEANEST_DB),
+        bin_noise=noise,
     )
+
+
+def mean(values: Float) -> float:
+    """Return the mean over bins: of one or a few, a list is quicker than an array."""
+    return float(sum(values.tolist()) / len(values))
+
+
+def amplitudes_of(W: Complex, power: Float) -> Complex:
+    """Return Ŵ (n_bins, L, n_snapshots) of one look, or of several the root of the mean power."""
+    W = W * np.sqrt(power)[:, None, None]
+    if W.shape[0] == W.shape[2] == 1:
+        return np.asarray(W[0, :, 0])
+    return np.asarray(np.sqrt((W.real**2 + W.imag**2).mean(axis=(0, 2))) + 0j)
+
+
+def front(manifold: Manifold, mu: Float) -> Float:
+    """Return the angles within ±π, where two stand for one direction that in front."""
+    theta = np.angle(np.exp(1j * mu))
+    return manifold.from_doa(manifold.to_doa(theta)) if manifold.mirror else theta
 
 
 def silence(problem: Problem, max_age: int) -> Fit:

@@ -45,6 +45,8 @@ class Heard:
         (array([ True, False]), array([ True,  True, False]))
         """
         there = ~np.isnan(Y)
+        if there.all() and Y.any(axis=(1, 2)).all():
+            return cls(*(np.ones(n, dtype=np.bool_) for n in Y.shape))
         bins: Bool = np.asarray(there.any(axis=(1, 2)))
         snapshots: Bool = np.asarray(there.any(axis=(0, 1)))
         sensors: Bool = np.asarray(there[bins][:, :, snapshots].all(axis=(0, 2)))
@@ -66,6 +68,8 @@ class Heard:
 
     def block(self, Y: Complex) -> Complex:
         """Return the looks without gaps."""
+        if Y.shape == (self.bins.sum(), self.sensors.sum(), self.snapshots.sum()):
+            return Y
         return Y[np.ix_(self.bins, self.sensors, self.snapshots)]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from arrivals.typing import Complex, Int
+from arrivals.typing import Complex, Float, Int
 
 NOISE_FLOOR = 1e-9  # of the power: keeps a snapshot without noise from a division by zero
 
@@ -28,6 +28,29 @@ def first_noise(y: Complex, places: Int, snr_db: float | None) -> float:
     toeplitz = np.where(apart < 0, lags[np.abs(apart)].conj(), lags[np.abs(apart)])
     smallest = np.linalg.eigvalsh(toeplitz)[: max(M // 4, 1)]
     return max(float(smallest.mean()), NOISE_FLOOR * power / M)
+
+
+def quiet_noise(Y: Complex) -> Float:
+    """Return the noise of each bin, (n_bins,), by the smaller half of its covariance's eigenvalues.
+
+    Divided by what noise alone would leave there if the larger half were sources.
+
+    Parameters
+    ----------
+    Y : ndarray, shape (n_bins, n_sensors, n_snapshots)
+        At least as many snapshots as sensors, two of them or more.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> noise = rng.standard_normal((1, 8, 1000, 2)) @ np.array([1, 1j]) / np.sqrt(2)
+    >>> quiet_noise(noise + 10 * rng.standard_normal(1000)).round(1)
+    array([0.9])
+    """
+    M, N = Y.shape[1:]
+    smallest = np.linalg.eigvalsh(Y @ Y.conj().swapaxes(1, 2))[:, : max(M // 2, 1)]
+    power = (Y.real**2 + Y.imag**2).sum(axis=(1, 2)) / (M * N)
+    return np.asarray(np.maximum(smallest.mean(axis=1) / (N - M / 2), NOISE_FLOOR * power + 1e-300))
 
 
 def autocorrelation(z: Complex, places: Int) -> Complex:

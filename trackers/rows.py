@@ -8,7 +8,23 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from arrivals.typing import Bool
+from arrivals.typing import Bool, Int
+
+
+def some(rows: Bool) -> bool:
+    """Tell whether any of some rows, (B,), is on: of few, a list is quicker than an array.
+
+    Examples
+    --------
+    >>> some(np.array([False, True])), every(np.array([False, True]))
+    (True, False)
+    """
+    return True in rows.tolist()
+
+
+def every(rows: Bool) -> bool:
+    """Tell whether all rows, (B,), are on."""
+    return False not in rows.tolist()
 
 
 @dataclass(eq=False)
@@ -24,35 +40,37 @@ class Rows:
 
     def take(self, rows: Bool) -> Self:
         """Return some of the rows."""
-        if rows.all():
+        if every(rows):
             return self
-        parts = vars(self).items()
+        return self._taken(np.flatnonzero(rows))
+
+    def _taken(self, of: Int) -> Self:
         return type(self)(
             **{
-                name: part.take(rows) if isinstance(part, Rows) else part[rows]
-                for name, part in parts
+                name: part._taken(of) if isinstance(part, Rows) else part.take(of, axis=0)
+                for name, part in vars(self).items()
             }
         )
 
     def put(self, rows: Bool, other: Self) -> Self:
         """Return the record with those rows replaced; what is too short is filled up with 0."""
-        if rows.all():
-            return other
+        return other if every(rows) else self._with(np.flatnonzero(rows), other)
+
+    def _with(self, of: Int, other: Self) -> Self:
         return type(self)(
-            **{name: _put(part, rows, getattr(other, name)) for name, part in vars(self).items()}
+            **{name: _put(part, of, getattr(other, name)) for name, part in vars(self).items()}
         )
 
 
-def _put(old: Any, rows: Bool, new: Any) -> Any:
+def _put(old: Any, of: Int, new: Any) -> Any:
     if isinstance(old, Rows):
-        return old.put(rows, new)
-    if old.ndim == 1:
-        old = old.copy()
-        old[rows] = new
-        return old
-    shape = tuple(np.maximum(old.shape[1:], new.shape[1:]).tolist())
-    full = enlarged(old, shape, copy=True)
-    full[rows] = enlarged(new, shape)
+        return old._with(of, new)
+    if old.shape[1:] == new.shape[1:]:
+        full = old.copy()
+    else:
+        shape = tuple(map(max, old.shape[1:], new.shape[1:]))
+        full, new = enlarged(old, shape, copy=True), enlarged(new, shape)
+    full[of] = new
     return full
 
 

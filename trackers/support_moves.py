@@ -18,11 +18,12 @@ from arrivals.trackers.joint_elbo import (
     PLACE,
     PRIOR_KAPPA,
     PRIOR_MU,
-    Response,
     S,
     State,
 )
 from arrivals.trackers.joint_newton import LARGEST_VARIANCE
+from arrivals.trackers.responses import Response, over_snapshots
+from arrivals.trackers.rows import some
 from arrivals.typing import Bool, Float, Int
 
 LOG_2PI = float(np.log(2 * np.pi))
@@ -43,18 +44,27 @@ class Grid:
 
     def __init__(self, response: Response, per_sensor: int, merge: float) -> None:
         self.manifold: Manifold = response.manifold
-        self.norm2 = response.norm2
+        self.response = response
         n = int(np.ceil(per_sensor * max(response.extent, 4)))
         self.theta = -np.pi + 2 * np.pi * np.arange(n) / n
-        self.A, self.slope2 = response.at(self.theta)
+        # uniform over all angles that differ
+        self.log_range = LOG_2PI
+        if self.manifold.mirror:  # the front half is enough
+            self.theta = (self.theta + np.pi / n) / 2
+            self.log_range = LOG_2PI - np.log(2)
+        self.A, self.slope2, self.norm2 = response.at(self.theta)
         self.doa = self.manifold.to_doa(self.theta)
         self.waves = np.exp(1j * self.theta)
-        self.beam = 2 * np.pi / response.extent
-        self.merge = merge
+        two_beams = 4 * np.pi / response.extent
+        self.cos_apart = np.cos(two_beams) + 1e-9 if two_beams < np.pi + 1e-9 else -2.0
+        self.merge, self.cos_merge = merge, np.cos(min(merge, np.pi))
+        # of angles whose directions may be near: with a mirror, of any
+        reach = 1.01 * merge * float(self.manifold.slope(self.theta).max())
+        self.cos_reach = -2.0 if self.manifold.mirror else np.cos(min(reach, np.pi)) - 1e-12
 
     def near(self, doa: Float) -> Bool:
         """Tell which angles are too near to directions (..., n): (..., n, n_angles)."""
-        return np.asarray(np.abs(doa[..., None] - self.doa) < self.merge)
+        return np.asarray(np.cos(doa[..., None] - self.doa) > self.cos_merge)
 
 
 def nearest_later(grid: Grid, state: State) -> Int:
@@ -63,23 +73,41 @@ def nearest_later(grid: Grid, state: State) -> Int:
     L = state.facts.shape[2]
     if L < 2 or grid.merge == 0:
         return none
-    doa = np.where(state.used, grid.manifold.to_doa(state.facts[:, MU]), np.nan)
-    near = np.abs(doa[:, :, None] - doa[:, None, :]) < grid.merge
-    if np.count_nonzero(near) == np.count_nonzero(doa == doa):  # but for itself, none
+    theta = np.where(state.used, state.facts[:, MU], np.nan)
+    near = np.cos(theta[:, :, None] - theta[:, None, :]) > grid.cos_reach
+    if np.count_nonzero(near) == sum(state.K.tolist()):  # but for itself, none
         return none
+    doa = grid.manifold.to_doa(theta)
+    near = np.cos(doa[:, :, None] - doa[:, None, :]) > grid.cos_merge  # round the circle, too
     later = np.tril(near, -1).any(axis=2)
     return np.where(later.any(axis=1), later.argmax(axis=1), -1)
 
 
-def removal_gains(state: State, kl: float) -> Float:
+def removal_gains(response: Response, state: State, kl: float) -> Float:
     """Return by how much the criterion would rise without each component, (B, L).
 
     Exact while the angles are held; -inf in unused places.
     """
-    C = np.where(state.used, state.nu[:, None] * state.G.diagonal(axis1=1, axis2=2).real, 1.0)
-    w2 = state.w.real**2 + state.w.imag**2
-    gain = np.log(state.tau)[:, None] - np.log(C) - w2 / C - state.facts[:, ODDS] + kl * state.D
+    C = state.nu[:, :, None] * state.G.diagonal(axis1=2, axis2=3).real
+    C = np.where(state.used[:, None], C, 1.0)
+    w2 = over_snapshots(state.W.real**2 + state.W.imag**2)
+    looks = state.W.shape[3] * (np.log(state.tau)[:, :, None] - np.log(C)) - w2 / C
+    gain = response.total(looks) - state.facts[:, ODDS] + kl * state.D
     return np.where(state.used, gain, -np.inf)
+
+
+def relearned(response: Response, state: State) -> Float:
+    """Return what F would rise further after each removal if ν were learned again, (B, L).
+
+    A bin of d' degrees of freedom without the component, whose noise would be x times ν, gains
+    d' (x - 1 - ln x).
+    """
+    M, N = state.Y.shape[2:]
+    G = np.where(state.used[:, None], state.G.diagonal(axis1=2, axis2=3).real, 1.0)
+    w2 = over_snapshots(state.W.real**2 + state.W.imag**2)
+    freedom = N * (M - state.K[:, None, None])
+    x = (freedom + w2 / (G * state.nu[:, :, None])) / (freedom + N)
+    return response.total((freedom + N) * (x - 1 - np.log(np.maximum(x, 1e-3))))
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,10 +159,10 @@ def births(
     near = grid.near(grid.manifold.to_doa(state.facts[:, MU])) & state.used[:, :, None]
     base = np.where(barred | near.any(axis=1), -np.inf, base)
     cost = 0.5 * (LOG_2PI + 1 + np.log(variance))
-    fresh = base + odds[:, None] - kl * (LOG_2PI - cost)
+    fresh = base + odds[:, None] - kl * (grid.log_range - cost)
     B, rows = len(state), np.arange(len(state))
     facts = np.zeros((B, N_FACTS, max(int(room.max()), 1)))
-    facts[:, PLACE], facts[:, ODDS], facts[:, KL_CONSTANT] = -1, odds[:, None], LOG_2PI
+    facts[:, PLACE], facts[:, ODDS], facts[:, KL_CONSTANT] = -1, odds[:, None], grid.log_range
     best = fresh.argmax(axis=1)
     gain = fresh[rows, best]
     facts[:, MU, 0], facts[:, S, 0] = grid.theta[best], variance[rows, best]
@@ -148,17 +176,18 @@ def births(
 
 def evidence(grid: Grid, state: State) -> tuple[Float, Float, Float]:
     """Return what a component at each angle would gain, its |u|², and its angle's variance."""
-    P = state.A.conj() @ grid.A.T  # âᴴa
-    residual = state.y - (state.w[:, None] @ state.A)[:, 0]
-    z = residual @ grid.A.conj().T
-    z2 = z.real**2 + z.imag**2
+    P = state.A.conj() @ grid.A.swapaxes(1, 2)  # âᴴa
+    residual = state.Y - state.A.swapaxes(2, 3) @ state.W
+    z = grid.A.conj() @ residual
+    z2 = over_snapshots(z.real**2 + z.imag**2)
     GP = state.G @ P
-    nu, ratio = state.nu[:, None], (state.nu / state.tau)[:, None]
-    d = grid.norm2 + ratio - (P.real * GP.real + P.imag * GP.imag).sum(axis=1)
+    nu, tau = state.nu[:, :, None], state.tau[:, :, None]
+    d = grid.norm2 + nu / tau - (P.real * GP.real + P.imag * GP.imag).sum(axis=2)
     u2 = z2 / d**2
-    gain = np.log(nu / (state.tau[:, None] * d)) + z2 / (d * nu)
-    curvature = 2 * u2 * grid.slope2 / nu
-    return gain, u2, 1 / np.maximum(curvature, 1 / LARGEST_VARIANCE)
+    total = grid.response.total
+    gain = total(z.shape[3] * np.log(nu / (tau * d)) + z2 / (d * nu))
+    curvature = total(2 * u2 * grid.slope2 / nu)
+    return gain, u2.sum(axis=1), 1 / np.maximum(curvature, 1 / LARGEST_VARIANCE)
 
 
 def rivals(
@@ -166,16 +195,14 @@ def rivals(
 ) -> Int:
     """Add further local maxima, two beams apart and strong, to the best; return their numbers."""
     rows = np.arange(len(n))
-    angles = np.arange(len(grid.theta))
     peak = (fresh >= np.roll(fresh, 1, axis=1)) & (fresh >= np.roll(fresh, -1, axis=1))
     last = fresh.argmax(axis=1)
     open_ = peak & (fresh > 0) & (u2 > RIVAL * u2[rows, last][:, None])
     for i in range(1, facts.shape[2]):
-        apart = np.abs(angles - last[:, None])
-        apart = np.minimum(apart, len(angles) - apart) * (2 * np.pi / len(angles))
-        open_ = open_ & (apart >= 2 * grid.beam) & (i < room)[:, None]
+        near = np.cos(grid.theta - grid.theta[last][:, None]) > grid.cos_apart
+        open_ = open_ & ~near & (i < room)[:, None]
         found = open_.any(axis=1) & (n == i)
-        if not found.any():
+        if not some(found):
             break
         last = np.where(open_, fresh, -np.inf).argmax(axis=1)
         facts[:, MU, i], facts[:, S, i] = grid.theta[last], variance[rows, last]
@@ -204,7 +231,7 @@ def revive(
     back = np.where(revivable[:, :, None], back, -np.inf).reshape(len(n), -1)
     best = back.argmax(axis=1)
     better = back[rows, best] > np.maximum(gain, 0)
-    if better.any():
+    if some(better):
         who, where = np.divmod(best[better], len(grid.theta))
         facts[better, :, 0] = memory[better, :, who]
         facts[better, MU, 0] = grid.theta[where]
@@ -216,7 +243,8 @@ def without(facts: Float, k: Int) -> Float:
     """Return the components (B, 7, L) less the k-th of each problem, the last place empty."""
     L = facts.shape[2]
     order = np.arange(L) + (np.arange(L) >= k[:, None])
-    return np.take_along_axis(facts, np.minimum(order, L - 1)[:, None], axis=2)
+    rows = np.arange(len(k))[:, None]
+    return np.asarray(facts[rows, :, np.minimum(order, L - 1)].swapaxes(1, 2))
 
 
 def joined(facts: Float, K: Int, new: Births) -> tuple[Float, Int]:

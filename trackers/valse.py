@@ -35,9 +35,10 @@ class VALSE(SideBySide):
         the method estimates it.
     engine : {"fast", "coordinate"}
         What maximises the bound: joint Newton steps on all angles, or the paper's coordinate
-        ascent, which takes some thirty times as long and integrates the angles' densities. The
-        fast one is for one look a step of a line on a uniform grid within half of one wavelength;
-        everything else is fitted by coordinate ascent.
+        ascent, which takes three to thirty times as long and integrates the angles' densities.
+        The fast one serves every array, with any number of frequencies and snapshots; an unknown
+        slowness or elevation, or a whole posterior that is carried, is for coordinate ascent,
+        which then steps in.
     reference : {"middle", "first"}
         The sensor at which the amplitudes' phases are counted. "first" is the paper's; with the
         middle one phase and angle are uncorrelated, which saves most of the iterations.
@@ -148,28 +149,24 @@ class VALSE(SideBySide):
             "merge": self.merge,
             "snr_db": snr_db,
             "max_components": self.max_components,
+            "temper": self.temper,
+            "power_floor": self.power_floor,
+            "max_snr_db": self.max_snr_db,
         }
         if self.tolerance is not None:
             settings["tolerance"] = self.tolerance
         if self.is_fast and n_moments == 0:
             return JointNewton(kl=self.kl, **settings)
         return CoordinateAscent(
-            self.posterior,
-            descending=descending,
-            temper=self.temper,
-            power_floor=self.power_floor,
-            max_snr_db=self.max_snr_db,
-            n_moments=n_moments,
-            **settings,
+            self.posterior, descending=descending, n_moments=n_moments, **settings
         )
 
     @property
     def is_fast(self) -> bool:
-        """Whether the fast engine is wanted, and serves this measurement and these settings."""
-        plain = self.temper == 1 and not self.power_floor and self.max_snr_db is None
-        if self.engine != "fast" or not plain or not self.measurement.is_single:
+        """Whether the fast engine is wanted, and serves this measurement: no second unknown."""
+        if self.engine != "fast":
             return False
-        return self.measurement.manifold(self.reference).coefficients is None
+        return len(self.measurement.manifold(self.reference).nuisance_weights) == 1
 
     @property
     def n_slots(self) -> int:
