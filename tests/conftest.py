@@ -1,10 +1,35 @@
 """Settings of all tests."""
 
 import os
+from pathlib import Path
 
+import numpy as np
+import pytest
+from command_line import ARRAY, DOA, RATE, WINDOW, pressure
 from hypothesis import settings
+from scipy.io import wavfile
 
 # A first call may import scipy; and CI judges a change, not the luck of a draw.
 settings.register_profile("here", deadline=None)
 settings.register_profile("ci", deadline=None, derandomize=True)
 settings.load_profile("ci" if os.environ.get("CI") else "here")
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Write a folder with an array file, and one moving source as WAV and as raw samples."""
+    folder = tmp_path_factory.mktemp("scene")
+    (folder / "array.toml").write_text(ARRAY)
+    at = (np.arange(len(DOA) * WINDOW) - WINDOW / 2) / WINDOW
+    samples = pressure(np.interp(at, np.arange(len(DOA)), DOA))
+    counts = np.rint(samples * 32768).astype("<i2")
+    wavfile.write(folder / "tow.wav", RATE, counts)
+    (folder / "tow.raw").write_bytes(counts.tobytes())
+    return folder
+
+
+@pytest.fixture
+def here(scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Go to an empty folder."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path

@@ -1,0 +1,60 @@
+"""A scene on disk, and calls of the command line on it."""
+
+import csv
+import io
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from arrivals.__main__ import main
+from arrivals.measurement_models import SensorArray
+
+RATE, FREQUENCY, WINDOW = 8000, 1000.0, 256
+ARRAY = 'kind = "ula"\nn_sensors = 8\nspacing = 0.17\nspeed = 343.0\n'
+DOA = np.linspace(-8.0, 12.0, 20)  # degrees, one a window
+SUBSPACE = ("music", "root_music", "esprit", "past")
+HEADING = "step,time_s,label,doa_deg,std_deg,existence,level_db"
+SHELL = [sys.executable, "-W", "error", "-m", "arrivals"]
+
+
+def pressure(doa: Any, n_sensors: int = 8) -> Any:
+    """Return samples of a tone whose direction changes slowly, in noise: (n_samples, n_sensors)."""
+    rng = np.random.default_rng(0)
+    array = SensorArray.ula(n_sensors, 0.17, speed=343.0)
+    a = array.steering_vector(np.deg2rad(doa), array.wavelength(FREQUENCY))
+    turn = np.exp(2j * np.pi * FREQUENCY * np.arange(len(a)) / RATE)
+    return 0.3 * (turn[:, None] * a).real + 0.1 * rng.standard_normal(a.shape)
+
+
+def track(scene: Path, *more: str, file: str = "tow.wav", array: str = "array.toml") -> list[str]:
+    return ["track", str(scene / file) if file != "-" else "-", "--array", str(scene / array),
+            "--frequency", "1000", *more]  # fmt: skip
+
+
+def table(text: str) -> list[dict[str, str]]:
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+def shell(arguments: list[str], **more: Any) -> subprocess.CompletedProcess[bytes]:
+    return subprocess.run([*SHELL, *arguments], capture_output=True, timeout=60, **more)
+
+
+def refused(
+    arguments: list[str], capsys: pytest.CaptureFixture[str], here: Path, *words: str
+) -> None:
+    """Check that there is one line with these words, status 2, and nothing new in the folder."""
+    before = sorted(os.listdir(here))
+    assert main(arguments) == 2
+    printed, told = capsys.readouterr()
+    assert printed == ""
+    assert told.startswith("arrivals: ")
+    assert told.count("\n") == 1
+    assert told.endswith("\n")
+    for word in words:
+        assert word in told
+    assert sorted(os.listdir(here)) == before
