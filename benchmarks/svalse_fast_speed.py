@@ -17,9 +17,9 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
+from svalse_fast import ELECTRICAL, FIGURES, PAPER, row
 
 from arrivals.measurement_models import ArraySnapshot
-from arrivals.motion_models import BernoulliVonMises
 from arrivals.scenarios import create
 from arrivals.trackers import SVALSE
 from arrivals.trackers.joint_elbo import KL_CONSTANT, MU, N_FACTS, S, evaluate
@@ -27,21 +27,6 @@ from arrivals.trackers.joint_newton import ascend
 from arrivals.trackers.responses import Response
 from arrivals.trackers.support_moves import LOG_2PI
 from arrivals.typing import Complex, Float
-
-FIGURES = ("svalse_fig4", "svalse_fig5", "svalse_fig6")
-ELECTRICAL = BernoulliVonMises()  # the paper's walk
-PAPER: dict[str, Any] = {
-    "engine": "coordinate",
-    "reference": "first",
-    "tolerance": 1e-5,
-    "max_iterations": 1000,
-}
-
-
-def row(what: str, ours: str, limit: str, good: bool | None) -> None:
-    """Print one row of the table."""
-    verdict = "" if good is None else "pass" if good else "FAIL"
-    print(f"| {what} | {ours} | {limit} | {verdict} |", flush=True)
 
 
 def draw(name: str, seeds: range, **scenario: int) -> tuple[ArraySnapshot, Complex, Float]:
