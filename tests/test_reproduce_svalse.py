@@ -109,6 +109,17 @@ def test_what_a_user_would_write_stands_in_every_table_of_directions() -> None:
     assert {c.told for c in reproduce_any_array.CASES if c.method == "peaks_gnn"} == scenes
 
 
+def test_claims_on_any_array_go_by_paired_differences() -> None:
+    cases = reproduce_any_array.CASES
+    fewer = np.array([case.method == "svalse" and not case.params for case in cases])
+    gospa = np.where(fewer, 1.0, 2.0)[:, None] + [[0.0, 0.1, 0.2]]
+    claims = reproduce_any_array._claims(gospa)
+    assert len(claims) == len(reproduce_any_array.ORDER)
+    assert claims[0].startswith("Holds: on the circle SVALSE is below VALSE")
+    assert claims[-1].startswith("Does not hold: for that, whole densities")
+    assert "1.00 ± 0.00" in claims[0]
+
+
 def brief(runs: int, seed: int) -> Report:
     calls.append(runs)
     return Report(f"Brief, {runs}", ["a"], [(1.0,)], ["Holds: it is brief (1).", "A word."])
