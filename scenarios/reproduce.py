@@ -44,7 +44,7 @@ STUDIES: dict[str, str] = {
 # Runs of a study that wants others than 100, and QUICK if it is only looked at.
 RUNS: dict[str, tuple[int, int]] = {
     "any-array": (20, 3),
-    "ar-kf": (40, 4),
+    "ar-kf": (100, 4),
     "svalse-fig4": (20, 4),
     "svalse-fig5": (20, 4),
     "svalse-fig6": (20, 4),
