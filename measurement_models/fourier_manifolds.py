@@ -154,7 +154,7 @@ def _origin(waves: PlaneWaves, reference: Reference) -> Float:
     return waves.centre if reference == "middle" else waves.array.positions[0]
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=64)  # of several megabytes each, where the array is large
 def fourier_manifold(waves: PlaneWaves, reference: Reference = "middle") -> FourierManifold:
     """Return the manifold of any array: one FFT, remembered, as the waves never change.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal, Protocol
 
 import numpy as np
@@ -196,8 +197,15 @@ class GridLine:
         """Return the manifold of the line less some sensors."""
         if len(sensors) == 0:
             return self
-        return GridLine(np.delete(self.places, sensors), self.step, self.origin, self.reference)
+        return _line_without(self, tuple(map(int, sensors)))
 
     def only(self, bins: Sequence[int] | Int) -> GridLine:
         """Return the same: there is one bin."""
         return self
+
+
+@lru_cache(maxsize=256)
+def _line_without(line: GridLine, sensors: tuple[int, ...]) -> GridLine:
+    """Return a line less some sensors: the same one when asked again, as what is made of it."""
+    places = np.delete(line.places, sensors)
+    return GridLine(places, line.step, line.origin, line.reference)

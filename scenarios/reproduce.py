@@ -169,8 +169,11 @@ def reproduce(
     if runs is not None:
         count("runs", runs, least=min(2, _runs(name, quick=True)))
     count("seed", seed, least=0)
-    if page is not None and not Path(page).parent.is_dir():  # known before hours of work
-        raise FileNotFoundError(2, "the folder does not exist", str(Path(page).parent))
+    if page is not None:  # known before hours of work
+        if not Path(page).parent.is_dir():
+            raise FileNotFoundError(2, "the folder does not exist", str(Path(page).parent))
+        if Path(page).is_dir():
+            raise IsADirectoryError(21, "page must be a file; this is a folder", str(page))
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     names, written = tuple(STUDIES) if name == "all" else (name,), []

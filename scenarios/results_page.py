@@ -73,7 +73,8 @@ def write_page(path: Path, names: Sequence[str], folder: Path, command: str) -> 
     head = (
         "# Results\n\nOur numbers beside the papers', and a line on each claim that has one. "
         f"Written by\n\n    {command}\n\nwith arrivals {arrivals.__version__}; each study's "
-        "pictures and CSV lie beside its own page. What is finished is not run again.\n"
+        "pictures and CSV lie beside its own page."
+        f"{' What is finished is not run again.' if len(names) > 1 else ''}\n"
     )
     with replacing(path) as file:
         file.write("\n".join([head.rstrip(), *contents, "", *sections]).rstrip() + "\n")

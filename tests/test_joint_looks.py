@@ -418,3 +418,37 @@ def test_gospa_of_the_specification(scenario: str, numbers: dict[str, Any], limi
         for t, run in zip(draws, runs, strict=True)
     ]
     assert np.mean(found) < limit
+
+
+# -- what is remembered, and what is left of an array ---------------------------------------------
+
+
+def test_one_sensor_hears_noise_and_no_direction() -> None:
+    model = ArraySnapshot(SensorArray.uca(8, radius=0.65), [1.0, 1.25], n_snapshots=3)
+    rng = np.random.default_rng(0)
+    z = rng.standard_normal((2, 3, 8)) + 1j * rng.standard_normal((2, 3, 8))
+    z[:, :, 1:] = np.nan
+    tracker = SVALSE(model)
+    tracker.update(z)
+    power = (np.abs(z[:, :, 0]) ** 2).mean(axis=1)
+    assert tracker.estimate.doa.size == 0
+    np.testing.assert_allclose(tracker.bin_noise, power)
+    assert tracker.noise == pytest.approx(power.mean())
+
+
+def test_what_is_made_of_an_array_is_made_once_for_each_set_of_sensors() -> None:
+    for array in (SensorArray.ula(8, 0.5), SensorArray.uca(8, radius=0.65)):
+        model = ArraySnapshot(array, 1.0, noise=0.01)
+        z = model.simulate([0.3], np.ones((6, 1)), np.random.default_rng(0))
+        z[:, 3] = np.nan
+        moves_on.cache_clear()
+        SVALSE(model).run(z)
+        assert moves_on.cache_info().misses == 1
+
+
+@pytest.mark.parametrize("name", ["max_components", "power_floor", "max_snr_db"])
+def test_numbers_are_kept_as_numbers(name: str) -> None:
+    model = ArraySnapshot(SensorArray.ula(8, 0.5), 1.0)
+    given: dict[str, Any] = {name: np.int64(3)}
+    tracker = SVALSE(model, **given)
+    assert type(getattr(tracker, name)) is (int if name == "max_components" else float)

@@ -99,7 +99,8 @@ def test_without_a_component_all_is_noise_and_floors_hold() -> None:
     LooksAmplitudes.learn_variances(step)
     np.testing.assert_allclose(step.nu, (np.abs(step.Y) ** 2).mean(axis=(1, 2)))
     step.choose_support()
-    LooksAmplitudes.learn_variances(step, power_floor=1e6, noise_floor=0.5)
+    step.power_floor, step.noise_floor = 1e6, 0.5
+    LooksAmplitudes.learn_variances(step)
     np.testing.assert_allclose(step.tau, 1e6 * step.nu / step.mean_norm)
     assert (step.nu >= 0.5 * (np.abs(step.Y) ** 2).mean(axis=(1, 2)) - 1e-12).all()
 

@@ -172,3 +172,13 @@ def test_page_is_made_again_without_what_is_finished(
 
 def test_every_study_of_other_runs_exists() -> None:
     assert set(RUNS) <= set(STUDIES)
+
+
+def test_a_page_must_be_a_file_and_that_is_known_before_the_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(reproduce, "STUDIES", {"one": f"{__name__}:brief"})
+    before = len(calls)
+    with pytest.raises(IsADirectoryError, match="page must be a file"):
+        reproduce.reproduce("one", tmp_path / "out", quick=True, page=tmp_path)
+    assert len(calls) == before

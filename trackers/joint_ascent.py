@@ -15,9 +15,9 @@ import numpy as np
 from arrivals.measurement_models.manifolds import Manifold
 from arrivals.trackers.joint_moves import Bursts, Moves
 from arrivals.trackers.joint_newton import ascend
-from arrivals.trackers.joint_work import Problem, Work, result, silence, start
+from arrivals.trackers.joint_work import Problem, Work, nothing_found, result, start
 from arrivals.trackers.line_spectrum import Fit, Prediction
-from arrivals.trackers.noise_start import NOISE_FLOOR
+from arrivals.trackers.noise_start import noise_floor, power_floor
 from arrivals.trackers.responses import Response
 from arrivals.trackers.rows import every, some
 from arrivals.trackers.support_moves import Grid, removal_gains
@@ -102,21 +102,24 @@ class JointNewton:
         predictions: Sequence[Prediction | None],
     ) -> list[Fit]:
         """Fit independent snapshots of one array, as one array program."""
-        most = min(manifold.n_sensors, self.max_components or manifold.n_sensors)
+        most = self.most(manifold)
         problems = [Problem(Y, known, most) for Y, known in zip(Ys, predictions, strict=True)]
-        fits = [silence(problem, self.max_age) for problem in problems]
+        fits = [nothing_found(problem, self.max_age) for problem in problems]
         heard = [i for i, problem in enumerate(problems) if not problem.silent]
         if heard and manifold.n_sensors > 1:
-            for i, fit in zip(
-                heard, self._solved([problems[i] for i in heard], manifold, most), strict=True
-            ):
+            solved = self._solved([problems[i] for i in heard], manifold)
+            for i, fit in zip(heard, solved, strict=True):
                 fits[i] = fit
         return fits
 
-    def _solved(self, problems: list[Problem], manifold: Manifold, most: int) -> list[Fit]:
+    def most(self, manifold: Manifold) -> int:
+        """Return how many components there may be on an array."""
+        return min(manifold.n_sensors, self.max_components or manifold.n_sensors)
+
+    def _solved(self, problems: list[Problem], manifold: Manifold) -> list[Fit]:
         """Fit snapshots that have power: moves and Newton steps in turn until all rest."""
         moves = moves_on(self, manifold, problems[0].Y.shape[2])
-        work = start(problems, moves.response, self.snr_db, len(moves.grid.theta), most)
+        work = start(problems, moves.response, self.snr_db, len(moves.grid.theta), moves.places)
         work.left[:] = np.where(work.free, 0, self.inner)
         work.tolerance[:] = self.inner_tolerance
         fits: dict[int, Fit] = {}
@@ -151,16 +154,16 @@ class JointNewton:
         work.left = np.minimum(work.left, self.max_iterations - work.iterations)
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=16)  # of a whole array, and of some sets of sensors: each holds a grid of waves
 def moves_on(engine: JointNewton, manifold: Manifold, n_snapshots: int) -> Moves:
     """Return the moves between Newton steps, for an array and so many snapshots a step."""
-    M, several = manifold.n_sensors, manifold.n_bins * n_snapshots > 1
-    most = min(M, engine.max_components or M)
-    floor = engine.power_floor
-    if floor is None:
-        floor = 3.0 if several else 0.0
-    noise_floor = NOISE_FLOOR if engine.max_snr_db is None else 10 ** (-engine.max_snr_db / 10)
-    response = Response(manifold, engine.temper, floor, noise_floor)
+    M, most, n_looks = manifold.n_sensors, engine.most(manifold), manifold.n_bins * n_snapshots
+    response = Response(
+        manifold,
+        engine.temper,
+        power_floor(engine.power_floor, n_looks),
+        noise_floor(engine.max_snr_db),
+    )
     return Moves(
         response,
         Grid(response, engine.grid, engine.merge),
@@ -178,5 +181,5 @@ def moves_on(engine: JointNewton, manifold: Manifold, n_snapshots: int) -> Moves
         fill_to=min(int(np.ceil(round(engine.fill * response.extent, 6))), most, M - 1),
         max_moves=engine.max_moves,
         max_iterations=engine.max_iterations,
-        relearn=several or manifold.coefficients is not None,
+        relearn=n_looks > 1 or manifold.coefficients is not None,
     )

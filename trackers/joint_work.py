@@ -44,9 +44,19 @@ class Problem:
     known : Prediction or None
     most : int
         Components that may be used at once.
-    snr_db : float or None
-        Where the noise starts if `known` does not say so; None: from the covariance of many
-        snapshots or the lags of one look of a line, else 20.
+
+    Attributes
+    ----------
+    Y : ndarray, shape (n_bins, n_sensors, n_snapshots)
+        Of unit power in every bin that has power.
+    power : ndarray, shape (n_bins,)
+        Mean power of a sensor, before.
+    silent : bool
+        Whether no bin has power.
+    n : int
+        Components carried over.
+    age : ndarray of int, shape (n,)
+        Steps since each was last active.
     """
 
     def __init__(self, Y: Complex, known: Prediction | None, most: int) -> None:
@@ -60,7 +70,11 @@ class Problem:
         self.age = np.zeros(self.n, dtype=np.int64) if age is None else age[: self.n]
 
     def snr_db(self, manifold: Manifold, temper: float, otherwise: float | None) -> float:
-        """Return the signal-to-noise ratio at which the noise starts."""
+        """Return the signal-to-noise ratio at which the noise starts.
+
+        That of the steps before, else `otherwise`; if that is None, by the covariance of many
+        snapshots or the lags of one look of a line, else 20.
+        """
         if self.known.snr_db is not None:
             return self.known.snr_db
         if otherwise is not None:
@@ -257,8 +271,8 @@ def front(manifold: Manifold, mu: Float) -> Float:
     return manifold.from_doa(manifold.to_doa(theta)) if manifold.mirror else theta
 
 
-def silence(problem: Problem, max_age: int) -> Fit:
-    """Return the fit of a snapshot without power: nothing is active, what is carried ages."""
+def nothing_found(problem: Problem, max_age: int) -> Fit:
+    """Return the fit of a step that holds no source: what is carried ages, all power is noise."""
     known, n = problem.known, problem.n
     age = problem.age + 1
     return Fit(
@@ -269,9 +283,10 @@ def silence(problem: Problem, max_age: int) -> Fit:
         age=np.where(age > max_age, -1, age),
         amplitude=np.zeros(n, dtype=np.complex128),
         evidence=np.full(n, -np.inf),
-        noise=0.0,
+        noise=float(problem.power.mean()),
         power=0.0,
         iterations=0,
         converged=True,
         snr_db=known.snr_db,
+        bin_noise=None if problem.silent else problem.power,
     )

@@ -56,7 +56,7 @@ class Heard:
                 "a snapshot must have sensors that gave a number in all of its looks; in the best "
                 f"look {most} of {Y.shape[1]} did, but each has a NaN in some other"
             )
-        sounding = (np.where(there, Y, 0) != 0).any(axis=(1, 2))
+        sounding = (np.where(there, Y, 0)[:, sensors][:, :, snapshots] != 0).any(axis=(1, 2))
         if sounding.any():
             bins = np.asarray(bins & sounding)
         return cls(bins, sensors, snapshots)

@@ -36,7 +36,15 @@ class LooksAmplitudes(MergedSupport):
     rho : ndarray, shape (L,)
     temper : float
         Looks that count as one: divides the evidence of each.
+    power_floor : float
+        Power below which nothing counts as a source, in units of one look's noise after
+        beamforming.
+    noise_floor : float
+        Least noise, as a share of the power.
     """
+
+    power_floor = 0.0
+    noise_floor = NOISE_FLOOR
 
     def __init__(
         self, Y: Complex, rho: Float, nu: Float, tau: Float, norm: Float, temper: float = 1.0
@@ -118,20 +126,11 @@ class LooksAmplitudes(MergedSupport):
         self.C[block] = self.nu[:, None, None] * np.linalg.inv(self.J[block] + ridge)
         self.W[:, on] = self.C[block] @ self.H[:, on] / self.nu[:, None, None]
 
-    def learn_variances(self, power_floor: float = 0.0, noise_floor: float = NOISE_FLOOR) -> None:
-        """Maximise the ELBO over ν and τ of each bin, (58) and (59).
-
-        Parameters
-        ----------
-        power_floor : float
-            Power below which nothing counts as a source, in units of one look's noise after
-            beamforming.
-        noise_floor : float
-            Least noise, as a share of the power.
-        """
+    def learn_variances(self) -> None:
+        """Maximise the ELBO over ν and τ of each bin, (58) and (59), above their floors."""
         M, N = self.Y.shape[1:]
         K = int(self.active.sum())
-        floor = noise_floor * self.power / (M * N)
+        floor = self.noise_floor * self.power / (M * N)
         if K == 0:
             self.nu = self.power / (M * N)
             return
@@ -139,7 +138,7 @@ class LooksAmplitudes(MergedSupport):
         spread = N * _inner(self.C, self.J)  # N tr(J C)
         self.nu = np.maximum((self.power - explained + spread) / (M * N), floor)
         energy = _inner(self.W, self.W) + N * np.trace(self.C, axis1=1, axis2=2).real
-        self.tau = np.maximum(energy / (N * K), power_floor * self.nu / self.mean_norm)
+        self.tau = np.maximum(energy / (N * K), self.power_floor * self.nu / self.mean_norm)
 
     def reconstruction(self) -> Complex:
         """Return X̂ = Σ â ŵ, (n_bins, n_sensors, n_snapshots)."""

@@ -23,7 +23,7 @@ from arrivals.trackers.circle_posteriors import (
 from arrivals.trackers.component_support import Places
 from arrivals.trackers.line_spectrum import Fit, Prediction
 from arrivals.trackers.looks_amplitudes import LooksAmplitudes
-from arrivals.trackers.noise_start import NOISE_FLOOR
+from arrivals.trackers.noise_start import NOISE_FLOOR, noise_floor, power_floor
 from arrivals.typing import Complex, Float
 
 if TYPE_CHECKING:
@@ -65,8 +65,8 @@ class LooksAscent(LooksAmplitudes):
         super().__init__(Y, places.rho, nu, tau, self.norms[:, 0], settings.temper)
         self.begin(places)
         self._read_prediction(places.known, L)
-        floor = settings.power_floor
-        self.power_floor = (0.0 if self.n_looks == 1 else 3.0) if floor is None else floor
+        self.power_floor = power_floor(settings.power_floor, self.n_looks)
+        self.noise_floor = noise_floor(settings.max_snr_db)
 
     def _read_manifold(self) -> None:
         """Lay the manifold out for products: rows of G are (bin, sensor) pairs."""
@@ -249,12 +249,6 @@ class LooksAscent(LooksAmplitudes):
             self.norm[:, k] = np.einsum("sfi,si->f", self.norm_series, moments[:, :n]).real
 
     # -- the rest of an iteration -----------------------------------------------------------------
-
-    def learn_variances(self, power_floor: float = 0.0, noise_floor: float = NOISE_FLOOR) -> None:
-        """Maximise the ELBO over ν and τ (sec. 5)."""
-        if self.settings.max_snr_db is not None:
-            noise_floor = 10 ** (-self.settings.max_snr_db / 10)
-        super().learn_variances(self.power_floor, noise_floor)
 
     def rests(self, X: Complex, X_old: Complex) -> bool:
         """Tell whether the reconstruction moved by less than the tolerance, bins normalised."""

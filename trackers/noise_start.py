@@ -1,4 +1,4 @@
-"""Where the estimate of the noise of a line spectrum starts."""
+"""Where the estimate of the noise of a spectrum starts, and where it ends."""
 
 from __future__ import annotations
 
@@ -7,6 +7,36 @@ import numpy as np
 from arrivals.typing import Complex, Float, Int
 
 NOISE_FLOOR = 1e-9  # of the power: keeps a snapshot without noise from a division by zero
+
+
+def noise_floor(max_snr_db: float | None) -> float:
+    """Return the least noise, as a share of the power, below which what is left is the model's.
+
+    Examples
+    --------
+    >>> noise_floor(None), noise_floor(20.0)
+    (1e-09, 0.01)
+    """
+    return NOISE_FLOOR if max_snr_db is None else 10 ** (-max_snr_db / 10)
+
+
+def power_floor(floor: float | None, n_looks: int) -> float:
+    """Return the least power of a source in units of one look's noise after beamforming.
+
+    Parameters
+    ----------
+    floor : float or None
+        None: 0 for one look a step, which is the paper's model, and 3 for several.
+    n_looks : int
+
+    Examples
+    --------
+    >>> power_floor(None, 1), power_floor(None, 10), power_floor(0.0, 10)
+    (0.0, 3.0, 0.0)
+    """
+    if floor is not None:
+        return floor
+    return 0.0 if n_looks == 1 else 3.0
 
 
 def first_noise(y: Complex, places: Int, snr_db: float | None) -> float:

@@ -42,6 +42,10 @@ class DirectionTracker(Tracker):
     x, P : ndarray, shapes (n_slots,), (n_slots, n_slots)
         The directions reported, rad, NaN in unused places, and their variances on a diagonal, 0
         where they are not known.
+    estimate : DirectionEstimate
+        Read-only, as is
+    noise : float
+        Variance of the noise of one sensor as estimated last; NaN where it is not.
     """
 
     @property

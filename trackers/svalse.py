@@ -53,7 +53,9 @@ class SVALSE(VALSE):
     snr_db : float, optional
         Signal-to-noise ratio from which the noise estimate of the first step starts, and, with
         coordinate ascent, of every step; above 0, so that something is left to the sources. If
-        None, 20; but with several looks a step, the later ones start from the noise before.
+        None, 20, or with at least as many snapshots a step as sensors that of their covariance;
+        with coordinate ascent and several looks later steps start from the noise before. The
+        fast engine's later steps start from what was found before in any case.
     carry : {"von_mises", "posterior"}
         What is kept of an angle from step to step: one von Mises density, or the whole one, which
         remembers all directions that single steps cannot tell apart.
@@ -72,7 +74,8 @@ class SVALSE(VALSE):
     nuisance : ndarray, shape (L, n_nuisance)
         Their densities over the values of an unknown slowness or elevation.
     bin_noise : ndarray, shape (n_bins,)
-        Noise of each bin when it was last heard; NaN before, and for one look of a line.
+        Noise of each bin when it was last heard; NaN before, and with coordinate ascent on one
+        look of a line.
     x, P, noise
         As in `VALSE`.
 

@@ -122,17 +122,14 @@ class VALSE(SideBySide):
         self.tolerance = tolerance if tolerance is None else positive("tolerance", tolerance)
         self.kl = probability("kl", kl)
         self.max_iterations = count("max_iterations", max_iterations)
-        self.max_components = max_components
-        if max_components is not None:
-            count("max_components", max_components)
+        self.max_components = (
+            None if max_components is None else count("max_components", max_components)
+        )
         self.temper = positive("temper", temper)
         if temper < 1:
             raise ValueError(f"temper must be at least 1; got {temper}")
-        self.power_floor, self.max_snr_db = power_floor, max_snr_db
-        if power_floor is not None:
-            not_negative("power_floor", power_floor)
-        if max_snr_db is not None:
-            positive("max_snr_db", max_snr_db)
+        self.power_floor = None if power_floor is None else not_negative("power_floor", power_floor)
+        self.max_snr_db = None if max_snr_db is None else positive("max_snr_db", max_snr_db)
         self.merge = not_negative("merge", merge)
         check_directions(measurement, self.reference, mixture=self.posterior == "mixture")
         self.bin_noise = np.full(measurement.n_bins, np.nan)
