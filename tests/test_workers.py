@@ -113,8 +113,10 @@ def written(runs: int, seed: int) -> Report:
 
 def test_full_disk_and_unwritable_folder_are_one_line(tmp_path: Path) -> None:
     script = (
-        "import resource, signal; signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
-        "resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))\n"
+        "import atexit, resource, signal; signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        "before = resource.getrlimit(resource.RLIMIT_FSIZE)\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (2000, before[1]))\n"
+        "atexit.register(resource.setrlimit, resource.RLIMIT_FSIZE, before)  # what measures\n"
         f"{COMMAND.replace(':study', ':written')}"
     )
     done = called(script, None, "reproduce", "killed", "--out", str(tmp_path))
