@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -102,9 +103,14 @@ def _verdicts(text: str) -> str:
     --------
     >>> _verdicts("Holds: a (1).\n\nHolds: b (2).\n\nDoes not hold: c (3).\n")
     ': 2 claims hold, 1 does not'
+    >>> _verdicts("| claim | finding |\n| a | does not hold: 1 |\n| b | holds for 2 |\n")
+    ': 1 claim holds, 1 does not'
     """
     said = [line.partition(": ")[0] for line in text.splitlines()]
     hold, fail, open_ = (sum(map(said.count, kind)) for kind in (HOLD, FAIL, ("Not decided",)))
+    cells = [line.strip("| ").rpartition("| ")[2] for line in said if line.startswith("|")]
+    hold += sum(cell.startswith("holds") for cell in cells)
+    fail += sum(cell.startswith("does not hold") for cell in cells)
     if hold + fail + open_ == 0:
         return ""
     told = f": {hold} claim{'s' * (hold != 1)} hold{'s' * (hold == 1)}, "
@@ -125,5 +131,5 @@ def _section(name: str, text: str, stamp: Mapping[str, Any] | None) -> str:
         body = body.replace("\n\n\n", "\n\n")
     for said in VERDICTS:
         body = body.replace(f"\n{said}: ", f"\n* **{said}**: ")
-    body = body.replace(".\n\n* **", ".\n* **")
+    body = re.sub(r"(\n\* \*\*.*)\n(?=\n\* \*\*)", r"\1", body)  # one list
     return f'<a id="{name}"></a>\n\n##{title}\n\n`arrivals reproduce {name}`{told}.\n\n{body}\n'
