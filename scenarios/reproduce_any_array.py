@@ -14,9 +14,9 @@ import numpy as np
 
 from arrivals.scenarios.any_arrays import Circle
 from arrivals.scenarios.base import Trial, create
+from arrivals.scenarios.claims import holds, negative
 from arrivals.scenarios.metrics import Gospa, mean_gospa
 from arrivals.scenarios.reproduce import Report
-from arrivals.scenarios.reproduce_svalse import holds, negative
 from arrivals.scenarios.workers import spread
 from arrivals.trackers.recorder import Run
 from arrivals.typing import Float

@@ -21,8 +21,8 @@ from arrivals.scenarios.ar_fields import (
     ThirdOrder,
 )
 from arrivals.scenarios.base import Trial
+from arrivals.scenarios.claims import holds
 from arrivals.scenarios.reproduce import Report
-from arrivals.scenarios.reproduce_svalse import holds
 from arrivals.scenarios.separation import nmse
 from arrivals.scenarios.speech import SpeechField, SpeechOfOrderTwo
 from arrivals.scenarios.unlabelled import best_assignment_rmse

@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from arrivals.scenarios.base import create
+from arrivals.scenarios.claims import holds, negative
 from arrivals.scenarios.methods import plain
 from arrivals.scenarios.reproduce import Report
-from arrivals.scenarios.reproduce_svalse import NAN, batch_of, compared, holds, negative
+from arrivals.scenarios.reproduce_svalse import NAN, batch_of, compared
 from arrivals.scenarios.runner import monte_carlo
 from arrivals.scenarios.snapshot_bounds import LineBound, line_bound
 from arrivals.scenarios.study import Study
@@ -139,7 +140,10 @@ def fig10(runs: int, seed: int, out: Path | None = None, quick: bool = False) ->
         _draw_rebuilt(ax, name, 1)
         plot_metric(study, "rmse", x="snr_db", ax=ax,
                     bound={case: one.rmse for case, one in bounds.items()})  # fmt: skip
+        least = min(study.mean("rmse", method, case) for method in study.methods
+                    for case in study.cases)  # fmt: skip
         ax.set(xlabel="SNR, dB", ylabel="RMSE, degrees", yscale="log", title=SCENES[name])
+        ax.set_ylim(bottom=max(least / 3, 1e-4))  # an interval may reach down to zero
         said += _rmse_claims(study, SCENES[name])
         for snr in SNR_DB:
             rows += [(name, *_rmse_row(study, name, snr, method), bounds[f"{snr:g}"].rmse)

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from arrivals.scenarios.claims import holds, negative
 from arrivals.scenarios.metrics import mean_gospa, mean_rmse
 from arrivals.scenarios.reproduce import Report
-from arrivals.scenarios.reproduce_svalse import holds, negative
 from arrivals.scenarios.swellex96 import WITHIN_DB, TowPastLine, track
 from arrivals.scenarios.swellex_claims import Claim, claims
 from arrivals.scenarios.swellex_figures import environment_figure, field_figure

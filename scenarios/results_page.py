@@ -103,14 +103,9 @@ def _verdicts(text: str) -> str:
     --------
     >>> _verdicts("Holds: a (1).\n\nHolds: b (2).\n\nDoes not hold: c (3).\n")
     ': 2 claims hold, 1 does not'
-    >>> _verdicts("| claim | finding |\n| a | does not hold: 1 |\n| b | holds for 2 |\n")
-    ': 1 claim holds, 1 does not'
     """
     said = [line.partition(": ")[0] for line in text.splitlines()]
     hold, fail, open_ = (sum(map(said.count, kind)) for kind in (HOLD, FAIL, ("Not decided",)))
-    cells = [line.strip("| ").rpartition("| ")[2] for line in said if line.startswith("|")]
-    hold += sum(cell.startswith("holds") for cell in cells)
-    fail += sum(cell.startswith("does not hold") for cell in cells)
     if hold + fail + open_ == 0:
         return ""
     told = f": {hold} claim{'s' * (hold != 1)} hold{'s' * (hold == 1)}, "

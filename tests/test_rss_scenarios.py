@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.stats import gamma
 
 from arrivals.measurement_models import LogNormalRSS, db_to_neper
-from arrivals.scenarios import available, create
+from arrivals.scenarios import available, create, reproduce_rss
 from arrivals.scenarios.detection import (
     amplitude_gaussian_detection,
     exact_detection,
@@ -17,6 +17,8 @@ from arrivals.scenarios.detection import (
     network_detection,
     true_false_alarm,
 )
+from arrivals.scenarios.reproduce_rss import NAMES as METHOD_NAMES
+from arrivals.scenarios.reproduce_rss import table1
 from arrivals.scenarios.rss import RSSTrial, Table1K3, Table1K7, lattice
 from arrivals.scenarios.rss_bounds import rss_bound
 from arrivals.scenarios.rss_metrics import Assignment, assigned, huber, scores
@@ -207,3 +209,19 @@ def test_estimates_that_ran_away_count_as_lost() -> None:
     found = np.array([[[0.1, 0.0]], [[0.0, 0.2]], [[np.nan, 0.0]], [[np.inf, 0.0]]])
     u = np.zeros((4, 1))
     assert scores(found, truth, u, u).lost == 0.5
+
+
+def test_the_study_of_table_1_has_rows_claims_and_a_picture(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(reproduce_rss, "_least_ms", lambda work: 4.0)  # the clock is no test
+    report = table1(2, 0)
+    assert len({row[:2] for row in report.rows}) == len(report.rows) == 22
+    rms = {row[:2]: row[report.columns.index("location RMS m")] for row in report.rows}
+    three = next(line for line in report.remarks if "3 close targets" in line)
+    ratio = rms["K=3 random", METHOD_NAMES["lm"]] / rms["K=3 random", METHOD_NAMES["vb"]]
+    assert f"{ratio:.2f}" in three
+    assert three.startswith("Holds: " if ratio > 1.2 else "Does not hold: ")
+    assert "Holds: VB is linear in K (a cycle takes 1 times as long" in "".join(report.remarks)
+    assert len([line for line in report.remarks if "olds: " in line or "hold: " in line]) == 8
+    assert list(report.figures) == ["fig4"]

@@ -1,0 +1,26 @@
+"""One line on a claim: whether our numbers bear it out."""
+
+from __future__ import annotations
+
+
+def holds(claim: str, fact: bool | None, numbers: str) -> str:
+    """Return a line on a claim; None is for what the runs do not decide.
+
+    Examples
+    --------
+    >>> holds("one below two", 1 < 2, "1 and 2")
+    'Holds: one below two (1 and 2).'
+    """
+    verdict = "Not decided" if fact is None else "Holds" if fact else "Does not hold"
+    return f"{verdict}: {claim} ({numbers})."
+
+
+def negative(mean: float, error: float) -> bool | None:
+    """Tell whether a mean is below zero, None if it is within two standard errors of it.
+
+    Examples
+    --------
+    >>> negative(-1.0, 0.1), negative(-0.1, 0.1), negative(-1.0, float("nan"))
+    (True, None, None)
+    """
+    return mean < 0 if abs(mean) > 2 * error else None
