@@ -9,15 +9,12 @@ are its N snapshots.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 
-from arrivals.trackers.responses import Response
+from arrivals.trackers.responses import Response, diagonals
 from arrivals.trackers.rows import Rows
 from arrivals.typing import Bool, Complex, Float, Int
-
-Array = TypeVar("Array", Float, Complex)
 
 # What is known of a component: rows of the arrays of components, (B, 7, L).
 MU, S = 0, 1  # mean and variance of its angle
@@ -134,12 +131,6 @@ def evaluate(
     return State(
         Y, facts, K, used, nu, tau, rest, A, X, h, lost, pull, D, prior, W, G, explained, F + prior
     )
-
-
-def diagonals(X: Array) -> Array:
-    """Return the diagonals (..., L) of contiguous matrices (..., L, L), to be read and written."""
-    L = X.shape[-1]
-    return X.reshape(*X.shape[:-2], L * L)[..., :: L + 1]
 
 
 def with_variances(response: Response, state: State, nu: Float, tau: Float) -> State:

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from arrivals.trackers.joint_elbo import MU, S, State, diagonals, evaluate, with_variances
-from arrivals.trackers.responses import Response, over_snapshots
+from arrivals.trackers.joint_elbo import MU, S, State, evaluate, with_variances
+from arrivals.trackers.responses import Response, diagonals, over_snapshots
 from arrivals.trackers.rows import some
 from arrivals.typing import Bool, Complex, Float
 
@@ -150,5 +150,5 @@ def learned(response: Response, state: State) -> State:
 def floored(response: Response, state: State, nu: Float, tau: Float) -> Float:
     """Return τ, not below the power that counts as a source; the old one where there is none."""
     if response.power_floor:
-        tau = np.maximum(tau, response.power_floor * nu / response.mean_norm2)
+        tau = np.maximum(tau, response.power_floor * nu / response.norm2[:, 0])
     return np.where(state.K[:, None] > 0, tau, state.tau) if 0 in state.K.tolist() else tau

@@ -165,9 +165,9 @@ def start(
     rho[free] = max(most // 2, 1) / max(most, 2)
     rest = np.where(free, most * np.log1p(-np.minimum(rho, 0.999)), 0.0)
     Y = np.stack([p.Y for p in problems])
-    bins = np.ones(response.n_bins)
-    tau = np.outer(tau, bins * response.n_sensors / response.mean_norm2)
-    state = evaluate(response, Y, facts, K, np.outer(nu, bins), tau, rest)
+    tau = np.outer(tau, response.n_sensors / response.norm2)
+    nu = np.outer(nu, np.ones(response.n_bins))
+    state = evaluate(response, Y, facts, K, nu, tau, rest)
     off, zero, nan = np.zeros(B, dtype=np.bool_), np.zeros(B, dtype=np.int64), np.full(B, np.nan)
     return Work(
         row=np.arange(B), state=state, saved=state, memory=facts, n_known=K,

@@ -32,10 +32,8 @@ class Response:
     ----------
     extent : float
         Sensors of the filled line that resolves as well: 1/extent is the scale of its beam.
-    norm2 : ndarray, shape (n_bins, 1), or float
+    norm2 : ndarray, shape (n_bins, 1)
         ‖a(θ)‖², the mean over all angles where it changes.
-    mean_norm2 : ndarray, shape (n_bins,), or float
-        The same.
 
     Examples
     --------
@@ -70,8 +68,8 @@ class Response:
         weight /= weight.sum()
         self.extent = np.sqrt(12 * float(weight @ (k - weight @ k) ** 2) + 1)
         norm = manifold.norm_squared()
-        self.norm2: Float | float = norm if isinstance(norm, float) else norm[0, :, :1].real
-        self.mean_norm2 = norm if isinstance(norm, float) else norm[0, :, 0].real
+        one = np.full((self.n_bins, 1), norm) if isinstance(norm, float) else norm[0, :, :1].real
+        self.norm2: Float = np.asarray(one)
         self.series: Complex | None = None
         if not isinstance(norm, float) and norm.shape[2] > 1:
             self.series = norm[0].T.copy()  # (n_i, F)
@@ -116,7 +114,7 @@ class Response:
         if self.G is not None:
             T = stack[:, :, 1]
             X = np.concatenate([X, (T.conj() @ T.swapaxes(2, 3))[:, :, None]], axis=2)
-        own = X.reshape(*X.shape[:3], L * L)[..., :: L + 1]
+        own = diagonals(X)
         size = own[:, :, 0].real.copy()
         own[...] = 0
         if self.series is None:
@@ -126,8 +124,8 @@ class Response:
             own[:, :, :3] = norms if used is None else norms * used[:, None, None]
         return A, X, h, own[:, :, 0].real - size
 
-    def at(self, theta: Float) -> tuple[Complex, Float | float, Float | float]:
-        """Return a(θ) (F, n, n_sensors), ‖∂a/∂θ‖² and ‖a‖², (F, n) or numbers, at known angles."""
+    def at(self, theta: Float) -> tuple[Complex, Float | float, Float]:
+        """Return a(θ) (F, n, n_sensors), ‖∂a/∂θ‖² and ‖a‖², (F, n) or less, at known angles."""
         d = np.exp(theta[:, None] * self.jk)
         if self.G is None:
             return d[None], 2 * float(self.half_k2.sum()), self.norm2
@@ -142,6 +140,12 @@ class Response:
         """Return the sum over bins (B, F, ...) of what each tells, tempered."""
         x = x[:, 0] if x.shape[1] == 1 else x.sum(axis=1)
         return x if self.temper == 1 else x / self.temper
+
+
+def diagonals(X: Array) -> Array:
+    """Return the diagonals (..., L) of contiguous matrices (..., L, L), to be read and written."""
+    L = X.shape[-1]
+    return X.reshape(*X.shape[:-2], L * L)[..., :: L + 1]
 
 
 def over_snapshots(x: Array) -> Array:
