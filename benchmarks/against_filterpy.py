@@ -21,7 +21,7 @@ from filterpy.kalman import ExtendedKalmanFilter, IMMEstimator, KalmanFilter
 from arrivals.measurement_models import Bearing, LinearMeasurement
 from arrivals.motion_models import ConstantVelocity, LinearMotion
 from arrivals.trackers import EKF, IMM, Kalman
-from arrivals.trackers.recorder import Recorder
+from arrivals.trackers.run import Recorder
 from arrivals.typing import Float
 
 Step = Callable[[], object]

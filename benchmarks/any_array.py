@@ -21,12 +21,12 @@ from tqdm import tqdm
 
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.motion_models import BernoulliVonMises
+from arrivals.recordings.framing import looks
+from arrivals.recordings.recording import Recording
 from arrivals.scenarios import Trial, create, mean_gospa
-from arrivals.scenarios.infrasound import brp2012, tracker
-from arrivals.scenarios.looks import looks
-from arrivals.scenarios.recordings import Recording
+from arrivals.scenarios.demos.infrasound import brp2012, tracker
 from arrivals.trackers import CBF, SVALSE, VALSE, Tracker
-from arrivals.trackers.recorder import Run
+from arrivals.trackers.run import Run
 from arrivals.typing import Bool, Complex, Float
 
 MERGED: dict[str, Any] = {"merge": np.deg2rad(1.5)}

@@ -24,9 +24,9 @@ import numpy as np
 
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.motion_models import AutoregressiveSources, yule_walker
-from arrivals.motion_models.companion import blocks
+from arrivals.motion_models.companion_form import blocks
 from arrivals.trackers import ARKalmanQRDRLS, Run
-from arrivals.trackers.steady_kalman import steady_filter
+from arrivals.trackers.autoregressive.steady_state import steady_filter
 from arrivals.typing import Complex, Float
 
 TWO = ([0.772, -0.45], [0.96, -0.77])
@@ -284,7 +284,7 @@ def asked(tracker: ARKalmanQRDRLS, z: Complex) -> list[Any]:
         given.append(arguments)
         return steady_filter(*arguments)
 
-    with mock.patch("arrivals.trackers.source_filter.steady_filter", noted):
+    with mock.patch("arrivals.trackers.autoregressive.interval_filter.steady_filter", noted):
         copy.deepcopy(tracker).run(z)
     return given
 

@@ -18,11 +18,16 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 
 from arrivals.measurement_models import InterpolationDelay
-from arrivals.scenarios.interpolation import InterpolationTone
-from arrivals.scenarios.interpolation_trials import draws, filtered, rms, tracker
-from arrivals.scenarios.reproduce_interpolation import convergence, moving, rmse_study, table1
+from arrivals.scenarios.reproduce.interpolation.figures import (
+    convergence,
+    moving,
+    rmse_study,
+    table1,
+)
+from arrivals.scenarios.reproduce.interpolation.trials import draws, filtered, rms, tracker
+from arrivals.scenarios.simulations.sampled_source import InterpolationTone
 from arrivals.trackers import InterpolationEKF
-from arrivals.trackers.delay_updates import move
+from arrivals.trackers.interpolation.updates import move
 from arrivals.typing import Float
 
 # 9.1: mean (variance) at 15, 30, 45, 60, 75 degrees

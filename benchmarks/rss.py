@@ -22,11 +22,15 @@ import numpy as np
 
 from arrivals.measurement_models import LogNormalRSS, db_to_neper
 from arrivals.motion_models import RandomWalk
-from arrivals.scenarios.networks import Network, read_network
-from arrivals.scenarios.rss import FixedSources, RSSTrial, Table1K3, Table1K7, in_disc
-from arrivals.scenarios.rss_births import gospa_over_time, told_nothing, told_the_truth
-from arrivals.scenarios.rss_calibration import Calibration, calibrate
-from arrivals.scenarios.rss_measured import (
+from arrivals.recordings.network_calibration import Calibration, calibrate
+from arrivals.recordings.networks import Network, read_network
+from arrivals.scenarios.metrics.position_errors import Scores, assigned, distances, scores
+from arrivals.scenarios.reproduce.rss.birth_death import (
+    gospa_over_time,
+    told_nothing,
+    told_the_truth,
+)
+from arrivals.scenarios.reproduce.rss.measured_network import (
     FLOOR_DB,
     centre,
     snapshot,
@@ -34,16 +38,22 @@ from arrivals.scenarios.rss_measured import (
     strongest,
     track_transmitter,
 )
-from arrivals.scenarios.rss_metrics import Scores, assigned, distances, scores
-from arrivals.scenarios.rss_moving import BirthsAndDeaths, CrossingSources
-from arrivals.scenarios.rss_trials import answers, bounds, draws, one_of_batch
+from arrivals.scenarios.reproduce.rss.trials import answers, bounds, draws, one_of_batch
+from arrivals.scenarios.simulations.moving_emitters import BirthsAndDeaths, CrossingSources
+from arrivals.scenarios.simulations.signal_strength import (
+    FixedSources,
+    RSSTrial,
+    Table1K3,
+    Table1K7,
+    in_disc,
+)
 from arrivals.trackers import Run
-from arrivals.trackers.rss_cycles import Cycling, Sweep, solve
-from arrivals.trackers.rss_map import maximum
-from arrivals.trackers.rss_problem import Prior, Problem, inverse_2x2, marginals
-from arrivals.trackers.rss_quality import quality
-from arrivals.trackers.rss_scan import Newcomers
-from arrivals.trackers.rss_start import best, grown
+from arrivals.trackers.rss.inference.goodness_of_fit import quality
+from arrivals.trackers.rss.inference.joint_posterior import Prior, Problem, inverse_2x2, marginals
+from arrivals.trackers.rss.inference.map_search import maximum
+from arrivals.trackers.rss.inference.variational import Cycling, Sweep, solve
+from arrivals.trackers.rss.model_order.grid_search import Newcomers
+from arrivals.trackers.rss.model_order.model_selection import best, grown
 from arrivals.typing import Float
 
 SEEDS = (0, 1, 2)
@@ -400,7 +410,7 @@ def peak_mb() -> float:
     """Return the peak memory of a fresh process that updates once with 1e5 sensors."""
     script = (
         "import numpy as np, resource\n"
-        "from arrivals.scenarios.rss import Table1K3\n"
+        "from arrivals.scenarios.simulations.signal_strength import Table1K3\n"
         "trial = Table1K3(n_sensors=100000).sample(np.random.default_rng(0))\n"
         "trial.tracker('rss_vb').update(trial.measurements[0])\n"
         "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)\n"

@@ -19,14 +19,14 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 
 from arrivals.measurement_models import ArraySnapshot, SensorArray
-from arrivals.measurement_models.manifolds import GridLine
+from arrivals.measurement_models.manifolds.manifold import GridLine
 from arrivals.scenarios import ar_signals, best_assignment_rmse
 from arrivals.trackers import MUSIC, PAST
-from arrivals.trackers.esprit import esprit_angles
-from arrivals.trackers.music import Scan
-from arrivals.trackers.past import past_step
-from arrivals.trackers.root_music import root_music_angles
-from arrivals.trackers.subspace import Subspaces, on_grid
+from arrivals.trackers.subspace.base import Subspaces, on_grid
+from arrivals.trackers.subspace.esprit import esprit_angles
+from arrivals.trackers.subspace.music import Scan
+from arrivals.trackers.subspace.past import past_step
+from arrivals.trackers.subspace.root_music import root_music_angles
 from arrivals.typing import Complex, Float
 
 COEFFICIENTS, NOISE = ([0.772, -0.45], [0.96, -0.77]), (0.571, 0.287)

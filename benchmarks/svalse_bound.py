@@ -19,9 +19,10 @@ from arrivals.motion_models import BernoulliVonMises
 from arrivals.motion_models.bessel import log_i0
 from arrivals.scenarios import create
 from arrivals.trackers import SVALSE
-from arrivals.trackers.coordinate_ascent import Ascent, CoordinateAscent
-from arrivals.trackers.joint_ascent import JointNewton
-from arrivals.trackers.joint_elbo import (
+from arrivals.trackers.svalse.components import Fit, Prediction
+from arrivals.trackers.svalse.coordinate.solver import Ascent, CoordinateAscent
+from arrivals.trackers.svalse.newton.candidates import LOG_2PI
+from arrivals.trackers.svalse.newton.elbo import (
     KL_CONSTANT,
     MU,
     N_FACTS,
@@ -31,10 +32,9 @@ from arrivals.trackers.joint_elbo import (
     S,
     evaluate,
 )  # fmt: skip
-from arrivals.trackers.joint_work import log_odds
-from arrivals.trackers.line_spectrum import Fit, Prediction
-from arrivals.trackers.responses import Response
-from arrivals.trackers.support_moves import LOG_2PI
+from arrivals.trackers.svalse.newton.expected_response import Response
+from arrivals.trackers.svalse.newton.solver import JointNewton
+from arrivals.trackers.svalse.newton.state import log_odds
 from arrivals.typing import Complex
 
 FIGURES = ("svalse_fig4", "svalse_fig5", "svalse_fig6")

@@ -22,10 +22,10 @@ from svalse_fast import ELECTRICAL, FIGURES, PAPER, row
 from arrivals.measurement_models import ArraySnapshot
 from arrivals.scenarios import create
 from arrivals.trackers import SVALSE, Tracker
-from arrivals.trackers.joint_elbo import KL_CONSTANT, MU, N_FACTS, S, evaluate
-from arrivals.trackers.joint_newton import ascend
-from arrivals.trackers.responses import Response
-from arrivals.trackers.support_moves import LOG_2PI
+from arrivals.trackers.svalse.newton.candidates import LOG_2PI
+from arrivals.trackers.svalse.newton.elbo import KL_CONSTANT, MU, N_FACTS, S, evaluate
+from arrivals.trackers.svalse.newton.expected_response import Response
+from arrivals.trackers.svalse.newton.step import ascend
 from arrivals.typing import Complex, Float
 
 

@@ -15,10 +15,10 @@ from pathlib import Path
 from joblib import parallel_config
 
 from arrivals.scenarios import create, monte_carlo
-from arrivals.scenarios.methods import plain
-from arrivals.scenarios.reproduce_svalse import compared, svalse_as_printed
-from arrivals.scenarios.reproduce_svalse_snr import SCENES, SNR_DB, sweep
-from arrivals.scenarios.svalse_figures import ACTIVATION, REBUILT, SWEEP, SWEPT
+from arrivals.scenarios.experiments.methods import plain
+from arrivals.scenarios.reproduce.svalse.figures_4_to_7 import compared, svalse_as_printed
+from arrivals.scenarios.reproduce.svalse.figures_8_to_10 import SCENES, SNR_DB, sweep
+from arrivals.scenarios.reproduce.svalse.published_values import ACTIVATION, REBUILT, SWEEP, SWEPT
 
 
 def verdict(passed: bool) -> str:

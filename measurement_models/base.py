@@ -5,7 +5,7 @@ from abc import ABC, abstractmethod
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.params import Model
+from arrivals.parameters import Model
 from arrivals.typing import Float
 
 

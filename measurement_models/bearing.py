@@ -6,9 +6,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.checks import constant, count, covariance, positive, real
 from arrivals.measurement_models.base import MeasurementModel
 from arrivals.typing import Float
+from arrivals.validation import constant, count, covariance, positive, real
 
 
 @dataclass(frozen=True, eq=False, init=False)

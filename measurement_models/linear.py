@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.checks import constant, covariance, state
 from arrivals.measurement_models.base import MeasurementModel
 from arrivals.typing import Float
+from arrivals.validation import constant, covariance, state
 
 
 @dataclass(frozen=True, eq=False, init=False)

@@ -1,5 +1,11 @@
 """How states move."""
 
+from arrivals.motion_models.ar_estimation import (
+    autocovariance,
+    partial_autocorrelation,
+    select_order,
+    yule_walker,
+)
 from arrivals.motion_models.autoregressive import AutoregressiveSources
 from arrivals.motion_models.base import MotionModel
 from arrivals.motion_models.bernoulli_von_mises import BernoulliVonMises
@@ -10,10 +16,10 @@ from arrivals.motion_models.bessel import (
     log_bessel_ratio,
     log_i0,
 )
+from arrivals.motion_models.combined import Stacked
+from arrivals.motion_models.coordinated_turn import CoordinatedTurn
 from arrivals.motion_models.delay import DelayDrift, DelayWalk
 from arrivals.motion_models.linear import ConstantVelocity, LinearMotion, RandomWalk
-from arrivals.motion_models.stacked import Stacked
-from arrivals.motion_models.turn import CoordinatedTurn
 from arrivals.motion_models.von_mises import (
     VonMisesWalk,
     log_density,
@@ -21,12 +27,6 @@ from arrivals.motion_models.von_mises import (
     mfold_modes,
     product,
     wrap,
-)
-from arrivals.motion_models.yule_walker import (
-    autocovariance,
-    partial_autocorrelation,
-    select_order,
-    yule_walker,
 )
 
 __all__ = [

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.checks import positive, real, state
 from arrivals.motion_models.base import MotionModel
-from arrivals.motion_models.companion import Blocks, blocks, radius, stationary
-from arrivals.motion_models.stacked import block_diagonal
+from arrivals.motion_models.combined import block_diagonal
+from arrivals.motion_models.companion_form import Blocks, blocks, radius, stationary
 from arrivals.typing import Complex, Float
+from arrivals.validation import positive, real, state
 
 
 @dataclass(frozen=True)

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.checks import not_negative, probability, real
 from arrivals.motion_models.base import MotionModel
 from arrivals.motion_models.von_mises import VonMisesWalk
 from arrivals.typing import Bool, Float
+from arrivals.validation import not_negative, probability, real
 
 PAPER_KAPPA = 148.0  # 1.5° at broadside of a half-wavelength line
 

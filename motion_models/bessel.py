@@ -6,8 +6,8 @@ A(κ) = I₁(κ)/I₀(κ) is the mean resultant length of a von Mises density. A
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.checks import count, real
 from arrivals.typing import Float
+from arrivals.validation import count, real
 
 # scipy.special takes longer to import than the package itself, so functions import it when called.
 

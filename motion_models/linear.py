@@ -7,9 +7,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.checks import constant, count, covariance, not_negative, shaped, state
 from arrivals.motion_models.base import MotionModel
 from arrivals.typing import Float
+from arrivals.validation import constant, count, covariance, not_negative, shaped, state
 
 
 class _Linear(MotionModel):

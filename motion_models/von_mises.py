@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.checks import count, not_negative, positive, state
 from arrivals.motion_models.base import MotionModel
 from arrivals.motion_models.bessel import concentrations, from_log_ratio, log_bessel_ratio
 from arrivals.typing import Complex, Float
+from arrivals.validation import count, not_negative, positive, state
 
 
 def wrap(angle: ArrayLike) -> Float:

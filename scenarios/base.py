@@ -11,7 +11,7 @@ import numpy as np
 
 from arrivals.measurement_models import ArraySamples, ArraySnapshot, LogNormalRSS
 from arrivals.motion_models import MotionModel
-from arrivals.params import Model
+from arrivals.parameters import Model
 from arrivals.trackers import Tracker, find
 from arrivals.trackers.registry import Registry
 from arrivals.typing import Complex, Float

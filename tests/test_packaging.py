@@ -13,14 +13,16 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 FOLDERS = ("motion_models", "measurement_models", "trackers", "scenarios")
+APPLICATIONS = ("recordings", "plots", "cli")  # below src/arrivals
 SETUPTOOLS = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]
 
 
 def packaged(folder: Path) -> dict[str, Path]:
     """Return the files of the packages by their place in a wheel."""
     homes = {f"arrivals/{name}": folder / name for name in FOLDERS}
-    own = (folder / "src" / "arrivals").glob("*.*")
-    files = {f"arrivals/{path.name}": path for path in own if path.is_file()}
+    own = folder / "src" / "arrivals"
+    files = {f"arrivals/{path.name}": path for path in own.glob("*.*") if path.is_file()}
+    homes |= {f"arrivals/{name}": own / name for name in APPLICATIONS}
     for inside, home in homes.items():
         for path in home.rglob("*"):
             parts = path.relative_to(home).parts
@@ -136,16 +138,17 @@ def violations(place: str, source: str) -> list[str]:
     above: dict[str, tuple[str, ...]] = {
         "motion_models": ("measurement_models", "trackers", "scenarios"),
         "measurement_models": ("motion_models", "trackers", "scenarios"),
-        "trackers": ("scenarios",),
+        "trackers": ("scenarios", *APPLICATIONS),
         "scenarios": (),
+        **dict.fromkeys(APPLICATIONS, ()),
     }
     banned = [f"arrivals.{name}" for name in above.get(folder, FOLDERS)] + [*FOLDERS]
     late = ["filterpy"]  # only inside a function
-    if place == "arrivals/trackers/filterpy_ekf.py":  # itself imported inside a function
+    if place == "arrivals/trackers/gaussian/filterpy_ekf.py":  # itself imported inside a function
         late.remove("filterpy")
-    if folder != "scenarios":
+    if folder not in ("scenarios", *APPLICATIONS):
         banned += ["matplotlib", "sklearn", "joblib", "tqdm", "scipy.io", "soundfile", "h5py"]
-    if place == "arrivals/trackers/conformance.py":
+    if place == "arrivals/trackers/conformance/checks.py":
         banned.remove("sklearn")
         late.append("sklearn")
 
@@ -174,19 +177,22 @@ def test_imports_run_one_way(place: str) -> None:
 @pytest.mark.parametrize(
     ("place", "source"),
     [
-        ("arrivals/motion_models/a.py", "from arrivals.measurement_models.arrays import direction"),
+        (
+            "arrivals/motion_models/a.py",
+            "from arrivals.measurement_models.arrays.sensor_array import direction",
+        ),
         ("arrivals/motion_models/a.py", "from arrivals import measurement_models"),
         ("arrivals/measurement_models/a.py", "import arrivals.motion_models as m"),
         ("arrivals/measurement_models/a.py", "def f():\n    from arrivals.trackers import find"),
-        ("arrivals/trackers/a.py", "from arrivals.scenarios.metrics import gospa"),
+        ("arrivals/trackers/a.py", "from arrivals.scenarios.metrics.gospa import gospa"),
         ("arrivals/trackers/a.py", "def f():\n    import matplotlib.pyplot"),
         ("arrivals/trackers/a.py", "def f():\n    from sklearn.linear_model import HuberRegressor"),
-        ("arrivals/trackers/conformance.py", "from sklearn.base import clone"),
+        ("arrivals/trackers/conformance/checks.py", "from sklearn.base import clone"),
         ("arrivals/trackers/a.py", "from filterpy.common import Saver"),
         ("arrivals/scenarios/a.py", "from trackers import SVALSE"),
         ("arrivals/scenarios/a.py", "from .metrics import gospa"),
-        ("arrivals/checks.py", "from arrivals.trackers import find"),
-        ("arrivals/checks.py", "def f():\n    from arrivals.motion_models import RandomWalk"),
+        ("arrivals/validation.py", "from arrivals.trackers import find"),
+        ("arrivals/validation.py", "def f():\n    from arrivals.motion_models import RandomWalk"),
     ],
 )
 def test_import_in_the_wrong_direction_is_seen(place: str, source: str) -> None:
@@ -197,7 +203,7 @@ def test_import_in_the_wrong_direction_is_seen(place: str, source: str) -> None:
     ("place", "source"),
     [
         ("arrivals/trackers/a.py", "from arrivals.motion_models import RandomWalk\nimport scipy"),
-        ("arrivals/trackers/conformance.py", "def f():\n    from sklearn.base import clone"),
+        ("arrivals/trackers/conformance/checks.py", "def f():\n    from sklearn.base import clone"),
         ("arrivals/trackers/a.py", "def f():\n    from filterpy.common import Saver"),
         (
             "arrivals/scenarios/a.py",

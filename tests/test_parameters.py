@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hands import SNAPSHOTS, Hands
+from recording_tracker import SNAPSHOTS, Hands
 
 from arrivals.measurement_models import ArraySnapshot, MeasurementModel, SensorArray
 from arrivals.motion_models import BernoulliVonMises, LinearMotion, RandomWalk, VonMisesWalk
-from arrivals.params import Configurable, Model
+from arrivals.parameters import Configurable, Model
 from arrivals.trackers import (
     CBF,
     SVALSE,

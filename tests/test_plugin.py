@@ -105,5 +105,5 @@ try:
 except ValueError as error:
     print(error)
 """
-    expected = "the tracker name 'svalse' is taken by arrivals.trackers.svalse.SVALSE\n"
+    expected = "the tracker name 'svalse' is taken by arrivals.trackers.svalse.svalse.SVALSE\n"
     assert run(python, "-c", script, cwd=tmp_path) == expected

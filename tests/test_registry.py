@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hands import SNAPSHOTS
+from recording_tracker import SNAPSHOTS
 
 from arrivals.trackers import (
     CBF,
@@ -51,7 +51,9 @@ def test_registered_class_is_found_made_and_given_back_unchanged(
 
 
 def test_taken_name_is_an_error_and_no_overwrite(animals: Registry[Animal]) -> None:
-    with pytest.raises(ValueError, match=r"animal name 'dog' is taken by test_registry\.Dog"):
+    with pytest.raises(
+        ValueError, match=r"animal name 'dog' is taken by tests\.test_registry\.Dog"
+    ):
         animals.register("dog")(Cat)
     assert animals.find("dog") is Dog
     assert animals.register("dog")(Dog) is Dog  # the same again is no conflict
@@ -138,7 +140,9 @@ def test_foreign_class_cannot_take_our_name(
     animals: Registry[Animal], foreign: list[EntryPoint]
 ) -> None:
     foreign.append(point("dog", "farm:Cow"))
-    with pytest.raises(ValueError, match=r"'dog' is taken twice: farm:Cow, test_registry:Dog"):
+    with pytest.raises(
+        ValueError, match=r"'dog' is taken twice: farm:Cow, tests.test_registry:Dog"
+    ):
         animals.find("dog")
     assert animals.available() == ["dog"]
 

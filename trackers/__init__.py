@@ -1,10 +1,10 @@
 """The methods, and the registry that finds them by name."""
 
-from arrivals.trackers.ar_kalman_qrd_rls import ARKalmanQRDRLS
+from arrivals.trackers.autoregressive.ar_kalman_qrd_rls import ARKalmanQRDRLS
+from arrivals.trackers.autoregressive.qrd_rls import QRDRLS
 from arrivals.trackers.base import Tracker
-from arrivals.trackers.cbf import CBF
-from arrivals.trackers.ekf import EKF
-from arrivals.trackers.esprit import ESPRIT
+from arrivals.trackers.beamforming.cbf import CBF
+from arrivals.trackers.beamforming.mvdr import MVDR
 from arrivals.trackers.estimates import (
     DirectionEstimate,
     Estimate,
@@ -12,27 +12,27 @@ from arrivals.trackers.estimates import (
     SourceEstimate,
     StateEstimate,
 )
-from arrivals.trackers.filterpy_bridge import as_filterpy
-from arrivals.trackers.imm import IMM, Filter
-from arrivals.trackers.interpolation_ekf import InterpolationEKF
-from arrivals.trackers.kalman import Kalman
-from arrivals.trackers.kalman_type import KalmanType
-from arrivals.trackers.music import MUSIC
-from arrivals.trackers.mvdr import MVDR
-from arrivals.trackers.particle import Particle
-from arrivals.trackers.past import PAST
-from arrivals.trackers.peaks_gnn import PeaksGNN
-from arrivals.trackers.qrd_rls import QRDRLS
-from arrivals.trackers.recorder import Run
+from arrivals.trackers.gaussian.ekf import EKF
+from arrivals.trackers.gaussian.filterpy_adapter import as_filterpy
+from arrivals.trackers.gaussian.imm import IMM, Filter
+from arrivals.trackers.gaussian.kalman import Kalman
+from arrivals.trackers.gaussian.particle import Particle
+from arrivals.trackers.gaussian.smoothing import KalmanType
+from arrivals.trackers.gaussian.ukf import UKF
+from arrivals.trackers.interpolation.interpolation_ekf import InterpolationEKF
+from arrivals.trackers.multi_target.peaks_gnn import PeaksGNN
 from arrivals.trackers.registry import available, create, find, register
-from arrivals.trackers.root_music import RootMUSIC
-from arrivals.trackers.rss_ml import RSSML
-from arrivals.trackers.rss_vb import RSSVB
-from arrivals.trackers.sbl import SBL
-from arrivals.trackers.ssbl import SSBL
-from arrivals.trackers.svalse import SVALSE
-from arrivals.trackers.ukf import UKF
-from arrivals.trackers.valse import VALSE
+from arrivals.trackers.rss.rss_ml import RSSML
+from arrivals.trackers.rss.rss_vb import RSSVB
+from arrivals.trackers.run import Run
+from arrivals.trackers.sparse_bayes.sbl import SBL
+from arrivals.trackers.sparse_bayes.ssbl import SSBL
+from arrivals.trackers.subspace.esprit import ESPRIT
+from arrivals.trackers.subspace.music import MUSIC
+from arrivals.trackers.subspace.past import PAST
+from arrivals.trackers.subspace.root_music import RootMUSIC
+from arrivals.trackers.svalse.svalse import SVALSE
+from arrivals.trackers.svalse.valse import VALSE
 
 __all__ = [
     "ARKalmanQRDRLS",

@@ -11,11 +11,11 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.checks import positive
-from arrivals.params import Configurable
+from arrivals.parameters import Configurable
 from arrivals.trackers.estimates import Estimate
-from arrivals.trackers.recorder import Recorder, Run
+from arrivals.trackers.run import Recorder, Run
 from arrivals.typing import Float
+from arrivals.validation import positive
 
 
 class Tracker(Configurable, ABC):

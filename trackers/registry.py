@@ -7,7 +7,7 @@ from collections.abc import Callable
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Generic, TypeVar
 
-from arrivals.params import FINDERS
+from arrivals.parameters import FINDERS
 from arrivals.trackers.base import Tracker
 
 Base = TypeVar("Base")

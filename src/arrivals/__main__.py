@@ -27,7 +27,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     0
     """
     try:
-        from arrivals.scenarios.cli import run
+        from arrivals.cli.main import run
 
         run(argv)
         sys.stdout.flush()

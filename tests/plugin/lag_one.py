@@ -3,10 +3,10 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.checks import instance, positive
 from arrivals.measurement_models import ArraySnapshot
 from arrivals.trackers import DirectionEstimate, Tracker
 from arrivals.trackers.base import missed
+from arrivals.validation import instance, positive
 
 
 class LagOne(Tracker):

@@ -1,0 +1,149 @@
+"""Arrays from files.
+
+An array file is TOML. `kind` says which other keys it has:
+
+===========  ==============================================================
+kind         keys
+===========  ==============================================================
+ula          `n_sensors`, `spacing`
+uca          `n_sensors`, `radius`
+symmetric    `distances`: of the sensors on either side of the centre
+positions    `positions`: a list of numbers, of [x, y] or of [x, y, z]
+===========  ==============================================================
+
+and all may have `speed` (m/s), `missing` (numbers of elements that do not work) and `channels`
+(the recording's channel of each element). Lengths are metres. Elements and channels are counted
+from 1 in the file, as they are labelled on the hardware; `channels` names one for every element
+of the whole array, or one for each that is not missing.
+"""
+
+from __future__ import annotations
+
+import csv
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from arrivals.measurement_models.arrays.sensor_array import SensorArray
+from arrivals.validation import count
+
+KEYS = {
+    "ula": ("n_sensors", "spacing"),
+    "uca": ("n_sensors", "radius"),
+    "symmetric": ("distances",),
+    "positions": ("positions",),
+}
+
+
+def from_toml(path: str | Path) -> SensorArray:
+    """Read an array file.
+
+    Raises
+    ------
+    ValueError
+        If the file is not TOML, lacks a key or has one that its kind does not know, or if its
+        numbers make no array; the message starts with the file's name.
+    """
+    try:
+        with open(path, "rb") as file:
+            return from_description(tomllib.load(file))
+    except (ValueError, TypeError) as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
+def from_description(description: dict[str, Any]) -> SensorArray:
+    """Make the array that the keys of an array file describe.
+
+    Examples
+    --------
+    >>> from_description({"kind": "ula", "n_sensors": 3, "spacing": 0.1, "missing": [2]}).channels
+    (0, 2)
+    >>> from_description({"kind": "uca", "n_sensors": 8})
+    Traceback (most recent call last):
+    ValueError: an array of kind 'uca' needs the key 'radius'
+    """
+    keys = dict(description)
+    kind = keys.pop("kind", None)
+    if kind is None:
+        raise ValueError(f"the key 'kind' is missing; it is one of {', '.join(KEYS)}")
+    if not isinstance(kind, str) or kind not in KEYS:
+        raise ValueError(f"kind must be one of {', '.join(KEYS)}; got {kind!r}")
+    common = {name: keys.pop(name, None) for name in ("speed", "missing", "channels")}
+    for name in KEYS[kind]:
+        if name not in keys:
+            raise ValueError(f"an array of kind {kind!r} needs the key {name!r}")
+    unknown = sorted(set(keys) - set(KEYS[kind]))
+    if unknown:
+        raise ValueError(f"an array of kind {kind!r} has no key {unknown[0]!r}")
+    array = (
+        _positions(keys["positions"]) if kind == "positions" else getattr(SensorArray, kind)(**keys)
+    )
+    return _wired(
+        SensorArray(array.positions, common["speed"]), common["missing"], common["channels"]
+    )
+
+
+def _positions(rows: Any) -> SensorArray:
+    try:
+        return SensorArray(np.array(rows, dtype=np.float64))
+    except (TypeError, ValueError) as error:
+        if "inhomogeneous" in str(error) or "could not convert" in str(error):
+            raise ValueError("positions must be numbers, or lists of the same length") from None
+        raise
+
+
+def _wired(array: SensorArray, missing: Any, channels: Any) -> SensorArray:
+    """Return the array less its missing elements, its channels renumbered from 0."""
+    for name, value in (("missing", missing), ("channels", channels)):
+        if value is not None and not isinstance(value, list):
+            raise ValueError(f"{name} must be a list of numbers; got {value!r}")
+    gone = [count("missing", element) - 1 for element in missing or []]
+    if max(gone, default=0) >= array.n_sensors:
+        raise ValueError(f"missing names element {max(gone) + 1} of {array.n_sensors}")
+    whole = array.without(gone)
+    if channels is None:
+        return whole
+    wires = tuple(count("channels", channel) - 1 for channel in channels)
+    if len(set(wires)) != len(wires):
+        raise ValueError(f"channels must differ from each other; got {channels}")
+    if len(wires) == array.n_sensors:
+        return SensorArray(array.positions, array.speed, wires).without(gone)
+    return SensorArray(whole.positions, whole.speed, wires)
+
+
+def from_csv(path: str | Path, *, speed: float | None = None) -> SensorArray:
+    """Read positions in metres, one sensor a row, columns x, y, z as far as there are any.
+
+    A first row that holds no number is taken for a heading.
+
+    Raises
+    ------
+    ValueError
+        If a row has no number where one is wanted, or rows differ in length.
+    """
+    try:
+        with open(path, newline="", encoding="utf-8-sig") as file:
+            rows = [row for row in csv.reader(file) if any(cell.strip() for cell in row)]
+    except (UnicodeDecodeError, csv.Error):
+        raise ValueError(f"{path}: not a table of numbers") from None
+    if rows and not any(_is_number(cell) for cell in rows[0]):
+        rows = rows[1:]
+    if not rows:
+        raise ValueError(f"{path}: holds no positions")
+    for line, row in enumerate(rows, start=1):
+        if len(row) != len(rows[0]) or not all(_is_number(cell) for cell in row):
+            raise ValueError(f"{path}: row {line} must hold {len(rows[0])} numbers; got {row}")
+    try:
+        return SensorArray(np.array(rows, dtype=np.float64), speed)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,135 @@
+"""Plane waves of several frequencies on sensors that have responses of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from arrivals.measurement_models.arrays.element_response import ElementResponse
+from arrivals.measurement_models.arrays.sensor_array import SensorArray
+from arrivals.parameters import Model
+from arrivals.typing import Complex, Float, Int
+from arrivals.validation import positive
+
+
+@dataclass(frozen=True)
+class PlaneWaves(Model):
+    """How an array answers to plane waves.
+
+    Parameters
+    ----------
+    array : SensorArray
+    wavelengths : sequence of float
+        Of the frequency bins, m.
+    response : ElementResponse, optional
+        Isotropic elements if None.
+    slowness : sequence of float, optional
+        Values of an unknown slowness, as factors of the one that the wavelengths stand for.
+    elevation : sequence of float, optional
+        Values of an unknown elevation, rad; horizontal waves if None.
+
+    Examples
+    --------
+    >>> waves = PlaneWaves(SensorArray.uca(5, 0.4), (1.0, 1.2))
+    >>> waves.steering([0.0, 0.3, 0.6]).shape
+    (1, 2, 5, 3)
+    """
+
+    array: SensorArray
+    wavelengths: Sequence[float]
+    response: ElementResponse | None = None
+    slowness: Sequence[float] | None = None
+    elevation: Sequence[float] | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("wavelengths", "slowness", "elevation"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, tuple(getattr(self, name)))
+        if self.response is not None:
+            _check_response(self.response, self.array, len(self.wavelengths))
+        for factor in self.slowness or ():
+            positive("slowness", factor)
+        if self.elevation is not None:
+            if self.slowness is not None:
+                raise ValueError("either slowness or elevation may be unknown, not both")
+            if self.array.dim == 1:
+                raise ValueError("a line hears no elevation apart: its directions lie on cones")
+            if not all(abs(angle) <= np.pi / 2 for angle in self.elevation):
+                raise ValueError(f"elevation must lie within ±π/2; got {self.elevation}")
+
+    @property
+    def is_line(self) -> bool:
+        """Whether directions are counted from broadside: two angles of a circle look alike."""
+        return self.array.dim == 1
+
+    @property
+    def centre(self) -> Float:
+        """Centroid of the sensors, m."""
+        return np.asarray(self.array.positions.mean(axis=0))
+
+    @property
+    def wavenumber(self) -> Float:
+        """2π/λ of the bins, rad/m."""
+        return 2 * np.pi / np.asarray(self.wavelengths)
+
+    @property
+    def n_nuisance(self) -> int:
+        """Number of values of the second parameter, 1 if there is none."""
+        return len(self.slowness or self.elevation or (1,))
+
+    def directions(self, angle: ArrayLike) -> Float:
+        """Return slowness vectors of angles (n,), as factors: (n_nuisance, n, dim)."""
+        angle = np.asarray(angle, dtype=np.float64)
+        if self.is_line:
+            u = np.sin(angle)[:, None]
+        else:
+            height = np.zeros(1) if self.elevation is None else np.asarray(self.elevation)
+            flat = np.cos(height)[:, None]
+            axes = [flat * np.cos(angle), flat * np.sin(angle)]
+            axes += [np.sin(height)[:, None] + 0 * angle] * (self.array.dim - 2)
+            u = np.stack(axes, axis=-1)
+        factors = np.ones(1) if self.slowness is None else np.asarray(self.slowness)
+        return np.asarray(factors[:, None, None] * u)
+
+    def steering(self, angle: ArrayLike, origin: Float | float = 0.0) -> Complex:
+        """Return responses to angles (n,), phases counted at `origin`: (n_nuisance, F, M, n).
+
+        The angle of a line runs over the circle: beyond endfire come its mirror images.
+        """
+        path = (self.array.positions - origin) @ np.swapaxes(self.directions(angle), 1, 2)
+        a = np.exp(1j * self.wavenumber[:, None, None] * path[:, None])
+        if self.response is not None:
+            a = a * np.swapaxes(self.response(angle), 1, 2)
+        return np.asarray(a)
+
+    def without(self, sensors: Sequence[int] | Int) -> PlaneWaves:
+        """Return the waves on the array less some sensors."""
+        if len(sensors) == 0:
+            return self
+        response = self.response and self.response.without(sensors)
+        return self.replace(array=self.array.without(map(int, sensors)), response=response)
+
+    def only(self, bins: Sequence[int] | Int) -> PlaneWaves:
+        """Return the waves of some of the bins."""
+        if len(bins) == len(self.wavelengths):
+            return self
+        response = self.response
+        if response is not None and response.n_bins is not None:
+            response = ElementResponse(response.gains[np.asarray(bins)])
+        return self.replace(wavelengths=[self.wavelengths[f] for f in bins], response=response)
+
+
+def _check_response(response: ElementResponse, array: SensorArray, n_bins: int) -> None:
+    if array.dim == 1:
+        raise ValueError(
+            "element responses are functions of the azimuth: give the positions in a plane"
+        )
+    wanted = f"({array.n_sensors} sensors" + (f", {n_bins} bins)" if n_bins > 1 else ")")
+    if response.n_sensors != array.n_sensors or response.n_bins not in (None, n_bins):
+        raise ValueError(
+            "the element response must have shape (n_angles, n_sensors) or (n_bins, n_angles, "
+            f"n_sensors) {wanted}; got {response.gains.shape}"
+        )

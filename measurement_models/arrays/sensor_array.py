@@ -1,0 +1,316 @@
+"""Where the sensors are, and how a plane wave reaches them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from arrivals.parameters import Model
+from arrivals.typing import Complex, Float, Int
+from arrivals.validation import count, positive, real
+
+
+def direction(doa: ArrayLike, dim: int) -> Float:
+    """Return the unit vectors, (..., dim), that point from the array to where the waves come from.
+
+    On a line `doa` is counted from broadside, positive towards growing coordinates. In a plane it
+    is the azimuth, anticlockwise from the x axis; in space, the azimuth of a horizontal wave.
+
+    Examples
+    --------
+    >>> direction(np.pi / 6, 1).round(3), direction(np.pi / 2, 2).round(3)
+    (array([0.5]), array([0., 1.]))
+    """
+    doa = np.asarray(doa, dtype=np.float64)
+    if dim == 1:
+        return np.asarray(np.sin(doa)[..., None])
+    level = [np.zeros_like(doa)] * (dim - 2)
+    return np.stack([np.cos(doa), np.sin(doa), *level], axis=-1)
+
+
+def steering_vector(positions: ArrayLike, doa: ArrayLike, wavelength: ArrayLike) -> Complex:
+    """Return the response of sensors at `positions` to plane waves of unit amplitude.
+
+    This is the one place where the sign is fixed: a sensor nearer to the source hears the wave
+    earlier, and for signals that turn as exp(+jωt), as the spectra of numpy and scipy do, its
+    phase is ahead: a = exp(+j 2π/λ p·u), u pointing to the source. Papers that write
+    exp(-j m d 2π/λ sin β) count their sensors, or their angles, the other way round.
+
+    Parameters
+    ----------
+    positions : array_like, shape (n_sensors, dim)
+        Metres.
+    doa : array_like, shape (...)
+        Directions of arrival, rad.
+    wavelength : array_like, shape broadcasting with `doa`
+        Metres.
+
+    Returns
+    -------
+    ndarray, shape (..., n_sensors)
+
+    Examples
+    --------
+    >>> steering_vector([[0.0], [0.25]], np.pi / 2, wavelength=1.0).round(6)
+    array([1.+0.j, 0.+1.j])
+    """
+    positions = np.asarray(positions, dtype=np.float64)
+    path = direction(doa, positions.shape[1]) @ positions.T
+    waves = path / np.asarray(wavelength, dtype=np.float64)[..., None]
+    return np.asarray(np.exp(2j * np.pi * waves))
+
+
+def grid_spacing(coordinates: ArrayLike, tolerance: float = 1e-3) -> float | None:
+    """Return the largest spacing of a uniform grid that holds all coordinates, or None.
+
+    A coordinate may lie off the grid by `tolerance` of its spacing, or the nth part of that if
+    the smallest gap has n spacings: a fine enough grid fits anything. Grids of more than 4096
+    points are not looked for.
+
+    Examples
+    --------
+    >>> grid_spacing([0.0, 1.5, 3.5]), grid_spacing([0.0, 1.0, 2.7183]), grid_spacing([0.0])
+    (0.5, None, None)
+    """
+    places = np.unique(np.asarray(coordinates, dtype=np.float64))
+    places = places - places[0]
+    gaps = sorted(np.diff(places).tolist())
+    finest = int(4096 * gaps[0] / places[-1]) if gaps else 0
+    for parts in range(1, finest + 1):
+        spacing, span, n_points = gaps[0] / parts, 0.0, 0
+        for gap in gaps:  # larger gaps count more points and make the spacing more exact
+            n_points += round(gap / spacing)
+            span += gap
+            spacing = span / n_points
+        off = np.abs(places - spacing * np.rint(places / spacing)).max()
+        if off <= tolerance / parts * spacing:
+            return float(spacing)
+    return None
+
+
+@dataclass(frozen=True, eq=False)
+class SensorArray(Model):
+    """Sensors at known places.
+
+    Parameters
+    ----------
+    positions : array_like, shape (n_sensors, dim) or (n_sensors,)
+        Metres; dim is 1 for a line, 2 for a plane, 3 in space.
+    speed : float, optional
+        Speed of the waves, m/s; wanted where a frequency is to be turned into a wavelength.
+    channels : sequence of int, optional
+        The recording's channel of each sensor, counted from 0; in order of the sensors if None.
+    n_channels : int, optional
+        Channels of a recording of the whole array; if None, any that has the channels named.
+
+    Raises
+    ------
+    ValueError
+        If two sensors share a place, or a number is not finite.
+
+    Examples
+    --------
+    >>> array = SensorArray.ula(4, spacing=0.5)
+    >>> array.positions.ravel()
+    array([-0.75, -0.25,  0.25,  0.75])
+    >>> array.steering_vector(np.pi / 2, wavelength=2.0).round(3)[:2]
+    array([-0.707-0.707j,  0.707-0.707j])
+    >>> array.without([1]).channels
+    (0, 2, 3)
+    """
+
+    positions: Float
+    speed: float | None = None
+    channels: Sequence[int] | Int | None = None
+    n_channels: int | None = None
+
+    def __post_init__(self) -> None:
+        positions = real("positions", self.positions)
+        positions = positions[:, None] if positions.ndim == 1 else positions
+        positions = positions + 0.0  # a copy, without the sign of -0.0, which a hash would see
+        if positions.ndim != 2 or not 1 <= positions.shape[1] <= 3 or len(positions) == 0:
+            raise ValueError(
+                "positions must have shape (n_sensors, dim), dim 1, 2 or 3; "
+                f"got {np.shape(self.positions)}"
+            )
+        if not np.isfinite(positions).all():
+            bad = int(np.argmin(np.isfinite(positions).all(axis=1)))
+            raise ValueError(f"positions must be finite; sensor {bad} is at {positions[bad]}")
+        _distinct(positions)
+        positions.setflags(write=False)
+        object.__setattr__(self, "positions", positions)
+        if self.speed is not None:
+            object.__setattr__(self, "speed", positive("speed", self.speed))
+        if self.channels is not None:
+            channels = tuple(count("channels", channel, least=0) for channel in self.channels)
+            if len(channels) != len(positions):
+                raise ValueError(
+                    f"channels must name one channel for each of the {len(positions)} sensors; "
+                    f"got {len(channels)}"
+                )
+            if len(set(channels)) != len(channels):
+                raise ValueError(f"channels must differ from each other; got {channels}")
+            object.__setattr__(self, "channels", channels)
+        if self.n_channels is not None:
+            last = max(self.channels or range(len(positions)))
+            count("n_channels", self.n_channels, least=last + 1)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, SensorArray):
+            return NotImplemented
+        return (
+            np.array_equal(self.positions, other.positions)
+            and self.speed == other.speed
+            and self.channels == other.channels
+            and self.n_channels == other.n_channels
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.positions.tobytes(), self.speed, self.channels))
+
+    @property
+    def n_sensors(self) -> int:
+        """Number of sensors."""
+        return len(self.positions)
+
+    @property
+    def dim(self) -> int:
+        """1 for a line, 2 for a plane, 3 in space."""
+        return int(self.positions.shape[1])
+
+    @property
+    def spacing(self) -> float | None:
+        """Spacing, m, of the uniform grid that a line's sensors lie on, or None."""
+        return grid_spacing(self.positions[:, 0]) if self.dim == 1 else None
+
+    @property
+    def alias_limit(self) -> float | None:
+        """Shortest wavelength, m, whose directions are unambiguous: two grid spacings of a line."""
+        spacing = self.spacing
+        return None if spacing is None else 2 * spacing
+
+    @classmethod
+    def ula(
+        cls,
+        n_sensors: int,
+        spacing: float,
+        *,
+        missing: Iterable[int] = (),
+        speed: float | None = None,
+    ) -> SensorArray:
+        """Make a uniform line about the origin; `missing` names sensors, from 0, to leave out."""
+        places = np.arange(count("n_sensors", n_sensors), dtype=np.float64) - (n_sensors - 1) / 2
+        return cls(places * positive("spacing", spacing), speed).without(missing)
+
+    @classmethod
+    def uca(
+        cls,
+        n_sensors: int,
+        radius: float,
+        *,
+        missing: Iterable[int] = (),
+        speed: float | None = None,
+    ) -> SensorArray:
+        """Make a uniform circle about the origin, the first sensor on the x axis, anticlockwise."""
+        angle = 2 * np.pi * np.arange(count("n_sensors", n_sensors, least=2)) / n_sensors
+        return cls(positive("radius", radius) * direction(angle, 2), speed).without(missing)
+
+    @classmethod
+    def symmetric(
+        cls,
+        distances: ArrayLike,
+        *,
+        missing: Iterable[int] = (),
+        speed: float | None = None,
+    ) -> SensorArray:
+        """Make a line with a sensor in the centre and one at each distance, m, on either side."""
+        d = np.sort(real("distances", distances)).astype(np.float64)
+        if d.ndim != 1 or len(d) == 0 or not (d > 0).all():
+            raise ValueError(f"distances must be a list of positive numbers; got {distances!r}")
+        return cls(np.concatenate([-d[::-1], [0.0], d]), speed).without(missing)
+
+    @classmethod
+    def from_csv(cls, path: str | Path, *, speed: float | None = None) -> SensorArray:
+        """Read positions, one sensor a row, columns x, y, z in metres; see `array_files`."""
+        from arrivals.measurement_models.arrays.files import from_csv
+
+        return from_csv(path, speed=speed)
+
+    @classmethod
+    def from_toml(cls, path: str | Path) -> SensorArray:
+        """Read an array file; see `array_files` for its keys."""
+        from arrivals.measurement_models.arrays.files import from_toml
+
+        return from_toml(path)
+
+    def without(self, sensors: Iterable[int]) -> SensorArray:
+        """Return the array less some sensors, named by index; the others keep their channels."""
+        gone = sorted({count("sensor", sensor, least=0) for sensor in sensors})
+        if not gone:
+            return self
+        if gone[-1] >= self.n_sensors:
+            raise ValueError(f"sensor {gone[-1]} is not there: the array has {self.n_sensors}")
+        if len(gone) == self.n_sensors:
+            raise ValueError("no sensor would be left")
+        kept = np.setdiff1d(np.arange(self.n_sensors), gone)
+        if self.channels is None:
+            return SensorArray(self.positions[kept], self.speed, kept, self.n_sensors)
+        channels = np.array(self.channels)[kept]
+        return SensorArray(self.positions[kept], self.speed, channels, self.n_channels)
+
+    def steering_vector(self, doa: ArrayLike, wavelength: ArrayLike) -> Complex:
+        """Return the response to plane waves from `doa` (...), rad: shape (..., n_sensors)."""
+        return steering_vector(self.positions, doa, wavelength)
+
+    def wavelength(self, frequency: float) -> float:
+        """Return the wavelength, m, at a frequency, Hz, from the array's wave speed."""
+        if self.speed is None:
+            raise ValueError("the array has no wave speed: give speed, m/s")
+        return self.speed / positive("frequency", frequency)
+
+    def select(self, samples: ArrayLike) -> Any:
+        """Return the sensors' channels of a recording, (..., n_channels) -> (..., n_sensors).
+
+        A recording with one channel for each sensor is taken as it is where the channels named
+        do not fit: missing elements were not recorded then.
+
+        Raises
+        ------
+        ValueError
+            If the recording has too few channels, or too many.
+
+        Examples
+        --------
+        >>> SensorArray.ula(3, 0.5, missing=[1]).select([[10, 11, 12]])
+        array([[10, 12]])
+        """
+        samples = np.asarray(samples)
+        n_channels = samples.shape[-1] if samples.ndim else 0
+        channels = range(self.n_sensors) if self.channels is None else self.channels
+        wanted = self.n_sensors if self.channels is None else self.n_channels
+        if n_channels == wanted or (wanted is None and n_channels > max(channels)):
+            return samples[..., list(channels)]
+        if n_channels == self.n_sensors:
+            return samples
+        other = f"at least {max(channels) + 1}" if wanted is None else str(wanted)
+        others = "" if wanted == self.n_sensors else f" or {other}"
+        raise ValueError(
+            f"the array wants {self.n_sensors}{others} channels; the recording has {n_channels}"
+        )
+
+
+def _distinct(positions: Float) -> None:
+    """Raise a ValueError if two sensors share a place."""
+    order = np.lexsort(positions.T)
+    same = (np.diff(positions[order], axis=0) == 0).all(axis=1)
+    if same.any():
+        first = int(np.argmax(same))
+        one, other = sorted(order[first : first + 2].tolist())
+        place = ", ".join(f"{x:g}" for x in positions[one])
+        which = f"numbers {one + 1} and {other + 1} of {len(positions)}"
+        raise ValueError(f"two sensors share the position ({place}) m: {which}")

@@ -1,0 +1,150 @@
+"""Real samples of a line array that hears one source: where angles become delays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from arrivals.measurement_models.arrays.sensor_array import SensorArray
+from arrivals.measurement_models.delays.source_correlation import SourceCorrelation
+from arrivals.parameters import Model
+from arrivals.typing import Float, Int
+from arrivals.validation import instance, number, positive
+
+
+@dataclass(frozen=True)
+class ArraySamples(Model):
+    """What a line array samples of one source: y_j(k) = s(k - jΔ) + v_j(k).
+
+    This is the door between angles and delays. The method's papers count the sensors j in the
+    order in which a wave from a positive angle passes them. Here a sensor at a larger coordinate
+    is nearer to a source at a positive `doa` and hears it earlier, so that j counts from the
+    largest coordinate downwards, and Δ = κ sin β, κ = rate · spacing / speed.
+
+    Parameters
+    ----------
+    array : SensorArray
+        A line on a uniform grid, gaps allowed, with a wave speed.
+    rate : float
+        Samples per second, Hz.
+    correlation : SourceCorrelation
+        Of the source, its frequencies in cycles per sample.
+    snr_db : float
+        Power of the source over that of the noise, at one sensor.
+    power : float, optional
+        Power of the source at one sensor; if None, a tracker learns it from what it hears.
+
+    Attributes
+    ----------
+    kappa : float
+        κ, the delay between neighbouring grid points at endfire, samples.
+    places : ndarray of int, shape (n_sensors,)
+        Grid point of each sensor, counted from the largest coordinate.
+
+    Raises
+    ------
+    ValueError
+        If the array is no such line, or its grid is wider than half the shortest wavelength, so
+        that directions would be ambiguous.
+
+    Notes
+    -----
+    Shapes: one real sample of every sensor, (..., n_sensors), is a snapshot. Delays in samples,
+    directions from broadside in rad.
+
+    Examples
+    --------
+    >>> from arrivals.measurement_models import Tones
+    >>> array = SensorArray.ula(10, spacing=0.5, speed=1000.0)
+    >>> model = ArraySamples(array, rate=4000.0, correlation=Tones(0.25), snr_db=5.0)
+    >>> model.kappa, model.delay([np.pi / 6]).round(6), model.doa([1.0]).round(6)
+    (2.0, array([1.]), array([0.523599]))
+    """
+
+    array: SensorArray
+    rate: float
+    correlation: SourceCorrelation
+    snr_db: float = 0.0
+    power: float | None = None
+    kappa: float = field(init=False, repr=False, compare=False)
+    places: Int = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        instance("array", self.array, SensorArray)
+        instance("correlation", self.correlation, SourceCorrelation)  # type: ignore[type-abstract]  # any
+        positive("rate", self.rate)
+        number("snr_db", self.snr_db)
+        if self.power is not None:
+            positive("power", self.power)
+        spacing = self.array.spacing
+        if spacing is None:
+            raise ValueError(
+                "delays between neighbours need a line of two sensors or more on a uniform grid "
+                f"(gaps are allowed); this array has {self.array.n_sensors} sensors in "
+                f"{self.array.dim} dimension(s) on no such grid"
+            )
+        if self.array.speed is None:
+            raise ValueError("the array has no wave speed: give speed, m/s")
+        p = self.array.positions[:, 0]
+        places = np.rint((p.max() - p) / spacing).astype(np.int64)
+        places.setflags(write=False)
+        object.__setattr__(self, "kappa", self.rate * spacing / self.array.speed)
+        object.__setattr__(self, "places", places)
+        if 2 * self.correlation.highest * self.kappa > 1 + 1e-6:
+            limit = self.rate / (2 * self.kappa)
+            raise ValueError(
+                f"the source reaches up to {self.correlation.highest * self.rate:.6g} Hz, above "
+                f"the array's alias limit, {limit:.6g} Hz: directions are ambiguous"
+            )
+
+    @property
+    def noise_ratio(self) -> float:
+        """ε, noise power over source power."""
+        return float(10 ** (-self.snr_db / 10))
+
+    @property
+    def n_places(self) -> int:
+        """Number of grid points from the first sensor to the last."""
+        return int(self.places.max()) + 1
+
+    def frame(self, z: ArrayLike) -> Float:
+        """Return snapshots on the grid: (..., n_sensors) -> (..., n_places), NaN where none is.
+
+        Raises
+        ------
+        TypeError
+            If the numbers are not real.
+        ValueError
+            If there is not one number a sensor.
+        """
+        z = np.asarray(z)
+        if z.dtype.kind not in "biuf":
+            raise TypeError(f"a snapshot must hold real samples; got {z.dtype}")
+        if z.ndim == 0 or z.shape[-1] != self.array.n_sensors:
+            raise ValueError(
+                f"a snapshot must have shape (..., {self.array.n_sensors}), one sample a sensor; "
+                f"got {z.shape}"
+            )
+        frame = np.full((*z.shape[:-1], self.n_places), np.nan)
+        frame[..., self.places] = np.where(np.isfinite(z), z, np.nan)
+        return frame
+
+    def delay(self, doa: ArrayLike) -> Float:
+        """Return the delay between neighbours, samples, of directions, rad."""
+        return np.asarray(self.kappa * np.sin(doa))
+
+    def doa(self, delay: ArrayLike) -> Float:
+        """Return the directions, rad, of delays, samples; those beyond ±κ are at endfire."""
+        return np.asarray(np.arcsin(np.clip(np.asarray(delay) / self.kappa, -1, 1)))
+
+    def delay_std(self, doa: ArrayLike, std: ArrayLike) -> Float:
+        """Return standard deviations of delays, samples, of directions known to `std`, rad."""
+        return np.asarray(self.kappa * np.cos(doa) * np.asarray(std))
+
+    def doa_std(self, delay: ArrayLike, std: ArrayLike) -> Float:
+        """Return standard deviations of directions, rad; cos β is taken as 0.05 at least."""
+        return np.asarray(
+            np.asarray(std) / (self.kappa * np.maximum(np.cos(self.doa(delay)), 0.05))
+        )

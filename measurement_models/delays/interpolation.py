@@ -1,0 +1,267 @@
+"""A sensor's sample from its neighbour's, by interpolation at the delay between them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from arrivals.measurement_models.base import MeasurementModel
+from arrivals.measurement_models.delays.source_correlation import SourceCorrelation
+from arrivals.parameters import Model
+from arrivals.typing import Float
+from arrivals.validation import count, instance, not_negative, positive, real
+
+
+def window(reach: float) -> tuple[int, ...]:
+    """Return the offsets of the taps that interpolate well at every delay within ±reach.
+
+    Examples
+    --------
+    >>> window(2.0)
+    (-3, -2, -1, 0, 1, 2, 3, 4)
+    """
+    return tuple(range(math.floor(1e-9 - reach) - 1, math.ceil(reach - 1e-9) + 3))
+
+
+@dataclass(frozen=True)
+class DelayInterpolator(Model):
+    """The linear least-squares estimate of s(k - τ) from s(k - o₁), ..., s(k - o_L).
+
+    Parameters
+    ----------
+    correlation : SourceCorrelation
+    offsets : sequence of int
+        o, samples; negative ones are later samples. (0, 1) are the paper's two.
+    loading : float
+        ε_c, noise power over source power that the taps are taken to carry. 0 gives the paper's
+        coefficients; with the true ratio the noise biases no delay.
+
+    Raises
+    ------
+    ValueError
+        If the offsets repeat, or so many taps are singular without loading.
+
+    Notes
+    -----
+    Shapes: delays (...), coefficients (..., n_taps). Units: samples.
+
+    References
+    ----------
+    Radhakrishnan, Unnikrishnan and Balakrishnan, (4), after Pridham and Mucci, Proc. IEEE 67(6),
+    1979. In (3) and (11) the same coefficients stand at an index one too high, which would bias
+    the delay by one sample; they are used here as (4) defines them.
+
+    Examples
+    --------
+    A quarter of a period late, a tone is what it was one sample before:
+
+    >>> from arrivals.measurement_models import Tones
+    >>> DelayInterpolator(Tones(0.25)).coefficients(1.0).round(6) + 0.0
+    array([0., 1.])
+    """
+
+    correlation: SourceCorrelation
+    offsets: Sequence[int] = (0, 1)
+    loading: float = 0.0
+    r0: Float = field(init=False, repr=False, compare=False)
+    G: Float = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        instance("correlation", self.correlation, SourceCorrelation)  # type: ignore[type-abstract]  # any
+        not_negative("loading", self.loading)
+        offsets = tuple(count("offsets", offset, least=-10_000) for offset in self.offsets)
+        if not offsets or len(set(offsets)) < len(offsets):
+            raise ValueError(f"offsets must be different whole numbers; got {self.offsets}")
+        object.__setattr__(self, "offsets", offsets)
+        r0 = self.correlation.rho(np.subtract.outer(offsets, offsets))
+        r = r0 + self.loading * np.eye(len(offsets))
+        if np.linalg.cond(r) > 1e12:
+            raise ValueError(
+                f"{len(offsets)} taps on this source are singular without loading; give a loading "
+                f"of 1e-9 at least, got {self.loading}"
+            )
+        for name, matrix in (("r0", r0), ("G", np.linalg.inv(r))):
+            matrix.setflags(write=False)
+            object.__setattr__(self, name, matrix)
+
+    @property
+    def n_taps(self) -> int:
+        """Number of taps."""
+        return len(self.offsets)
+
+    def coefficients(self, tau: ArrayLike) -> Float:
+        """Return c(τ) = G p(τ), p = ρ(τ - o): (...) -> (..., n_taps)."""
+        return self._solved(self.correlation.rho(self._lags(tau)))
+
+    def jacobian(self, tau: ArrayLike) -> Float:
+        """Return dc/dτ = G p'(τ): (...) -> (..., n_taps)."""
+        return self._solved(self.correlation.drho(self._lags(tau)))
+
+    def error_variance(self, tau: ArrayLike, noise_ratio: float = 0.0) -> Float:
+        """Return 1 - 2cᵀp + cᵀ(r₀ + εI)c, the power of the error over that of the source.
+
+        It holds the interpolation error, and the noise of taps with the ratio ε.
+        """
+        p = self.correlation.rho(self._lags(tau))
+        return self._error(self._solved(p), p, noise_ratio)
+
+    def linearise(self, tau: ArrayLike, noise_ratio: float = 0.0) -> tuple[Float, Float]:
+        """Return coefficients with their derivatives, (..., 2, n_taps), and the error variance."""
+        lags = self._lags(tau)
+        p, dp = self.correlation.rho(lags), self.correlation.drho(lags)
+        both: Float = np.stack([p, dp], axis=-2) @ self.G
+        return both, self._error(both[..., 0, :], p, noise_ratio)
+
+    def _lags(self, tau: ArrayLike) -> Float:
+        tau = np.asarray(tau, dtype=np.float64)
+        return np.asarray(tau[..., None] - np.array(self.offsets, dtype=np.float64))
+
+    def _solved(self, p: Float) -> Float:
+        return np.asarray((p[..., None, :] @ self.G)[..., 0, :])
+
+    def _error(self, c: Float, p: Float, noise_ratio: float) -> Float:
+        mixed = (c[..., None, :] @ self.r0)[..., 0, :] + noise_ratio * c - 2 * p
+        return np.asarray(1 + (mixed * c).sum(axis=-1))
+
+
+@dataclass(frozen=True, eq=False)
+class InterpolationDelay(MeasurementModel):
+    """Sensors of a line as their neighbours foretell them: z = X c(mΔ), of variance R(mΔ).
+
+    The samples X of the neighbours are known inputs: bind them by `replace(regressors=X)`, or
+    hand them to `h` and `H`, as filterpy's filters do. The delay Δ is element 0 of the state,
+    whatever follows it.
+
+    Parameters
+    ----------
+    interpolator : DelayInterpolator
+    n_sensors : int
+        Sensors j = 0, 1, ... in the order of growing delay.
+    noise_ratio : float
+        ε, noise power over source power; the data are scaled to a source of power 1.
+    baseline : int
+        m: sensor j is foretold from j - m; a negative one runs backwards along the array.
+    inflation : float
+        Factor on R, for residuals that share samples with those of other baselines.
+    regressors : ndarray, shape (..., n_sensors - abs(m), n_taps), optional
+        X, the samples of the present snapshot.
+
+    Notes
+    -----
+    Shapes: states (..., dim_x), measurements (..., n_sensors - abs(m)). Units: samples.
+
+    References
+    ----------
+    Radhakrishnan, Unnikrishnan and Balakrishnan, (9)-(11), with the state reduced to Δ: the
+    noise of the regressors is in R, and H holds the slope of the coefficients, which the paper's
+    H leaves out.
+
+    Examples
+    --------
+    >>> from arrivals.measurement_models import Tones
+    >>> model = InterpolationDelay(DelayInterpolator(Tones(0.25)), n_sensors=3, noise_ratio=0.1)
+    >>> frames = np.cos(np.pi / 2 * (np.arange(2)[:, None] - 0.5 * np.arange(3)))
+    >>> z, X = model.split(frames)
+    >>> model.residual(z, model.h([0.5], X)).round(6) + 0.0
+    array([0., 0.])
+    """
+
+    interpolator: DelayInterpolator
+    n_sensors: int
+    noise_ratio: float
+    baseline: int = 1
+    inflation: float = 1.0
+    regressors: Float | None = None
+
+    def __post_init__(self) -> None:
+        instance("interpolator", self.interpolator, DelayInterpolator)
+        not_negative("noise_ratio", self.noise_ratio)
+        positive("inflation", self.inflation)
+        if not 1 <= abs(self.baseline) < count("n_sensors", self.n_sensors, least=2):
+            raise ValueError(
+                f"baseline must be a number of steps from 1 to {self.n_sensors - 1}, or its "
+                f"negative; got {self.baseline}"
+            )
+
+    @property
+    def dim_z(self) -> int:
+        """Number of sensors that have a neighbour to be foretold from."""
+        return self.n_sensors - abs(self.baseline)
+
+    @property
+    def latency(self) -> int:
+        """Number of snapshots after its own that a measurement waits for."""
+        return max(0, -min(self.interpolator.offsets))
+
+    @property
+    def memory(self) -> int:
+        """Number of snapshots before its own that a measurement needs."""
+        return max(0, *self.interpolator.offsets)
+
+    def split(self, frames: ArrayLike, k: int | None = None) -> tuple[Float, Float]:
+        """Return measurement and regressors of snapshot k, (n,) and (n, n_taps).
+
+        Parameters
+        ----------
+        frames : array_like, shape (..., n_snapshots, n_sensors)
+        k : int, optional
+            The last one for which all taps are there if None.
+        """
+        frames = np.asarray(frames, dtype=np.float64)
+        k = frames.shape[-2] - 1 - self.latency if k is None else k
+        if not self.memory <= k < frames.shape[-2] - self.latency:
+            raise ValueError(f"snapshot {k} of {frames.shape[-2]} lacks taps on one side")
+        n, m = self.dim_z, self.baseline
+        first, source = (m, 0) if m > 0 else (0, -m)
+        at = k - np.array(self.interpolator.offsets)
+        taps = np.take(frames[..., source : source + n], at, axis=-2)
+        return frames[..., k, first : first + n], np.swapaxes(taps, -1, -2)
+
+    def linearise(self, delay: ArrayLike) -> tuple[Float, Float]:
+        """Return c(mΔ) with c'(mΔ), (..., 2, n_taps), and R(mΔ), (...), for delays (...)."""
+        tau = self.baseline * np.asarray(delay)
+        taps, error = self.interpolator.linearise(tau, self.noise_ratio)
+        return taps, self.inflation * (self.noise_ratio + error)
+
+    def h(self, x: ArrayLike, regressors: ArrayLike | None = None) -> Float:
+        """Return the samples foretold for states: X c(mΔ), (..., dim_x) -> (..., dim_z)."""
+        c = self.interpolator.coefficients(self.baseline * _delay(x))
+        return np.asarray((self._inputs(regressors) @ c[..., None])[..., 0])
+
+    def H(self, x: ArrayLike, regressors: ArrayLike | None = None) -> Float:
+        """Return the Jacobian of `h` at one state: m X c'(mΔ) in column 0, (dim_z, dim_x)."""
+        dc = self.interpolator.jacobian(self.baseline * _delay(x))
+        slope = np.zeros((self.dim_z, np.shape(x)[-1]))
+        slope[:, 0] = self.baseline * self._inputs(regressors) @ dc
+        return slope
+
+    def variance(self, x: ArrayLike) -> Float:
+        """Return the variance of each residual at states, R(mΔ): (..., dim_x) -> (...)."""
+        return self.linearise(_delay(x))[1]
+
+    @property
+    def R(self) -> Float:
+        """Covariance of the residuals at broadside; `variance` gives it at any state."""
+        return float(self.variance(np.zeros(1))) * np.eye(self.dim_z)
+
+    def _inputs(self, regressors: ArrayLike | None) -> Float:
+        given = self.regressors if regressors is None else np.asarray(regressors, dtype=np.float64)
+        if given is None:
+            raise ValueError("h and H need the neighbours' samples: pass or bind regressors")
+        wanted = (self.dim_z, self.interpolator.n_taps)
+        if given.shape[-2:] != wanted:
+            raise ValueError(f"regressors must have shape (..., {wanted[0]}, {wanted[1]}); "
+                             f"got {given.shape}")  # fmt: skip
+        return given
+
+
+def _delay(x: ArrayLike) -> Float:
+    """Return element 0 of states (..., dim_x)."""
+    x = real("x", x)
+    if x.ndim == 0:
+        raise ValueError("states must have shape (..., dim_x); got a number")
+    return x[..., 0]

@@ -1,0 +1,222 @@
+"""Symmetric line arrays by real numbers: the odd-unitary transformation of their snapshots."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from arrivals.measurement_models.array_snapshot import composite
+from arrivals.measurement_models.arrays.sensor_array import SensorArray
+from arrivals.measurement_models.base import MeasurementModel
+from arrivals.typing import Complex, Float, Int
+from arrivals.validation import instance, positive, shaped, state
+
+
+@dataclass(frozen=True)
+class ArrayManifold(MeasurementModel):
+    """What a symmetric array with a centre sensor hears, turned so that its response is real.
+
+    Sums and differences of the two sensors of a pair turn a(β) into
+    [√2 cos φ_1 ... √2 cos φ_M, 1, √2 sin φ_1 ... √2 sin φ_M], φ_m = 2π d_m/λ sin β, the inner pair
+    first. Both rows of a pair belong to the same distance.
+
+    Parameters
+    ----------
+    array : SensorArray
+        A line, symmetric about a sensor in its centre: `SensorArray.symmetric`.
+    wavelength : float
+        Metres; at least twice the distance of the inner pair.
+    noise : float
+        Variance of the complex noise of one sensor; the transformation leaves it white.
+
+    Raises
+    ------
+    ValueError
+        If the array is not symmetric, has no centre sensor, or its inner pair is ambiguous.
+
+    Notes
+    -----
+    Shapes: snapshots (..., n_sensors), complex; directions (..., n_sources), rad. The Gaussian
+    face is that of one source with a state [β, Re w, Im w], and its measurements are real,
+    `composite(transform(snapshot))`.
+
+    References
+    ----------
+    Gu, Chan, Zhu and Swamy, IEEE TCAS-II 60(1), 2013. Our rows √2 Re, 1, √2 Im; the report on
+    that paper prints another scale and order, with which the transformed response is not real.
+
+    Examples
+    --------
+    >>> manifold = ArrayManifold(SensorArray.symmetric([0.25, 0.5]), wavelength=1.0)
+    >>> a = manifold.real_steering(np.pi / 2)
+    >>> a.round(3)
+    array([ 0.   , -1.414,  1.   ,  1.414,  0.   ])
+    >>> z = manifold.array.steering_vector(np.pi / 2, 1.0)
+    >>> bool(abs(manifold.transform(z) - a).max() < 1e-15)
+    True
+    """
+
+    array: SensorArray
+    wavelength: float
+    noise: float = 1.0
+
+    def __post_init__(self) -> None:
+        instance("array", self.array, SensorArray)
+        positive("wavelength", self.wavelength)
+        positive("noise", self.noise)
+        _pairs(self.array)
+        inner = self.distances[0]
+        if inner > 0.5 * (1 + 1e-6):
+            raise ValueError(
+                f"the inner pair must lie at most half a wavelength, {self.wavelength / 2:.6g} m, "
+                f"from the centre; it lies {inner * self.wavelength:.6g} m from it: directions "
+                "are ambiguous"
+            )
+
+    @property
+    def distances(self) -> Float:
+        """Distances of the pairs from the centre in wavelengths, (n_pairs,), the inner first."""
+        left, _, right = _pairs(self.array)
+        places = self.array.positions[:, 0]
+        return np.asarray((places[right] - places[left]) / (2 * self.wavelength))
+
+    @property
+    def n_pairs(self) -> int:
+        """M, of 2M + 1 sensors."""
+        return self.array.n_sensors // 2
+
+    @property
+    def T(self) -> Complex:
+        """The unitary matrix (n_sensors, n_sensors), a real response is Tᴴ a."""
+        return _transformation(self.array)
+
+    @property
+    def centre(self) -> int:
+        """Row of the ones, which settles scale and sign of the sources."""
+        return self.n_pairs
+
+    def transform(self, z: ArrayLike) -> Complex:
+        """Return Tᴴ z of snapshots (..., n_sensors); the noise stays white."""
+        return np.asarray(np.asarray(z) @ self.T.conj())
+
+    def phases(self, doa: ArrayLike) -> Float:
+        """Return φ_m of directions (...), rad: shape (..., n_pairs)."""
+        u = np.sin(np.asarray(doa, dtype=np.float64))
+        return np.asarray(2 * np.pi * self.distances * u[..., None])
+
+    def real_steering(self, doa: ArrayLike) -> Float:
+        """Return the response to directions (...), rad: shape (..., n_sensors), real."""
+        phi = self.phases(doa)
+        root = np.sqrt(2.0)
+        ones = np.ones((*phi.shape[:-1], 1))
+        return np.concatenate([root * np.cos(phi), ones, root * np.sin(phi)], axis=-1)
+
+    def doa(self, phases: ArrayLike) -> Float:
+        """Return the directions, rad, of the pairs' phases, each known up to whole turns.
+
+        Parameters
+        ----------
+        phases : array_like, shape (..., n_pairs)
+            rad, the inner pair first.
+
+        Returns
+        -------
+        ndarray, shape (...)
+            arcsin of the least-squares fit of sin β, cut to ±1. Each pair takes the whole turns
+            that come nearest to the fit of those inside it: right as long as the fit is off by
+            less than half a wavelength over the pair's distance.
+
+        Examples
+        --------
+        >>> wide = ArrayManifold(SensorArray.symmetric([0.5, 4.0]), wavelength=1.0)
+        >>> turns = 2 * np.pi * np.array([0, -3])
+        >>> wide.doa(wide.phases(0.8) + turns).round(6)
+        np.float64(0.8)
+        """
+        d, given = 2 * np.pi * self.distances, np.asarray(phases, dtype=np.float64)
+        if given.shape[-1:] != d.shape:
+            raise ValueError(f"phases must have shape (..., {len(d)}); got {given.shape}")
+        phi = np.moveaxis(given, -1, 0)
+        num, den = d[0] * phi[0], d[0] ** 2  # equal noise in all phases: weights d²
+        for d_m, phi_m in zip(d[1:], phi[1:], strict=True):
+            turns = np.rint((d_m * num / den - phi_m) / (2 * np.pi))
+            num, den = num + d_m * (phi_m + 2 * np.pi * turns), den + d_m**2
+        return np.asarray(np.arcsin(np.clip(num / den, -1.0, 1.0)))
+
+    # The Gaussian face
+
+    @property
+    def dim_z(self) -> int:
+        """Twice the number of sensors: real and imaginary parts."""
+        return 2 * self.array.n_sensors
+
+    @property
+    def R(self) -> Float:
+        """Covariance of the composite noise: half the variance for each part."""
+        return self.noise / 2 * np.eye(self.dim_z)
+
+    def h(self, x: ArrayLike) -> Float:
+        """Return the transformed snapshot of states [β, Re w, Im w]: (..., 3) -> (..., dim_z)."""
+        doa, re, im = np.moveaxis(state(x, 3), -1, 0)
+        return composite((re + 1j * im)[..., None] * self.real_steering(doa))
+
+    def H(self, x: ArrayLike) -> Float:
+        """Return the Jacobian of `h` at one state, (dim_z, 3)."""
+        doa, re, im = shaped("x", x, 3)
+        a, slope = self.real_steering(doa), self.slope(doa)
+        return np.stack([composite((re + 1j * im) * slope), composite(a), composite(1j * a)]).T
+
+    def slope(self, doa: ArrayLike) -> Float:
+        """Return the derivative of `real_steering`, √2 φ'_m (-sin φ_m, cos φ_m); same shape."""
+        doa = np.asarray(doa, dtype=np.float64)
+        phi = self.phases(doa)
+        rate = np.sqrt(2.0) * 2 * np.pi * self.distances * np.cos(doa)[..., None]
+        zeros = np.zeros((*phi.shape[:-1], 1))
+        return np.concatenate([-rate * np.sin(phi), zeros, rate * np.cos(phi)], axis=-1)
+
+
+@lru_cache(maxsize=64)
+def _pairs(array: SensorArray) -> tuple[Int, int, Int]:
+    """Return the sensors left of the centre, the centre, and those right of it, inner first.
+
+    Raises
+    ------
+    ValueError
+        If the array is not a line, has no centre sensor, or is not symmetric about it.
+    """
+    if array.dim != 1:
+        raise ValueError(f"the array must be a line; its sensors lie in {array.dim} dimensions")
+    places = array.positions[:, 0]
+    order = np.argsort(places)
+    n = len(order)
+    if n < 3 or n % 2 == 0:
+        raise ValueError(
+            f"the array must have a centre sensor and pairs about it, 3, 5, ... sensors; it has {n}"
+        )
+    middle = int(order[n // 2])
+    left, right = order[: n // 2][::-1], order[n // 2 + 1 :]
+    off = np.abs(places[left] + places[right] - 2 * places[middle])
+    worst = int(np.argmax(off))
+    if off[worst] > 1e-6 * np.ptp(places):
+        raise ValueError(
+            "the array must be symmetric about its centre sensor; those at "
+            f"{places[left[worst]]:g} and {places[right[worst]]:g} m are not, about "
+            f"{places[middle]:g} m"
+        )
+    return left, middle, right
+
+
+@lru_cache(maxsize=64)
+def _transformation(array: SensorArray) -> Complex:
+    left, middle, right = _pairs(array)
+    M = len(left)
+    T = np.zeros((2 * M + 1, 2 * M + 1), dtype=np.complex128)
+    pair = np.arange(M)
+    T[right, pair] = T[left, pair] = np.sqrt(0.5)
+    T[middle, M] = 1.0
+    T[right, M + 1 + pair], T[left, M + 1 + pair] = 1j * np.sqrt(0.5), -1j * np.sqrt(0.5)
+    T.setflags(write=False)
+    return T

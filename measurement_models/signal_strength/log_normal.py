@@ -1,0 +1,272 @@
+"""Received signal strength of several sources at sensors, as log-normal readings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from arrivals.measurement_models.base import MeasurementModel
+from arrivals.measurement_models.signal_strength.arguments import (
+    entries,
+    gains,
+    moments,
+    per_sensor,
+)
+from arrivals.measurement_models.signal_strength.decibels import neper_to_db
+from arrivals.measurement_models.signal_strength.envelope import sample_log_envelope
+from arrivals.measurement_models.signal_strength.path_loss import Field, Levels, slopes
+from arrivals.typing import Float
+from arrivals.validation import constant, count, number, positive, real
+
+FARTHEST = 40.0  # Np, 347 dB: what lies beyond is in another unit
+
+
+@dataclass(frozen=True, eq=False, init=False)
+class LogNormalRSS(MeasurementModel):
+    """Log readings of signal strength, ξ ~ N(log σ_y, r), σ_y² = Σ e^{2u} R^-α + σ_n².
+
+    Parameters
+    ----------
+    sensors : array_like, shape (n_sensors, 2)
+        m.
+    sigma : float or array_like, shape (n_sensors,), optional
+        Standard deviation of the readings, Np: measured data want their shadowing here. If None,
+        readings average snapshots, and it is 1/(2√N).
+    n_snapshots : int
+        N, snapshots of the envelope in one reading.
+    alpha : float
+        Loss exponent: received power falls as R^-α. A slope of 10 n dB a decade is α = n.
+    log_noise : float or array_like, shape (n_sensors,), optional
+        Log amplitude of the noise, Np; without noise if None.
+    offsets : float or array_like, shape (n_sensors,)
+        Log gains of the sensors, Np, of source and noise alike.
+    log_gain : array_like, shape (n_sensors,) or (n_sources, n_sensors), optional
+        Known log gains of the sources' way to the sensors, Np, as `doppler_log_gain` gives them.
+    r_min : float
+        Ranges are not below this, m.
+    exact_moments : bool
+        Expect the exact mean log σ_y + ½(ψ(N) - ln N), with variance ¼ψ'(N), in place of
+        log σ_y and 1/4N. Of no effect with `sigma`.
+    position : tuple of two int
+        Entries of one source's state that are x and y: (0, 2) for `ConstantVelocity` and
+        `CoordinatedTurn`, (0, 1) for `RandomWalk`.
+    amplitude : int, optional
+        Entry of one source's state that is u, its log amplitude at 1 m, Np; if None, all u are
+        `log_amplitude`.
+    log_amplitude : float
+        u of all sources where the state has none, Np.
+    n_sources : int
+        States hold as many sources, one after the other, with equally many entries each.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a number is out of range, a shape is wrong, or an entry of the state is named twice.
+
+    Notes
+    -----
+    Shapes: states (..., n_sources · n), measurements (..., n_sensors). Units: m and Np,
+    1 dB = ln(10)/20 Np; `db_to_neper` and `dbm_to_neper` convert. Below `r_min` the level has no
+    slope. A missing reading is NaN. What holds the positions and log amplitudes apart, as
+    `rss_vb` does, calls `levels`.
+
+    References
+    ----------
+    Cevher, Sankaranarayanan, Chellappa, "Factorized variational approximations for acoustic multi
+    source localization", ICASSP 2008, (1)-(3), (9).
+
+    Examples
+    --------
+    >>> heard = LogNormalRSS([[0.0, 0.0], [60.0, 0.0]], position=(0, 1), amplitude=2)
+    >>> heard.h([30.0, 40.0, 9.0]).round(3)
+    array([5.088, 5.088])
+    >>> heard.H([30.0, 40.0, 9.0]).round(3)
+    array([[-0.012, -0.016,  1.   ],
+           [ 0.012, -0.016,  1.   ]])
+    """
+
+    sensors: Float
+    sigma: float | Float | None
+    n_snapshots: int
+    alpha: float
+    log_noise: float | Float | None
+    offsets: float | Float
+    log_gain: Float | None
+    r_min: float
+    exact_moments: bool
+    position: tuple[int, int]
+    amplitude: int | None
+    log_amplitude: float
+    n_sources: int
+    _bias: ClassVar[float]  # of the object, yet no parameters
+    _variance: ClassVar[Float]
+    _noise: ClassVar[float | Float]
+
+    def __init__(
+        self,
+        sensors: ArrayLike,
+        sigma: float | ArrayLike | None = None,
+        *,
+        n_snapshots: int = 50,
+        alpha: float = 2.0,
+        log_noise: float | ArrayLike | None = None,
+        offsets: float | ArrayLike = 0.0,
+        log_gain: ArrayLike | None = None,
+        r_min: float = 1.0,
+        exact_moments: bool = False,
+        position: tuple[int, int] = (0, 2),
+        amplitude: int | None = None,
+        log_amplitude: float = 0.0,
+        n_sources: int = 1,
+    ) -> None:
+        places = constant("sensors", sensors)
+        if places.shape[1] != 2:
+            raise ValueError(f"sensors must have shape (n_sensors, 2); got {places.shape}")
+        n = len(places)
+        own: dict[str, Any] = {
+            "sensors": places,
+            "sigma": None if sigma is None else per_sensor("sigma", sigma, n),
+            "n_snapshots": count("n_snapshots", n_snapshots),
+            "alpha": positive("alpha", alpha),
+            "log_noise": None if log_noise is None else per_sensor("log_noise", log_noise, n),
+            "offsets": per_sensor("offsets", offsets, n),
+            "log_gain": None if log_gain is None else gains(log_gain, n),
+            "r_min": positive("r_min", r_min),
+            "exact_moments": bool(exact_moments),
+            "log_amplitude": number("log_amplitude", log_amplitude),
+            "n_sources": count("n_sources", n_sources),
+        }
+        own["position"], own["amplitude"] = entries(position, amplitude)
+        if own["sigma"] is not None and not np.all(np.asarray(own["sigma"]) > 0):
+            raise ValueError(f"sigma must be positive; got {sigma!r}")
+        own["_noise"] = -np.inf if own["log_noise"] is None else own["log_noise"]
+        own["_bias"], own["_variance"] = moments(
+            own["sigma"], own["n_snapshots"], own["exact_moments"], n
+        )
+        for name, value in own.items():
+            object.__setattr__(self, name, value)
+
+    @property
+    def dim_z(self) -> int:
+        """One reading a sensor."""
+        return len(self.sensors)
+
+    @property
+    def variance(self) -> Float:
+        """Variances r of the readings, Np², (n_sensors,); not to be written to."""
+        return self._variance
+
+    @property
+    def R(self) -> Float:
+        """Covariance of the readings, Np²: `variance` on the diagonal."""
+        return np.diag(self._variance)
+
+    @property
+    def field(self) -> Field:
+        """Sensors, exponent, noise, floor and gains, for kernels."""
+        gain = 0.0 if self.log_gain is None else self.log_gain
+        return Field(self.sensors, self.alpha, self._noise, self.r_min, gain)
+
+    def levels(self, u: ArrayLike, theta: ArrayLike) -> Levels:
+        """Return log σ_y and shares of sources (..., n_sources), (..., n_sources, 2)."""
+        return self.field.levels(
+            np.asarray(u, dtype=np.float64), np.asarray(theta, dtype=np.float64)
+        )
+
+    def h(self, x: ArrayLike) -> Float:
+        """Return log σ_y, with offsets and bias, of states: (..., n) -> (..., n_sensors)."""
+        u, theta = self.sources(x)
+        return np.asarray(self.levels(u, theta).log_sigma + self.offsets + self._bias)
+
+    def H(self, x: ArrayLike) -> Float:
+        """Return the Jacobian of `h` at one state, (n_sensors, n)."""
+        x = real("x", x)
+        if x.ndim != 1:
+            raise ValueError(f"H wants one state, shape (n,); got {x.shape}")
+        u, theta = self.sources(x)
+        G, K = slopes(self.levels(u, theta), self.alpha), self.n_sources
+        H = np.zeros((self.dim_z, K, x.size // K))
+        H[..., self.position[0]], H[..., self.position[1]] = G[:, K::2], G[:, K + 1 :: 2]
+        if self.amplitude is not None:
+            H[..., self.amplitude] = G[:, :K]
+        return H.reshape(self.dim_z, x.size)
+
+    def sample(self, x: ArrayLike, rng: np.random.Generator) -> Float:
+        """Draw readings of each state: the exact statistic [2], or Gaussian with `sigma`."""
+        u, theta = self.sources(x)
+        return self.draw(u, theta, rng)
+
+    def draw(self, u: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Float:
+        """Draw readings of sources (..., n_sources), (..., n_sources, 2), as `sample` does."""
+        level = self.levels(u, theta).log_sigma + self.offsets
+        if self.sigma is None:
+            return np.asarray(level + sample_log_envelope(self.n_snapshots, level.shape, rng))
+        return np.asarray(level + self.sigma * rng.standard_normal(level.shape))
+
+    def readings(self, z: ArrayLike) -> Float:
+        """Return readings as log σ_y plus noise: checked, less the offsets and the bias.
+
+        Parameters
+        ----------
+        z : array_like, shape (..., n_sensors)
+            Np; NaN where missing.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If the shape is wrong, or a value is infinite or in another unit by its size.
+
+        Examples
+        --------
+        >>> LogNormalRSS([[0.0, 0.0]]).readings([-71.5])
+        Traceback (most recent call last):
+        ValueError: readings are in neper, within ±40; got -71.5: convert dB and dBm by db_to_neper
+        """
+        z = real("z", z)
+        if z.ndim == 0 or z.shape[-1] != self.dim_z:
+            raise ValueError(f"readings must have shape (..., {self.dim_z}); got {z.shape}")
+        xi = z - self.offsets - self._bias
+        low, high = (np.nan, np.nan) if np.isnan(z).all() else (np.nanmin(z), np.nanmax(z))
+        worst = low if low < -FARTHEST else high
+        if low < -FARTHEST or high > FARTHEST:
+            raise ValueError(
+                f"readings are in neper, within ±{FARTHEST:g}; got {worst:g}: "
+                "convert dB and dBm by db_to_neper"
+            )
+        floor = np.max(self._noise) - 5 * np.sqrt(self._variance.max()) - 5.0
+        if np.nanmin(xi, initial=np.inf) < floor:
+            raise ValueError(
+                f"a reading lies {neper_to_db(np.max(self._noise) - np.nanmin(xi)):.0f} dB below "
+                "the noise: readings are in neper, convert dB and dBm by db_to_neper"
+            )
+        return np.asarray(xi)
+
+    def sources(self, x: ArrayLike) -> tuple[Float, Float]:
+        """Return log amplitudes (..., n_sources) and positions (..., n_sources, 2) of states."""
+        x, K = real("x", x), self.n_sources
+        least = max(*self.position, -1 if self.amplitude is None else self.amplitude) + 1
+        n = x.shape[-1] if x.ndim else 0
+        if n % K or n < K * least:
+            column = x.ndim == 2 and x.shape[1] == 1 and len(x) % K == 0 and len(x) >= K * least
+            got = f"the column {x.shape}: pass x.ravel()" if column else f"{x.shape}"
+            raise ValueError(f"states must have shape (..., {K} n), n at least {least}; got {got}")
+        each = x.reshape(*x.shape[:-1], K, n // K)
+        theta = each[..., self.position]
+        if self.amplitude is None:
+            return np.full(theta.shape[:-1], self.log_amplitude), theta
+        return each[..., self.amplitude], theta
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, LogNormalRSS):
+            return NotImplemented
+        return self._content() == other._content()
+
+    def __hash__(self) -> int:
+        return hash(self._content())
+
+    def _content(self) -> tuple[object, ...]:
+        params = self.get_params(deep=False).values()
+        return tuple((v.shape, v.tobytes()) if isinstance(v, np.ndarray) else v for v in params)

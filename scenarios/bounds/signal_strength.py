@@ -1,0 +1,94 @@
+"""Bounds on positions and powers from signal strength."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from arrivals.measurement_models import LogNormalRSS
+from arrivals.trackers.rss.inference.joint_posterior import Prior, Problem, marginals
+from arrivals.typing import Float
+from arrivals.validation import real
+
+
+class Bound(NamedTuple):
+    """Least variances of unbiased estimates.
+
+    Parameters
+    ----------
+    v : ndarray, shape (..., n_sources)
+        Of log amplitudes, Np².
+    Sigma : ndarray, shape (..., n_sources, 2, 2)
+        Covariances of positions, m².
+    """
+
+    v: Float
+    Sigma: Float
+
+    @property
+    def position(self) -> Float:
+        """Root of the mean squared distance, m, (..., n_sources)."""
+        return np.asarray(np.sqrt(np.trace(self.Sigma, axis1=-2, axis2=-1)))
+
+    @property
+    def amplitude(self) -> Float:
+        """Standard deviation of the log amplitude, Np, (..., n_sources)."""
+        return np.asarray(np.sqrt(self.v))
+
+
+def rss_bound(
+    measurement: LogNormalRSS,
+    u: ArrayLike,
+    theta: ArrayLike,
+    *,
+    v0: ArrayLike | None = None,
+    P0: ArrayLike | None = None,
+) -> Bound:
+    """Return the Cramér-Rao bound, or with priors the Bayesian one.
+
+    J = Σ W g gᵀ, plus the precisions of the priors; the same for the exact Chi statistic as for
+    its Gaussian approximation.
+
+    Parameters
+    ----------
+    measurement : LogNormalRSS
+    u : array_like, shape (..., n_sources)
+        Log amplitudes, Np.
+    theta : array_like, shape (..., n_sources, 2)
+        Positions, m.
+    v0 : float or array_like, shape (n_sources,), optional
+        Prior variances of the log amplitudes, Np²; unknown before if None.
+    P0 : array_like, shape (2, 2) or (n_sources, 2, 2), optional
+        Prior covariances of the positions, m²; unknown before if None.
+
+    Raises
+    ------
+    ValueError
+        If the readings do not hold all unknowns.
+
+    References
+    ----------
+    Van Trees, *Detection, Estimation, and Modulation Theory I*, 1968, sec. 2.4.3.
+
+    Examples
+    --------
+    >>> heard = LogNormalRSS([[0.0, 0.0], [60.0, 0.0], [0.0, 60.0], [60.0, 60.0]])
+    >>> rss_bound(heard, [9.2], [[30.0, 30.0]]).position.round(2)
+    array([3.])
+    """
+    u, theta = real("u", u), real("theta", theta)
+    K = u.shape[-1]
+    w = np.zeros(u.shape) if v0 is None else np.broadcast_to(1 / np.asarray(v0), u.shape)
+    P = np.zeros((2, 2)) if P0 is None else np.linalg.inv(real("P0", P0))
+    prior = Prior(u, w, theta, np.broadcast_to(P, (*u.shape, 2, 2)))
+    W = np.broadcast_to(1 / measurement.variance, (*u.shape[:-1], measurement.dim_z))
+    problem = Problem(measurement.field, W, W, prior)
+    J = problem.information(measurement.levels(u, theta))
+    try:
+        return Bound(*marginals(J))
+    except np.linalg.LinAlgError:
+        raise ValueError(
+            f"{measurement.dim_z} readings do not hold the {3 * K} unknowns of {K} sources"
+        ) from None

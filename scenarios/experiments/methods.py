@@ -1,0 +1,129 @@
+"""What a study compares: trackers by name, with settings, and grids of settings."""
+
+from __future__ import annotations
+
+import inspect
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from arrivals.parameters import _plain
+from arrivals.scenarios.base import Trial
+from arrivals.trackers import Tracker, find
+
+
+@dataclass(frozen=True)
+class Method:
+    """A tracker with settings, under a name of its own.
+
+    Parameters
+    ----------
+    tracker : str
+        A registered name.
+    params : mapping of str to object
+        Its parameters, by (nested) names; models that are not set come from the trial.
+    label : str
+        What it is called in tables; made from the others if empty.
+
+    Raises
+    ------
+    ValueError
+        If there is no such tracker, or it has no such parameter.
+
+    Examples
+    --------
+    >>> Method("svalse", {"motion__p_activate": 0.2}).label
+    'svalse(motion__p_activate=0.2)'
+    """
+
+    tracker: str
+    params: Mapping[str, Any] = field(default_factory=dict)
+    label: str = ""
+    kind: type[Tracker] = field(init=False, repr=False)  # goes along to other processes
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "kind", find(self.tracker))
+        known = inspect.signature(self.kind).parameters
+        for name in self.params:
+            if name.partition("__")[0] not in known:
+                raise ValueError(
+                    f"the tracker {self.tracker!r} has no parameter {name!r}; it has: "
+                    f"{', '.join(known)}"
+                )
+        settings = ", ".join(f"{name}={value}" for name, value in self.params.items())
+        made = f"{self.tracker}({settings})" if settings else self.tracker
+        object.__setattr__(self, "label", self.label or made)
+
+    def make(self, trial: Trial, chance: np.random.SeedSequence) -> Tracker:
+        """Make the tracker for a trial; one that takes an `rng` draws from `chance`."""
+        known = inspect.signature(self.kind).parameters
+        plain = {name: value for name, value in self.params.items() if name in known}
+        nested = {name: value for name, value in self.params.items() if name not in known}
+        if "rng" in known and "rng" not in plain:
+            own = np.random.SeedSequence(
+                chance.entropy, spawn_key=(*chance.spawn_key, zlib.crc32(self.label.encode()))
+            )
+            plain["rng"] = np.random.default_rng(own)
+        made = trial.tracker(self.kind, **plain)
+        if not nested:
+            return made
+        return type(made)(**made.set_params(**nested).get_params(deep=False))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the description that a results file keeps."""
+        params = {name: _plain(value) for name, value in self.params.items()}
+        return {"tracker": self.tracker, "params": params, "label": self.label}
+
+
+def methods(trackers: Sequence[str | Method]) -> list[Method]:
+    """Return methods, each of its own label.
+
+    Examples
+    --------
+    >>> [method.label for method in methods(["cbf", Method("cbf", {"threshold_db": 3.0})])]
+    ['cbf', 'cbf(threshold_db=3.0)']
+    >>> methods(["cbf", "cbf"])
+    Traceback (most recent call last):
+    ValueError: every method needs a label of its own; 'cbf' is there twice
+    """
+    made = [Method(one) if isinstance(one, str) else one for one in trackers]
+    labels = [method.label for method in made]
+    twice = next((label for label in labels if labels.count(label) > 1), None)
+    if twice is not None:
+        raise ValueError(f"every method needs a label of its own; {twice!r} is there twice")
+    if not made:
+        raise ValueError("a study needs at least one tracker")
+    return made
+
+
+def grid(tracker: str, values: Mapping[str, Sequence[Any]]) -> list[Method]:
+    """Return a method for every combination of values of (nested) parameters.
+
+    Parameters
+    ----------
+    tracker : str
+    values : mapping of str to sequence, or a list of such
+        As `sklearn.model_selection.ParameterGrid` takes it.
+
+    Examples
+    --------
+    >>> [method.label for method in grid("svalse", {"motion__p_activate": [0.1, 0.2]})]
+    ['svalse(motion__p_activate=0.1)', 'svalse(motion__p_activate=0.2)']
+    """
+    from sklearn.model_selection import ParameterGrid
+
+    return [Method(tracker, params) for params in ParameterGrid(values)]
+
+
+def plain(method: str) -> str:
+    """Return the tracker that a label begins with.
+
+    Examples
+    --------
+    >>> plain("svalse as printed")
+    'svalse'
+    """
+    return method.partition(" ")[0]

@@ -1,0 +1,226 @@
+"""A study's file: it grows by a row for each number, and knows what it belongs to."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import json
+import os
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from arrivals import measurement_models, motion_models, trackers
+from arrivals.scenarios.experiments.batch import Row
+from arrivals.trackers.run import replacing
+
+MARK = "# arrivals study "
+
+
+def fingerprint(config: Mapping[str, Any]) -> str:
+    """Return ten letters that differ when a configuration differs.
+
+    Examples
+    --------
+    >>> fingerprint({"seed": 0}) == fingerprint({"seed": 1})
+    False
+    """
+    return hashlib.sha256(_text(config).encode()).hexdigest()[:10]
+
+
+def code_mark(modules: Iterable[str] | None = None) -> str:
+    """Return ten letters that differ when trackers, models or the named modules have changed.
+
+    If no modules are given, all scenarios count too.
+
+    Examples
+    --------
+    >>> code_mark([]) == code_mark(["arrivals.scenarios.simulations.line_arrays"])
+    False
+    """
+    packages = (measurement_models, motion_models, trackers)
+    files = {path for package in packages for path in Path(package.__path__[0]).rglob("*.py")}
+    if modules is None:
+        files |= set(Path(__file__).parents[1].rglob("*.py"))
+    named = (getattr(sys.modules.get(name), "__file__", None) for name in modules or ())
+    files |= {Path(file) for file in named if file}
+    contents = hashlib.sha256()
+    for path in sorted(files):
+        contents.update(path.read_bytes())
+    return contents.hexdigest()[:10]
+
+
+def _text(config: Mapping[str, Any]) -> str:
+    return json.dumps(config, sort_keys=True, ensure_ascii=True)
+
+
+class Results:
+    """Rows in a file that others may read while it grows, or in memory.
+
+    Parameters
+    ----------
+    config : mapping
+        What the study is, as JSON has it.
+    path : path, optional
+        A CSV file, or a folder in which each configuration has a file of its own. In memory if
+        None.
+
+    Raises
+    ------
+    ValueError
+        If the file is no study's, or another study's.
+    OSError
+        If it cannot be read or written.
+    """
+
+    def __init__(self, config: Mapping[str, Any], path: str | os.PathLike[str] | None) -> None:
+        self.config = dict(config)
+        self.path = None if path is None else _place(Path(path), config)
+        self._rows: list[Row] = []
+        if self.path is not None and self.path.exists():
+            self._check(read_config(self.path))
+
+    def _check(self, other: Mapping[str, Any]) -> None:
+        """Refuse a file of another study, or with rows that its own first line does not know."""
+        differ = sorted(k for k in {*self.config, *other} if self.config.get(k) != other.get(k))
+        if differ:
+            raise ValueError(
+                f"{self.path} holds another study: {', '.join(differ)} differ(s); name another "
+                "file, or a folder, in which each study finds its own"
+            )
+        known = other.get("scenarios", {})
+        strange = next((row.case for row in self.rows() if row.case not in known), None)
+        if strange is not None:
+            raise ValueError(f"{self.path} has rows of the case {strange!r}: its study has none")
+
+    def rows(self) -> Iterator[Row]:
+        """Give the rows there are, in order of arrival."""
+        return iter(self._rows) if self.path is None else read_rows(self.path)
+
+    def keep(self, wanted: Callable[[Row], bool]) -> None:
+        """Drop the rows that are not wanted, and a last line that was cut off."""
+        if self.path is None or not self.path.exists():
+            return
+        if _is_whole(self.path) and all(wanted(row) for row in self.rows()):
+            return
+        with replacing(self.path) as file:
+            file.write(self._head())
+            rows = (row for row in self.rows() if wanted(row))
+            csv.writer(file, lineterminator="\n").writerows(rows)
+
+    @contextmanager
+    def writing(self) -> Iterator[None]:
+        """Keep other processes from writing to the file; a process that dies lets go of it.
+
+        Raises
+        ------
+        BlockingIOError
+            If another one writes to it now.
+        """
+        if self.path is None or sys.platform == "win32":
+            yield
+            return
+        import fcntl
+
+        lock = self.path.with_name(f".{self.path.name}.lock")
+        with open(lock, "w") as file:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                raise BlockingIOError(f"another process is writing to {self.path}") from None
+            try:
+                yield
+            finally:
+                lock.unlink(missing_ok=True)
+
+    def add(self, rows: Iterable[Row]) -> None:
+        """Append rows; they are in the file when this returns.
+
+        Raises
+        ------
+        OSError
+            If there is no room for them; the rows before stay.
+        """
+        if self.path is None:
+            self._rows.extend(rows)
+            return
+        new = not self.path.exists()  # such a one goes again if it cannot be begun
+        lines = io.StringIO()
+        csv.writer(lines, lineterminator="\n").writerows(rows)
+        try:
+            with open(self.path, "ab") as file:
+                file.write(((self._head() if new else "") + lines.getvalue()).encode())
+        except OSError as error:
+            if new:
+                self.path.unlink(missing_ok=True)
+            raise OSError(
+                error.errno,
+                f"{error.strerror}: what was finished before is kept; call again to go on",
+                str(self.path),
+            ) from None
+
+    def _head(self) -> str:
+        return f"{MARK}{_text(self.config)}\n{','.join(Row._fields)}\n"
+
+
+def _place(path: Path, config: Mapping[str, Any]) -> Path:
+    if path.suffix == ".csv" and not path.is_dir():
+        if not path.parent.is_dir():
+            raise FileNotFoundError(2, "the folder does not exist", str(path.parent))
+        return path
+    path.mkdir(parents=True, exist_ok=True)
+    return path / f"study-{fingerprint(config)}.csv"
+
+
+def _is_whole(path: Path) -> bool:
+    """Tell whether the last line ends."""
+    with open(path, "rb") as file:
+        file.seek(-1, os.SEEK_END)
+        return file.read() == b"\n"
+
+
+def read_config(path: Path) -> dict[str, Any]:
+    """Return what the study of a file is.
+
+    Raises
+    ------
+    ValueError
+        If the file is no study's.
+    """
+    with open(path, encoding="utf-8", errors="replace") as file:
+        first = file.readline()
+    try:
+        if not first.startswith(MARK):
+            raise ValueError
+        config: dict[str, Any] = json.loads(first.removeprefix(MARK))
+    except ValueError:
+        raise ValueError(f"{path} is no file of a study") from None
+    return config
+
+
+def read_rows(path: Path) -> Iterator[Row]:
+    """Give the rows of a file; a line that was cut off at its end does not count.
+
+    Raises
+    ------
+    ValueError
+        If another line is no row.
+    """
+    if not path.exists():
+        return
+    with open(path, encoding="utf-8", errors="replace", newline="") as file:
+        file.readline()
+        file.readline()
+        lines = csv.reader(line for line in file if line.endswith("\n"))
+        for number, cells in enumerate(lines, start=3):
+            try:
+                case, run, method, metric, value, note = cells
+                row = Row(case, int(run), method, metric, float(value), note)
+            except ValueError:
+                raise ValueError(
+                    f"line {number} of {path} is no row of a study: take it out to go on"
+                ) from None
+            yield row

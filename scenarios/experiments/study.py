@@ -1,0 +1,216 @@
+"""What a study found: tidy rows, means with intervals, and differences on the same draws."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from arrivals.scenarios.experiments.batch import ERROR, Row
+from arrivals.scenarios.experiments.results_file import Results, read_config
+from arrivals.trackers.run import replacing
+from arrivals.typing import Float
+
+
+class Difference(NamedTuple):
+    """The mean of a difference over runs, its standard error, and in how many runs it is below 0.
+
+    Parameters
+    ----------
+    mean, error : float
+    n_below, n_runs : int
+    """
+
+    mean: float
+    error: float
+    n_below: int
+    n_runs: int
+
+
+class Study:
+    """The numbers of a study, read from its file when they are asked for.
+
+    Parameters
+    ----------
+    results : Results
+    runs : sequence of int, optional
+        The runs to look at; all that are there if None.
+
+    Attributes
+    ----------
+    config : dict
+        Scenarios, methods, metrics, seed and version.
+    path : Path or None
+        The file.
+
+    Examples
+    --------
+    >>> from arrivals.scenarios import create, monte_carlo
+    >>> scenario = create("svalse_fig6", n_steps=5)
+    >>> study = monte_carlo(scenario, ["cbf", "sbl"], runs=3, metrics=["gospa"])
+    >>> study.paired("gospa", "sbl", "cbf").n_below
+    3
+    """
+
+    def __init__(self, results: Results, runs: Sequence[int] | None = None) -> None:
+        self._results = results
+        self._runs = None if runs is None else set(runs)
+        self.config: dict[str, Any] = results.config
+        self.path = results.path
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str]) -> Study:
+        """Return the study of a file, finished or not.
+
+        Raises
+        ------
+        ValueError
+            If the file is no study's.
+        OSError
+            If it cannot be read.
+        """
+        return cls(Results(read_config(Path(path)), Path(path)))
+
+    @property
+    def cases(self) -> list[str]:
+        """Names of the scenarios."""
+        return list(self.config["scenarios"])
+
+    @property
+    def methods(self) -> list[str]:
+        """Labels of the methods."""
+        return [method["label"] for method in self.config["methods"]]
+
+    @property
+    def runs(self) -> list[int]:
+        """Numbers of the runs that are there."""
+        return sorted({row.run for row in self._rows()})
+
+    def _rows(self) -> Iterator[Row]:
+        rows = self._results.rows()
+        return (row for row in rows if self._runs is None or row.run in self._runs)
+
+    def rows(self) -> list[Row]:
+        """Return all rows, in order of cases, runs and methods, whatever order they came in."""
+        case = {name: n for n, name in enumerate(self.cases)}
+        method = {name: n for n, name in enumerate(self.methods)}
+        return sorted(self._rows(), key=lambda row: (case[row.case], row.run, method[row.method]))
+
+    def failures(self) -> list[Row]:
+        """Return the rows of the runs that failed; their notes tell error and seed."""
+        return [row for row in self.rows() if row.metric == ERROR]
+
+    def values(self, metric: str, method: str, case: str | None = None) -> dict[int, float]:
+        """Return the numbers of a metric by run; runs that failed, and NaN, are left out.
+
+        Parameters
+        ----------
+        metric, method : str
+        case : str, optional
+            May be left out if there is one.
+
+        Raises
+        ------
+        ValueError
+            If there is no such metric, method or case, or the method gives no such number.
+        """
+        case = self._one("case", case, self.cases)
+        self._one("method", method, self.methods)
+        found = [r for r in self._rows()
+                 if r.metric == metric and r.method == method and r.case == case]  # fmt: skip
+        notes = [row.note for row in found if row.note]
+        if notes and len(notes) == len(found):
+            raise ValueError(f"{metric} cannot be given: {notes[0]}")
+        if not found:
+            failed = [r for r in self.failures() if r.method == method and r.case == case]
+            raise ValueError(
+                f"every run of {method!r} failed, the first by {failed[0].note}" if failed else
+                f"no run has the metric {metric!r} of {method!r}; the study has: "
+                f"{', '.join([*self.config['metrics'], 'cpu_ms'])}"
+            )  # fmt: skip
+        return {row.run: row.value for row in sorted(found) if row.value == row.value}
+
+    def _one(self, noun: str, name: str | None, known: list[str]) -> str:
+        if name is None and len(known) == 1:
+            return known[0]
+        if name not in known:
+            raise ValueError(f"{noun} must be one of {', '.join(map(repr, known))}; got {name!r}")
+        return name
+
+    def array(self, metric: str, method: str, case: str | None = None) -> Float:
+        """Return the numbers of a metric in order of runs."""
+        return np.array(list(self.values(metric, method, case).values()), dtype=np.float64)
+
+    def mean(self, metric: str, method: str, case: str | None = None) -> float:
+        """Return the mean over the runs; NaN if none has a number."""
+        values = self.array(metric, method, case)
+        return float(values.mean()) if values.size else np.nan
+
+    def spread(self, metric: str, method: str, case: str | None = None) -> float:
+        """Return the standard deviation over the runs; NaN for fewer than two."""
+        values = self.array(metric, method, case)
+        return float(values.std(ddof=1)) if values.size > 1 else np.nan
+
+    def interval(
+        self, metric: str, method: str, case: str | None = None, level: float = 0.95
+    ) -> tuple[float, float]:
+        """Return the bootstrap interval of the mean over the runs.
+
+        Bias-corrected and accelerated, 2000 resamples; the same at every call. NaN for fewer than
+        two runs.
+
+        References
+        ----------
+        Efron and Tibshirani, *An Introduction to the Bootstrap*, 1993, ch. 14.
+        """
+        from scipy.stats import bootstrap
+
+        values = self.array(metric, method, case)
+        if values.size < 2:
+            return np.nan, np.nan
+        if np.ptp(values) == 0:
+            return float(values[0]), float(values[0])
+        found = bootstrap(
+            (values,), np.mean, n_resamples=2000, confidence_level=level,
+            rng=np.random.default_rng(0),
+        )  # fmt: skip
+        return float(found.confidence_interval.low), float(found.confidence_interval.high)
+
+    def paired(self, metric: str, first: str, second: str, case: str | None = None) -> Difference:
+        """Return first minus second on the same draws, over the runs that both have."""
+        a, b = self.values(metric, first, case), self.values(metric, second, case)
+        off = np.array([a[run] - b[run] for run in a if run in b], dtype=np.float64)
+        n = len(off)
+        error = float(off.std(ddof=1) / np.sqrt(n)) if n > 1 else np.nan
+        return Difference(float(off.mean()) if n else np.nan, error, int((off < 0).sum()), n)
+
+    def summary(self) -> list[dict[str, Any]]:
+        """Return a row for each case, method and metric: mean, std, interval, number of runs."""
+        table = []
+        for case in self.cases:
+            for method in self.methods:
+                for metric in [*self.config["metrics"], "cpu_ms"]:
+                    table.append(self._line(case, method, metric))
+        return [line for line in table if line]
+
+    def _line(self, case: str, method: str, metric: str) -> dict[str, Any]:
+        try:
+            n = self.array(metric, method, case).size
+        except ValueError:
+            return {}
+        low, high = self.interval(metric, method, case)
+        key = {"case": case, "method": method, "metric": metric}
+        mean, std = self.mean(metric, method, case), self.spread(metric, method, case)
+        return key | {"mean": mean, "std": std, "low": low, "high": high, "n_runs": n}
+
+    def to_csv(self, path: str | os.PathLike[str]) -> None:
+        """Write the tidy rows, in order; the file appears only when it is complete."""
+        import csv
+
+        with replacing(path) as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(Row._fields)
+            writer.writerows(self.rows())

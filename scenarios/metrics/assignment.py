@@ -1,0 +1,125 @@
+"""Which found point belongs to which true one, and what follows for tracks and their labels."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from arrivals.typing import Float, Int
+from arrivals.validation import positive, real
+
+
+class Matches(NamedTuple):
+    """Pairs of a true and a found direction or position, step after step.
+
+    Parameters
+    ----------
+    step, source, slot : ndarray of int, shape (n_pairs,)
+        Time step, column of the truth and column of what was found.
+    error : ndarray, shape (n_pairs,) or (n_pairs, dim)
+        Found minus true, in the unit given; the shorter way round.
+    """
+
+    step: Int
+    source: Int
+    slot: Int
+    error: Float
+
+
+def matches(truth: ArrayLike, found: ArrayLike, c: float, period: float | None = None) -> Matches:
+    """Pair, in each step, true and found points nearer than `c` as GOSPA with p = 1 does.
+
+    Parameters
+    ----------
+    truth, found : array_like, shapes (n_steps, n_sources[, dim]), (n_steps, n_slots[, dim])
+        Directions, or positions; NaN where there is none.
+    c : float
+        Same unit.
+    period : float, optional
+        Takes differences around a circle of this length.
+
+    Raises
+    ------
+    ValueError
+        If the shapes do not fit, or `c` or `period` is not positive.
+
+    Examples
+    --------
+    >>> pairs = matches([[10, 20, 40]], [[26, np.nan, 11]], c=10)
+    >>> pairs.source, pairs.slot, pairs.error
+    (array([0, 1]), array([2, 0]), array([1., 6.]))
+    """
+    from scipy.optimize import linear_sum_assignment
+
+    t, f = real("truth", truth), real("found", found)
+    if t.ndim not in (2, 3) or f.ndim != t.ndim or len(t) != len(f) or t.shape[2:] != f.shape[2:]:
+        raise ValueError(
+            "truth and found must have shapes (n_steps, n_sources) and (n_steps, n_slots), or "
+            f"(..., dim) of positions; got {t.shape} and {f.shape}"
+        )
+    error = f[:, None] - t[:, :, None]
+    if period is not None:
+        half = positive("period", period) / 2
+        error = (error + half) % period - half
+    far = np.abs(error) if error.ndim == 3 else np.linalg.norm(error, axis=-1)
+    cost = np.where(np.isnan(far), np.inf, far)
+    near = np.minimum(cost, positive("c", c))
+    rows = []
+    for step in range(len(t)):
+        source, slot = linear_sum_assignment(near[step])
+        kept = cost[step, source, slot] < c
+        rows.append(np.stack([np.full(kept.sum(), step), source[kept], slot[kept]]))
+    step, source, slot = np.concatenate([np.zeros((3, 0), dtype=np.int64), *rows], axis=1)
+    return Matches(step, source, slot, np.asarray(error[step, source, slot]))
+
+
+def label_switches(pairs: Matches, label: ArrayLike) -> int:
+    """Count how often a source is found under another label than when it was last found.
+
+    Parameters
+    ----------
+    pairs : Matches
+    label : array_like of int, shape (n_steps, n_slots)
+
+    References
+    ----------
+    Bernardin and Stiefelhagen, "Evaluating multiple object tracking performance", EURASIP J. Image
+    Video Process., 2008, section 2.1.3 (mismatches).
+
+    Examples
+    --------
+    >>> pairs = matches([[0.0, 5.0]] * 3, [[0.0, 5.0], [5.0, 0.0], [5.0, 0.0]], c=1)
+    >>> label_switches(pairs, [[7, 8], [8, 7], [7, 8]])
+    2
+    """
+    return sum(int((np.diff(names) != 0).sum()) for _, names in _histories(pairs, label))
+
+
+def track_lengths(pairs: Matches, label: ArrayLike) -> Int:
+    """Return the numbers of steps for which one source is found, without a gap, under one label.
+
+    Parameters
+    ----------
+    pairs : Matches
+    label : array_like of int, shape (n_steps, n_slots)
+
+    Examples
+    --------
+    >>> pairs = matches([[0.0]] * 6, [[0.0], [0.0], [np.nan], [0.0], [0.0], [0.0]], c=1)
+    >>> track_lengths(pairs, [[3], [3], [-1], [3], [3], [4]])
+    array([2, 2, 1])
+    """
+    lengths = [np.zeros(0, dtype=np.int64)]
+    for steps, names in _histories(pairs, label):
+        breaks = np.flatnonzero((np.diff(steps) > 1) | (np.diff(names) != 0)) + 1
+        lengths.append(np.diff(np.concatenate([[0], breaks, [len(steps)]])))
+    return np.concatenate(lengths)
+
+
+def _histories(pairs: Matches, label: ArrayLike) -> list[tuple[Int, Int]]:
+    """Return steps and labels of each source that was found, in order of time."""
+    names = np.asarray(label)[pairs.step, pairs.slot]
+    mine = [pairs.source == source for source in np.unique(pairs.source)]
+    return [(pairs.step[on], names[on]) for on in mine]

@@ -1,0 +1,293 @@
+"""How far what was found lies from the truth, when both are sets of points of any size."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from arrivals.typing import Float
+from arrivals.validation import number, positive, real
+
+
+@dataclass(frozen=True)
+class Gospa:
+    """The GOSPA metric and the three parts that it is made of.
+
+    Parameters
+    ----------
+    total : float
+        The metric, in the unit of the points.
+    distance, missed, false : float
+        Parts due to the error of what was found, to what was missed and to what is not there. They
+        are p-th powers: total^p = distance + missed + false, and for p = 1 they share its unit.
+    """
+
+    total: float
+    distance: float
+    missed: float
+    false: float
+
+
+def gospa(
+    truth: ArrayLike,
+    found: ArrayLike,
+    c: float,
+    p: float = 1.0,
+    alpha: float = 2.0,
+    period: float | None = None,
+) -> Gospa:
+    """Measure errors, missed and false points at once: generalised optimal sub-pattern assignment.
+
+    Parameters
+    ----------
+    truth, found : array_like, shape (n,) or (n, dim)
+        Angles or points, in any unit. Rows that hold a NaN count as absent.
+    c : float
+        Cut-off, same unit: a true and a found point at distance `c` or more are never a pair.
+    p : float
+        Exponent, at least 1.
+    alpha : float
+        In (0, 2]: a point without partner costs c^p / α. Only at 2 is it the same to leave a
+        distant pair apart; below, a pair cut off costs c^p, half of it missed and half of it false.
+    period : float, optional
+        Takes differences around a circle of this length, 2π for angles in rad.
+
+    Returns
+    -------
+    Gospa
+        The metric and its parts.
+
+    Raises
+    ------
+    ValueError
+        If dimensions differ, a point is infinite, or `c`, `p`, `alpha`, `period` are out of range.
+
+    References
+    ----------
+    Rahmathullah, García-Fernández and Svensson, "Generalized optimal sub-pattern assignment
+    metric", FUSION 2017, definition 1 and proposition 1.
+
+    Examples
+    --------
+    Ten is found at 11 and twenty at 26; forty is missed, and seventy is false.
+
+    >>> gospa([10, 20, 40], [11, 26, 70], c=10)
+    Gospa(total=17.0, distance=7.0, missed=5.0, false=5.0)
+    >>> gospa([10, 20, 40], [], c=10).total, gospa([], [1, 2], c=10).total
+    (15.0, 10.0)
+    >>> gospa([-179], [178], c=10, period=360).distance
+    3.0
+    """
+    c, p = positive("c", c), _exponent(p)
+    if not 0 < number("alpha", alpha) <= 2:
+        raise ValueError(f"alpha must lie in (0, 2]; got {alpha}")
+    d = _distances(truth, found, period)
+    pairs = _assigned(d, c, p)
+    n_cut, surplus = np.sum(pairs >= c), d.shape[0] - d.shape[1]
+    distance = float(np.sum(pairs[pairs < c] ** p))
+    missed = float(c**p * (n_cut / 2 + max(surplus, 0) / alpha))
+    false = float(c**p * (n_cut / 2 + max(-surplus, 0) / alpha))
+    return Gospa((distance + missed + false) ** (1 / p), distance, missed, false)
+
+
+def ospa(
+    truth: ArrayLike, found: ArrayLike, c: float, p: float = 1.0, period: float | None = None
+) -> float:
+    """Measure the error per point, where a surplus point on either side counts as `c`.
+
+    Parameters
+    ----------
+    truth, found : array_like, shape (n,) or (n, dim)
+        Angles or points, in any unit. Rows that hold a NaN count as absent.
+    c : float
+        Cut-off, same unit.
+    p : float
+        Exponent, at least 1.
+    period : float, optional
+        Takes differences around a circle of this length.
+
+    Returns
+    -------
+    float
+        The metric, in [0, c]; 0 for two empty sets.
+
+    Raises
+    ------
+    ValueError
+        If dimensions differ, a point is infinite, or `c`, `p`, `period` are out of range.
+
+    References
+    ----------
+    Schuhmacher, Vo and Vo, "A consistent metric for performance evaluation of multi-object
+    filters", IEEE Trans. Signal Process. 56, 2008, (3).
+
+    Examples
+    --------
+    >>> ospa([10, 20], [12], c=10)
+    6.0
+    """
+    c, p = positive("c", c), _exponent(p)
+    d = _distances(truth, found, period)
+    most, surplus = max(d.shape), abs(d.shape[0] - d.shape[1])
+    powers = np.sum(np.minimum(_assigned(d, c, p), c) ** p) + c**p * surplus
+    return float((powers / most) ** (1 / p)) if most else 0.0
+
+
+def rmse(truth: ArrayLike, found: ArrayLike, c: float, period: float | None = None) -> float:
+    """Measure the error per true point, where a missed one counts as `c`; false ones cost nothing.
+
+    Parameters
+    ----------
+    truth, found : array_like, shape (n,) or (n, dim)
+        Angles or points, in any unit. Rows that hold a NaN count as absent.
+    c : float
+        Cut-off, same unit.
+    period : float, optional
+        Takes differences around a circle of this length.
+
+    Returns
+    -------
+    float
+        Root mean square error, in [0, c]; 0 if nothing is true.
+
+    Raises
+    ------
+    ValueError
+        If dimensions differ, a point is infinite, or `c` or `period` is not positive.
+
+    Examples
+    --------
+    >>> round(rmse([10, 20, 40], [11, 26, 70], c=10), 3)
+    6.758
+    >>> rmse([10, 20, 40], [], c=10), rmse([], [1, 2], c=10)
+    (10.0, 0.0)
+    """
+    c = positive("c", c)
+    d = _distances(truth, found, period)
+    if not len(d):
+        return 0.0
+    pairs = np.minimum(_assigned(d, c, 2.0), c)
+    return float(np.sqrt((np.sum(pairs**2) + c**2 * (len(d) - len(pairs))) / len(d)))  # (74)
+
+
+def mean_gospa(
+    truth: Sequence[ArrayLike] | Float,
+    found: Sequence[ArrayLike] | Float,
+    c: float,
+    p: float = 1.0,
+    alpha: float = 2.0,
+    period: float | None = None,
+) -> Gospa:
+    """Average GOSPA and its parts over time steps.
+
+    Parameters
+    ----------
+    truth, found : array_like, shape (n_steps, n_slots) or (n_steps, n_slots, dim)
+        One set in each step, filled up by NaN; lists of sets that differ in size will do as well.
+    c, p, alpha, period
+        As in `gospa`.
+
+    Returns
+    -------
+    Gospa
+        Means of `total`, `distance`, `missed` and `false`, each over the steps.
+
+    Raises
+    ------
+    ValueError
+        If the numbers of steps differ or are zero, and as `gospa` does.
+
+    Examples
+    --------
+    >>> mean_gospa([[0, 50], [1, np.nan]], [[2, np.nan], [1, np.nan]], c=10)
+    Gospa(total=3.5, distance=1.0, missed=2.5, false=0.0)
+    """
+    steps = [gospa(t, f, c, p, alpha, period) for t, f in _steps(truth, found)]
+    return Gospa(*np.mean([astuple(step) for step in steps], axis=0).tolist())
+
+
+def mean_rmse(
+    truth: Sequence[ArrayLike] | Float,
+    found: Sequence[ArrayLike] | Float,
+    c: float,
+    period: float | None = None,
+) -> float:
+    """Average the root mean square errors of time steps.
+
+    Parameters
+    ----------
+    truth, found : array_like, shape (n_steps, n_slots) or (n_steps, n_slots, dim)
+        One set in each step, filled up by NaN; lists of sets that differ in size will do as well.
+    c, period
+        As in `rmse`.
+
+    Returns
+    -------
+    float
+        Mean over the steps; a step without truth counts as 0.
+
+    Raises
+    ------
+    ValueError
+        If the numbers of steps differ or are zero, and as `rmse` does.
+
+    Examples
+    --------
+    >>> mean_rmse([[0], [1]], [[2], [np.nan]], c=10)
+    6.0
+    """
+    return float(np.mean([rmse(t, f, c, period) for t, f in _steps(truth, found)]))
+
+
+def _exponent(p: float) -> float:
+    if not 1 <= number("p", p) < np.inf:
+        raise ValueError(f"p must be finite and at least 1; got {p}")
+    return float(p)
+
+
+def _steps(
+    truth: Sequence[ArrayLike] | Float, found: Sequence[ArrayLike] | Float
+) -> list[tuple[ArrayLike, ArrayLike]]:
+    if len(truth) != len(found) or len(truth) == 0:
+        raise ValueError(
+            f"truth and found must have the same number of steps, at least one; "
+            f"got {len(truth)} and {len(found)}"
+        )
+    return list(zip(truth, found, strict=True))
+
+
+def _points(name: str, value: ArrayLike) -> Float:
+    """Return the rows without NaN of points (n, dim), of angles (n,) as (n, 1)."""
+    points = real(name, value)
+    if points.ndim not in (1, 2):
+        raise ValueError(f"{name} must have shape (n,) or (n, dim); got {points.shape}")
+    if np.any(np.isinf(points)):
+        raise ValueError(f"{name} must be finite, or NaN where absent; got an infinite value")
+    points = points[:, None] if points.ndim == 1 else points
+    return np.asarray(points[~np.any(np.isnan(points), axis=1)])
+
+
+def _distances(truth: ArrayLike, found: ArrayLike, period: float | None) -> Float:
+    """Euclidean distances (n_true, n_found), around the circle if there is a period."""
+    t, f = _points("truth", truth), _points("found", found)
+    if t.shape[1] != f.shape[1]:
+        if t.size and f.size:
+            raise ValueError(
+                f"truth and found must have the same dimension; got {t.shape[1]} and {f.shape[1]}"
+            )
+        return np.zeros((len(t), len(f)))
+    difference = np.abs(t[:, None] - f)
+    if period is not None:
+        difference = difference % positive("period", period)
+        difference = np.minimum(difference, period - difference)
+    return np.asarray(np.linalg.norm(difference, axis=-1))
+
+
+def _assigned(d: Float, c: float, p: float) -> Float:
+    """Distances of the pairs that make the sum of min(d, c)^p least; all of the smaller set."""
+    from scipy.optimize import linear_sum_assignment
+
+    return np.asarray(d[linear_sum_assignment(np.minimum(d, c) ** p)])

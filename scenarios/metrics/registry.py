@@ -1,0 +1,171 @@
+"""What a run is worth, held against the truth of its trial: one number each.
+
+Directions are scored in degrees, positions in metres; the trial's truth says which.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from arrivals.scenarios.base import Trial
+from arrivals.scenarios.metrics.assignment import Matches, label_switches, matches, track_lengths
+from arrivals.scenarios.metrics.consistency import (
+    circular_nees,
+    coverage,
+    position_coverage,
+    position_nees,
+)
+from arrivals.scenarios.metrics.gospa import Gospa, mean_gospa, mean_rmse, ospa
+from arrivals.trackers.run import Run
+from arrivals.typing import Float
+
+Metric: TypeAlias = Callable[[Trial, Run], float]
+CUT_OFF = 10.0  # degrees: the paper's c; and metres
+
+
+class Sets(NamedTuple):
+    """True and found directions, degrees, or positions, m; NaN where there is none.
+
+    Parameters
+    ----------
+    truth, found : ndarray, shapes (n_steps, n_sources) and (n_steps, n_slots); positions (..., 2)
+    period : float or None
+        Of directions all around, degrees.
+    """
+
+    truth: Float
+    found: Float
+    period: float | None
+
+
+def sets(trial: Trial, run: Run) -> Sets:
+    """Return what is compared: directions if the trial's truth is directions, else positions.
+
+    Raises
+    ------
+    ValueError
+        If the run holds none of that kind.
+    """
+    noun, name = ("positions", "position") if trial.truth.ndim == 3 else ("directions", "doa")
+    if name not in run.fields:
+        raise ValueError(f"the trial's truth is {noun}; a run of {run.kind.__name__}s holds none")
+    if name == "position":
+        return Sets(trial.truth, np.asarray(run.fields[name]), None)
+    period = 360.0 if trial.measurement.array.dim > 1 else None  # type: ignore[union-attr]  # heard by an array
+    return Sets(np.rad2deg(trial.truth), np.rad2deg(run.fields[name]), period)
+
+
+@lru_cache(maxsize=1)  # the parts are asked for one after the other
+def gospa_of(trial: Trial, run: Run) -> Gospa:
+    """Return GOSPA and its parts, degrees or m, means over the steps."""
+    truth, found, period = sets(trial, run)
+    return mean_gospa(truth, found, c=CUT_OFF, period=period)
+
+
+@lru_cache(maxsize=1)
+def pairs_of(trial: Trial, run: Run) -> Matches:
+    """Return the pairs of true and found ones, errors in rad or m."""
+    truth, found, period = sets(trial, run)
+    pairs = matches(truth, found, CUT_OFF, period)
+    return pairs if truth.ndim == 3 else pairs._replace(error=np.deg2rad(pairs.error))
+
+
+def _rmse(trial: Trial, run: Run) -> float:
+    truth, found, period = sets(trial, run)
+    return mean_rmse(truth, found, CUT_OFF, period)
+
+
+def _ospa(trial: Trial, run: Run) -> float:
+    truth, found, period = sets(trial, run)
+    steps = [ospa(t, f, CUT_OFF, period=period) for t, f in zip(truth, found, strict=True)]
+    return float(np.mean(steps))
+
+
+def _cardinality(trial: Trial, run: Run) -> float:
+    truth = sets(trial, run).truth
+    there = ~np.isnan(truth if truth.ndim == 2 else truth[..., 0])
+    return float(np.abs(run.n_found - there.sum(axis=1)).mean())
+
+
+def _stated(trial: Trial, run: Run) -> tuple[Float, Float]:
+    """Return errors, and the deviations (n,), rad, or covariances (n, 2, 2), m², stated."""
+    pairs = pairs_of(trial, run)
+    spread = run.fields["std" if pairs.error.ndim == 1 else "covariance"]
+    if run.n_found.any() and np.isnan(spread).all():
+        raise ValueError("the tracker states no standard deviations")
+    return pairs.error, np.asarray(spread[pairs.step, pairs.slot])
+
+
+def _labels(trial: Trial, run: Run) -> Matches:
+    if run.n_found.any() and (run.fields["label"] < 0).all():
+        raise ValueError("the tracker gives no labels")
+    return pairs_of(trial, run)
+
+
+def _gospa(trial: Trial, run: Run) -> float:
+    return gospa_of(trial, run).total
+
+
+def _distance(trial: Trial, run: Run) -> float:
+    return gospa_of(trial, run).distance
+
+
+def _missed(trial: Trial, run: Run) -> float:
+    return gospa_of(trial, run).missed
+
+
+def _false(trial: Trial, run: Run) -> float:
+    return gospa_of(trial, run).false
+
+
+def _nees(trial: Trial, run: Run) -> float:
+    error, spread = _stated(trial, run)
+    return (circular_nees if error.ndim == 1 else position_nees)(error, spread)
+
+
+def _covered(trial: Trial, run: Run, level: float) -> float:
+    error, spread = _stated(trial, run)
+    return (coverage if error.ndim == 1 else position_coverage)(error, spread, level=level)
+
+
+def _coverage68(trial: Trial, run: Run) -> float:
+    return _covered(trial, run, 0.68)
+
+
+def _coverage95(trial: Trial, run: Run) -> float:
+    return _covered(trial, run, 0.95)
+
+
+def _label_switches(trial: Trial, run: Run) -> float:
+    return float(label_switches(_labels(trial, run), run.fields["label"]))
+
+
+def _track_length(trial: Trial, run: Run) -> float:
+    lengths = track_lengths(_labels(trial, run), run.fields["label"])
+    return float(lengths.mean()) if lengths.size else np.nan
+
+
+def _converged(trial: Trial, run: Run) -> float:
+    return float(np.mean(run.converged))
+
+
+METRICS: dict[str, Metric] = {
+    "gospa": _gospa,
+    "distance": _distance,
+    "missed": _missed,
+    "false": _false,
+    "rmse": _rmse,
+    "ospa": _ospa,
+    "cardinality": _cardinality,
+    "nees": _nees,
+    "coverage68": _coverage68,
+    "coverage95": _coverage95,
+    "label_switches": _label_switches,
+    "track_length": _track_length,
+    "converged": _converged,
+}
+CPU = "cpu_ms"  # processor time of a step, measured by the runner: the seed does not settle it

@@ -1,0 +1,1 @@
+"""Positions from signal strength."""

@@ -1,0 +1,115 @@
+"""Source signals that are autoregressive processes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from arrivals.motion_models.companion_form import radius, stationary
+from arrivals.typing import Complex, Float
+from arrivals.validation import count, real
+
+
+def ar_signals(
+    coefficients: Sequence[ArrayLike],
+    noise: ArrayLike,
+    n: int,
+    rng: np.random.Generator,
+    batch: tuple[int, ...] = (),
+    *,
+    complex_valued: bool = True,
+) -> Complex | Float:
+    """Draw s(j) = Σ a_i s(j - i) + v(j) of several sources, from stationarity on.
+
+    Parameters
+    ----------
+    coefficients : list of array_like
+        One list a_1 ... a_p for each source; orders may differ.
+    noise : array_like, shape (n_sources,)
+        Variances of the driving noise v, circular if complex.
+    n : int
+        Steps.
+    rng : numpy.random.Generator
+    batch : tuple of int
+        Leading axes, of independent draws.
+    complex_valued : bool
+        Circular complex signals, or real ones.
+
+    Returns
+    -------
+    ndarray, shape (*batch, n, n_sources)
+
+    Raises
+    ------
+    ValueError
+        If a process is not stationary, or the numbers of sources or the variances do not fit.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> s = ar_signals([[0.772, -0.45], [0.96, -0.77]], [0.571, 0.287], 5000, rng)
+    >>> s.shape, (abs(s) ** 2).mean(axis=0).round(1)
+    ((5000, 2), array([1., 1.]))
+    """
+    orders = [np.atleast_1d(real("coefficients", a)) for a in coefficients]
+    variances = real("noise", noise)
+    count("n", n)
+    if variances.shape != (len(orders),) or not (np.isfinite(variances) & (variances >= 0)).all():
+        raise ValueError(
+            f"noise must hold one variance, not negative, for each of {len(orders)} sources; "
+            f"got {noise!r}"
+        )
+    parts = (2, *batch) if complex_valued else batch
+    share = 2 if complex_valued else 1
+    drawn = [
+        _real_signal(a, q / share, n, rng, parts) for a, q in zip(orders, variances, strict=True)
+    ]
+    s = np.stack(drawn, axis=-1)
+    return np.asarray(s[0] + 1j * s[1]) if complex_valued else s
+
+
+def stationary_covariance(a: ArrayLike, q: float) -> Float:
+    """Return the covariance of [s(j), ..., s(j - p + 1)], (p, p), of a stationary process.
+
+    Raises
+    ------
+    ValueError
+        If there is no such process: a root of the companion matrix is not inside the unit circle.
+
+    Examples
+    --------
+    >>> stationary_covariance([0.5], 0.75)
+    array([[1.]])
+    >>> stationary_covariance([1.0], 1.0)
+    Traceback (most recent call last):
+    ValueError: an AR process needs roots inside the unit circle; [1.0] has one of modulus 1
+    """
+    a = np.atleast_1d(real("coefficients", a))
+    p = len(a)
+    if a.ndim != 1 or p == 0 or not np.isfinite(a).all():
+        raise ValueError(f"coefficients must be finite numbers a_1 ... a_p; got {a.tolist()}")
+    largest = float(radius(a))
+    if largest >= 1:
+        raise ValueError(
+            f"an AR process needs roots inside the unit circle; {a.tolist()} has one of modulus "
+            f"{largest:.6g}"
+        )
+    F, Q = np.eye(p, k=-1), np.zeros((p, p))
+    F[0], Q[0, 0] = a, q
+    return stationary(F, Q)
+
+
+def _real_signal(
+    a: Float, q: float, n: int, rng: np.random.Generator, batch: tuple[int, ...]
+) -> Float:
+    from scipy.linalg import hankel
+    from scipy.signal import lfilter
+
+    values, vectors = np.linalg.eigh(stationary_covariance(a, q))
+    half = vectors * np.sqrt(np.maximum(values, 0))
+    past = rng.standard_normal((*batch, len(a))) @ half.T  # s(-1), s(-2), ...
+    v = np.sqrt(q) * rng.standard_normal((*batch, n))
+    s, _ = lfilter([1.0], [1.0, *-a], v, axis=-1, zi=past @ hankel(a))
+    return np.asarray(s)

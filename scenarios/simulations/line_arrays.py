@@ -1,0 +1,200 @@
+"""Sources that move past a half-wavelength line array: the simulations of SVALSE's paper.
+
+Amplitudes are redrawn at every step, and the noise of a step is set by the sources' power in that
+very step, so that the signal-to-noise ratio is the same in every snapshot.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+
+from arrivals.measurement_models import ArraySnapshot, SensorArray
+from arrivals.motion_models import BernoulliVonMises
+from arrivals.scenarios.base import Scenario, Trial, register
+from arrivals.typing import Bool, Complex, Float
+from arrivals.validation import count, number
+
+
+@dataclass(frozen=True)
+class LineScenario(Scenario):
+    """Sources in front of a half-wavelength line array.
+
+    Parameters
+    ----------
+    snr_db : float
+        Summed power of the sources over the noise power, after beamforming of one snapshot.
+    n_sensors, n_steps : int
+    """
+
+    snr_db: float = 20.0
+    n_sensors: int = 15
+    n_steps: int = 50
+
+    def __post_init__(self) -> None:
+        number("snr_db", self.snr_db)
+        count("n_sensors", self.n_sensors, least=2)
+        count("n_steps", self.n_steps)
+
+    @property
+    def measurement(self) -> ArraySnapshot:
+        """The array at a wavelength of 1 m."""
+        return ArraySnapshot(SensorArray.ula(self.n_sensors, spacing=0.5), wavelength=1.0)
+
+    @abstractmethod
+    def doa_deg(self) -> Float:
+        """Return the directions, degrees, (n_steps, n_sources), on or off."""
+
+    def active(self, rng: np.random.Generator) -> Bool:
+        """Draw which sources are on, (n_steps, n_sources); all of them as a rule."""
+        return np.ones(self.doa_deg().shape, dtype=np.bool_)
+
+    def amplitudes(self, rng: np.random.Generator) -> Complex:
+        """Draw complex amplitudes α ~ CN(0, 1), (n_steps, n_sources), for unit-norm steering."""
+        return complex_normal(rng, self.doa_deg().shape)
+
+    def signals(self, rng: np.random.Generator) -> tuple[Float, Complex, Float]:
+        """Draw what there is to hear: directions, amplitudes at a sensor, noise variances."""
+        active = self.active(rng)
+        alpha = np.where(active, self.amplitudes(rng), 0)
+        truth = np.where(active, np.deg2rad(self.doa_deg()), np.nan)
+        power = (np.abs(alpha) ** 2).sum(axis=1) / self.n_sensors
+        noise = 10 ** (-self.snr_db / 10) * power
+        return truth, alpha / np.sqrt(self.n_sensors), noise
+
+    def sample(self, rng: np.random.Generator) -> Trial:
+        """Draw one trial."""
+        truth, amplitude, noise = self.signals(rng)
+        model = self.measurement
+        waves = model.wave(truth, amplitude)
+        u = np.sqrt(noise)[:, None] * complex_normal(rng, waves.shape)
+        motion = BernoulliVonMises(sigma_doa=np.deg2rad(1.5))
+        return Trial(waves + u, truth, model, motion)
+
+
+def complex_normal(rng: np.random.Generator, shape: tuple[int, ...]) -> Complex:
+    """Draw circular complex normal numbers of variance 1.
+
+    Examples
+    --------
+    >>> complex_normal(np.random.default_rng(0), (2, 3)).shape
+    (2, 3)
+    """
+    re, im = rng.standard_normal((2, *shape)) / np.sqrt(2)
+    return np.asarray(re + 1j * im)
+
+
+@register("svalse_scenario2")
+@dataclass(frozen=True)
+class SixStatic(LineScenario):
+    """Six static sources at -70, -55, -40, 35, 50 and 65 degrees.
+
+    References
+    ----------
+    Park, Meyer and Gerstoft, JASA 153(1), 2023, Figs 9 and 10 (scenario 2).
+    """
+
+    def doa_deg(self) -> Float:
+        """Return the directions, degrees."""
+        return np.tile([-70.0, -55.0, -40.0, 35.0, 50.0, 65.0], (self.n_steps, 1))
+
+
+@register("svalse_scenario1")
+@dataclass(frozen=True)
+class ThreeStatic(LineScenario):
+    """Three static sources at -3, 2 and 60 degrees, of amplitude 10 and random phases.
+
+    References
+    ----------
+    Park, Meyer and Gerstoft, JASA 153(1), 2023, Figs 8 and 10 (scenario 1).
+    """
+
+    def doa_deg(self) -> Float:
+        """Return the directions, degrees."""
+        return np.tile([-3.0, 2.0, 60.0], (self.n_steps, 1))
+
+    def amplitudes(self, rng: np.random.Generator) -> Complex:
+        """Draw 10 exp(jφ), φ uniform."""
+        return np.asarray(10 * np.exp(2j * np.pi * rng.random(self.doa_deg().shape)))
+
+
+@register("svalse_fig4")
+@dataclass(frozen=True)
+class SixSources(SixStatic):
+    """Six sources, of which the third and the fourth move and cross.
+
+    References
+    ----------
+    Park, Meyer and Gerstoft, JASA 153(1), 2023, Fig. 4.
+
+    Examples
+    --------
+    >>> trial = SixSources(snr_db=20.0).sample(np.random.default_rng(0))
+    >>> trial.measurements.shape, np.rad2deg(trial.truth[0]).round(1)
+    ((50, 15), array([-70. , -55. , -33.9,  35. ,  50. ,  65. ]))
+    """
+
+    def doa_deg(self) -> Float:
+        """Return the directions, degrees: -40 + 80/(1 + exp(-0.1 (n - 25))) and 35 - n move."""
+        n = np.arange(self.n_steps)
+        doa = super().doa_deg()
+        doa[:, 2] += 80 / (1 + np.exp(-0.1 * (n - 25)))
+        doa[:, 3] -= n
+        return doa
+
+
+@register("svalse_fig5")
+@dataclass(frozen=True)
+class RandomPairsOff(SixSources):
+    """The six sources, two of them, drawn anew for every step but the first, off.
+
+    References
+    ----------
+    Park, Meyer and Gerstoft, JASA 153(1), 2023, Fig. 5, in one reading of its caption.
+    """
+
+    def active(self, rng: np.random.Generator) -> Bool:
+        """Draw two sources for each step, and switch them off."""
+        active = super().active(rng)
+        off = np.argsort(rng.random(active.shape), axis=1)[:, :2]
+        np.put_along_axis(active, off, values=False, axis=1)
+        active[0] = True
+        return active
+
+
+@register("svalse_fig5b")
+@dataclass(frozen=True)
+class OnePairOff(SixSources):
+    """The six sources, one random pair of them off from the second step on.
+
+    References
+    ----------
+    Park, Meyer and Gerstoft, JASA 153(1), 2023, Fig. 5, in the other reading of its caption.
+    """
+
+    def active(self, rng: np.random.Generator) -> Bool:
+        """Draw two sources, and switch them off after the first step."""
+        active = super().active(rng)
+        active[1:, rng.permutation(6)[:2]] = False
+        return active
+
+
+@register("svalse_fig6")
+@dataclass(frozen=True)
+class PairsInTurn(SixSources):
+    """The six sources, neighbouring pairs off in turn: steps 1-15, 16-30 and 31-50.
+
+    References
+    ----------
+    Park, Meyer and Gerstoft, JASA 153(1), 2023, Fig. 6.
+    """
+
+    def active(self, rng: np.random.Generator) -> Bool:
+        """Switch off 50 and 65 degrees, then the two that move, then -70 and -55 degrees."""
+        active = super().active(rng)
+        active[:15, 4:] = False
+        active[15:30, 2:4] = False
+        active[30:, :2] = False
+        return active

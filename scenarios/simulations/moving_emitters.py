@@ -1,0 +1,130 @@
+"""Sources that move through a field of sensors: they cross, they appear and vanish."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from arrivals.motion_models import ConstantVelocity, MotionModel
+from arrivals.scenarios.base import register
+from arrivals.scenarios.simulations.signal_strength import RSSScenario, lattice
+from arrivals.typing import Float
+from arrivals.validation import count
+
+
+@dataclass(frozen=True)
+class MovingSources(RSSScenario):
+    """Sources on straight ways.
+
+    Parameters
+    ----------
+    n_sources, n_sensors, radius, n_snapshots, alpha, noise_db, power_db, power_std_db
+        As in `RSSScenario`.
+    n_steps : int
+    q : float
+        Of the tracker's `ConstantVelocity`, m²/s³.
+    """
+
+    n_steps: int = 40
+    q: float = 0.1
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        count("n_steps", self.n_steps)
+
+    @property
+    def motion(self) -> MotionModel:
+        """Constant velocity, disturbed."""
+        return ConstantVelocity(self.q)
+
+
+@register("rss_crossing")
+@dataclass(frozen=True)
+class CrossingSources(MovingSources):
+    """Sources at 2 to 2.5 m/s from all sides that pass the middle, and each other, within 10 m.
+
+    Parameters
+    ----------
+    n_sources, n_sensors, radius, n_snapshots, alpha, noise_db, power_db, power_std_db
+        As in `RSSScenario`.
+    n_steps, q
+        As in `MovingSources`.
+    start_std, speed_std : float
+        Errors of the start, m and m/s; the tracker starts at rest.
+
+    Examples
+    --------
+    >>> CrossingSources().sample(np.random.default_rng(0)).truth.shape
+    (40, 3, 2)
+    """
+
+    start_std: float = 5.0
+    speed_std: float = 2.5
+
+    def positions(self, rng: np.random.Generator) -> Float:
+        """Draw the ways."""
+        K = self.n_sources
+        phi = rng.uniform(0, 2 * np.pi) + 2 * np.pi * np.arange(K) / K
+        along = np.stack([np.cos(phi), np.sin(phi)], axis=-1)
+        across = np.stack([-np.sin(phi), np.cos(phi)], axis=-1)
+        t = np.arange(self.n_steps) - (self.n_steps - 1) / 2
+        way = np.multiply.outer(t, rng.uniform(2.0, 2.5, K))
+        return np.asarray(way[..., None] * along + rng.uniform(-5, 5, K)[:, None] * across)
+
+    def start(self, truth: Float, rng: np.random.Generator) -> tuple[Float | None, Float]:
+        """Draw the first positions with an error; velocities are not known."""
+        x0 = np.zeros((self.n_sources, 4))
+        x0[:, ::2] = truth[0] + self.start_std * rng.standard_normal(truth[0].shape)
+        return x0, np.diag([self.start_std, self.speed_std] * 2) ** 2
+
+
+@register("rss_birth_death")
+@dataclass(frozen=True)
+class BirthsAndDeaths(MovingSources):
+    """Sources at 1 m/s that appear and vanish; the tracker is told nothing of them.
+
+    Parameters
+    ----------
+    n_sources, n_sensors, radius, n_snapshots, alpha, noise_db, power_db, power_std_db
+        As in `RSSScenario`.
+    n_steps, q
+        As in `MovingSources`.
+    apart : float
+        Least distance of the ways' middles, m.
+
+    Notes
+    -----
+    Every source is on for half to all of the time, the first from the beginning.
+
+    Examples
+    --------
+    >>> truth = BirthsAndDeaths().sample(np.random.default_rng(0)).truth
+    >>> np.isfinite(truth[::20, :, 0]).sum(axis=1)
+    array([1, 4, 4])
+    """
+
+    n_sources: int = 4
+    n_steps: int = 60
+    apart: float = 60.0
+
+    def positions(self, rng: np.random.Generator) -> Float:
+        """Draw the ways, and when the sources are on."""
+        K, T = self.n_sources, self.n_steps
+        middles = lattice(K, self.apart, centred=True)
+        turn = rng.uniform(0, 2 * np.pi)
+        c, s = np.cos(turn), np.sin(turn)
+        phi = rng.uniform(0, 2 * np.pi, K)
+        t = np.arange(T) - (T - 1) / 2
+        way = 0.5 * np.multiply.outer(t, np.stack([np.cos(phi), np.sin(phi)], axis=-1))
+        truth = middles @ np.array([[c, s], [-s, c]]) + way
+        length = rng.uniform(0.5, 0.9, K) * T
+        first = np.floor(rng.uniform(0, T - length))
+        first[0] = 0
+        on = (np.arange(T)[:, None] >= first) & (np.arange(T)[:, None] < first + length)
+        truth[~on] = np.nan
+        return np.asarray(truth)
+
+    def start(self, truth: Float, rng: np.random.Generator) -> tuple[Float | None, Float]:
+        """Tell nothing but how fast sources may be."""
+        return None, np.diag([100.0, 1.0, 100.0, 1.0])

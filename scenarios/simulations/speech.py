@@ -1,0 +1,142 @@
+"""Two voices before a symmetric line, one of them walking: the report's Figs 8 and 9."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+
+from arrivals.motion_models import AutoregressiveSources, yule_walker
+from arrivals.scenarios.base import Trial, register
+from arrivals.scenarios.simulations.autoregressive_sources import SourceField
+from arrivals.typing import Float
+from arrivals.validation import count
+
+SHIPPED = ("synth_count_up_8k.wav", "synth_count_down_8k.wav")
+
+
+@register("ar_fig8")
+@dataclass(frozen=True)
+class SpeechField(SourceField):
+    """Speech from 40 to 0 degrees, and from -20, five sensors, 30 dB (and 10 and 5): Fig. 8.
+
+    Two synthetic voices that count, up and down, are shipped; the report's own sounds are not
+    known.
+
+    Parameters
+    ----------
+    doa_deg, end_deg, distances, snr_db
+        As in `SourceField`.
+    order : int
+        Of the autoregressive model, fitted to the whole recordings; Fig. 9 has 2.
+    recordings : sequence of path, optional
+        Sound files with one channel in place of the two shipped, one a source. Cut to the
+        shortest; without their mean, and scaled to power 1.
+
+    Notes
+    -----
+    The array hears real sources as complex snapshots, as narrow-band receivers would: the phases
+    of the array at one frequency, whatever the source's own spectrum. That is the report's model;
+    a microphone array in a room would see a delay in its place.
+
+    References
+    ----------
+    Magakian, report of 25 April 2024 on Gu, Chan, Zhu and Swamy, IEEE TCAS-II 60(1), 2013, 4.3.
+
+    Examples
+    --------
+    >>> trial = SpeechField().sample(np.random.default_rng(0))
+    >>> trial.measurements.shape, trial.motion.orders, trial.motion.real_valued
+    ((24271, 5), (1, 1), True)
+    """
+
+    doa_deg: Sequence[float] = (40.0, -20.0)
+    end_deg: Sequence[float] | None = (0.0, -20.0)
+    distances: Sequence[float] = (0.25, 0.5)
+    order: int = 1
+    recordings: Sequence[str | Path] | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        count("order", self.order)
+        given = SHIPPED if self.recordings is None else tuple(map(str, self.recordings))
+        if len(given) != self.n_sources:
+            raise ValueError(
+                f"recordings must be one for each of {self.n_sources} sources; got {len(given)}"
+            )
+        if self.recordings is not None:
+            object.__setattr__(self, "recordings", given)
+
+    @property
+    def signals(self) -> Float:
+        """The sources, (n_steps, n_sources)."""
+        own: list[Float] = (
+            [voice(name) for name in SHIPPED]
+            if self.recordings is None
+            else [normalised(path) for path in self.recordings]
+        )
+        shortest = min(map(len, own))
+        return np.stack([signal[:shortest] for signal in own], axis=-1)
+
+    @property
+    def motion(self) -> AutoregressiveSources:
+        """The models that Yule and Walker's equations give."""
+        fits = [yule_walker(signal, self.order) for signal in self.signals.T]
+        coefficients, noise = (np.array(each) for each in zip(*fits, strict=True))
+        return AutoregressiveSources(coefficients, noise, real_valued=True)
+
+    def sample(self, rng: np.random.Generator) -> Trial:
+        """Draw the noise."""
+        return self.heard(self.signals, self.motion, rng)
+
+
+@register("ar_fig9")
+@dataclass(frozen=True)
+class SpeechOfOrderTwo(SpeechField):
+    """The same speech with models of order 2, on which the report says that the method fails.
+
+    References
+    ----------
+    As in `SpeechField`.
+
+    Examples
+    --------
+    >>> SpeechOfOrderTwo().motion.orders
+    (2, 2)
+    """
+
+    order: int = 2
+
+
+@cache
+def voice(name: str) -> Float:
+    """Return a shipped recording, of mean 0 and power 1, (n_steps,)."""
+    signal = normalised(Path(str(files("arrivals.scenarios") / "data" / name)))
+    signal.setflags(write=False)
+    return signal
+
+
+def normalised(path: str | Path) -> Float:
+    """Read a sound file with one channel, of mean 0 and power 1, (n_steps,).
+
+    Raises
+    ------
+    ValueError
+        If it is none, has several channels, or is silent.
+    """
+    from arrivals.recordings.readers import read
+
+    samples = np.asarray(read(path).samples, dtype=np.float64)
+    if samples.ndim == 2 and samples.shape[1] == 1:
+        samples = samples[:, 0]
+    if samples.ndim != 1:
+        raise ValueError(f"{path} must have one channel; it has {samples.shape[1]}")
+    signal = samples - samples.mean()
+    power = float(np.mean(signal**2))
+    if not power > 0:
+        raise ValueError(f"{path} is silent")
+    return np.asarray(signal / np.sqrt(power))

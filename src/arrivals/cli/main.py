@@ -1,0 +1,172 @@
+"""The command line: track a recording or a stream, list what there is, show it on shipped data."""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import inspect
+import sys
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any, NoReturn
+
+import arrivals
+from arrivals.cli.locate import add_locate
+from arrivals.cli.track import track
+from arrivals.recordings.stream import DTYPES
+from arrivals.scenarios import base as scenarios
+from arrivals.scenarios.demos.infrasound import infrasound
+from arrivals.scenarios.demos.swellex96 import demo
+from arrivals.scenarios.reproduce.studies import add_reproduce
+from arrivals.trackers import available, find
+
+DEMOS: dict[str, Callable[..., None]] = {"swellex96": demo, "brp2012": infrasound}
+
+
+def run(argv: Sequence[str] | None = None) -> None:
+    """Do what the arguments say; what is wrong with them, or with a file, is raised.
+
+    Raises
+    ------
+    ValueError, TypeError, OSError
+
+    Examples
+    --------
+    >>> run(["track", "tow.wav"])
+    Traceback (most recent call last):
+    ValueError: the following arguments are required: --array (see arrivals track -h)
+    """
+    arguments = _parser().parse_args(argv)
+    arguments.command(arguments)
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser whose errors are raised: they become one line, like all others."""
+
+    def error(self, message: str) -> NoReturn:
+        raise ValueError(f"{message} (see {self.prog} -h)")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog="arrivals",
+        description="Track directions of arrival from the raw samples or snapshots of an array, "
+        "or positions from signal strength.",
+        allow_abbrev=False,
+    )
+    parser.add_argument("--version", action="version", version=f"arrivals {arrivals.__version__}")
+    commands = parser.add_subparsers(metavar="COMMAND", required=True)
+    _add_track(commands)
+    _add_demo(commands)
+    add_locate(commands, _bar)
+    add_reproduce(commands)
+    listing = commands.add_parser("list", help="list trackers and scenarios")
+    listing.set_defaults(command=_list)
+    return parser
+
+
+def _add_track(commands: Any) -> None:
+    add = commands.add_parser(
+        "track",
+        help="track directions through a recording or a stream",
+        description="Track directions of arrival through a recording (WAV, npy, npz, MATLAB, "
+        "CSV), or through raw interleaved samples from standard input.",
+        epilog="live: arecord -t raw -f S16_LE -r 48000 -c 8 | "
+        "arrivals track - --array ARRAY.toml --frequency 3000 --rate 48000",
+        allow_abbrev=False,
+    )
+    option = add.add_argument
+    option("file", metavar="FILE", help="recording; - for raw samples from standard input")
+    option("--array", required=True, metavar="TOML", help="array file")
+    option("--frequency", type=float, metavar="HZ", help="of the snapshots")
+    option("--frequencies", nargs="+", type=float, metavar="HZ", help="of the bins of each step")
+    option("--band", nargs=2, type=float, metavar=("F1", "F2"),
+           help="Hz: bins that fill it, or the band of a tracker of real samples")  # fmt: skip
+    option("--snapshots", type=int, default=1, metavar="N",
+           help="successive windows in one step (1)")  # fmt: skip
+    option("--snr", type=float, default=0.0, metavar="DB", help="expected in the band (0)")
+    option("--tracker", default="svalse", metavar="NAME", help="see `arrivals list` (svalse)")
+    option("--set", action="append", default=[], type=_setting, metavar="NAME=VALUE",
+           help="parameter of the tracker, such as motion__p_activate=0.2; repeatable")  # fmt: skip
+    option("--out", metavar="CSV", help="tracks file (standard output)")
+    option("--signals", metavar="WAV",
+           help="the separated sources, WAV or npy, of a tracker that tells them")  # fmt: skip
+    option("--plot", metavar="PNG", help="picture of the tracks over the beam power")
+    option("--rate", type=float, metavar="HZ", help="samples per second, if the file has none")
+    option("--window", type=int, metavar="N", help="samples of a snapshot's window")
+    option("--hop", type=int, metavar="N",
+           help="samples from window to window (the window), or from line to line (1)")  # fmt: skip
+    option("--variable", metavar="NAME", help="array in an npz or mat file")
+    option("--transpose", action="store_true", help="the rows of the file are channels")
+    option("--dtype", choices=tuple(DTYPES), help="samples of standard input (int16)")
+    option("--channels", type=int, metavar="N", help="channels of standard input (the array's)")
+    option("--quiet", action="store_true", help="no progress bar")
+    add.set_defaults(command=lambda arguments: track(arguments, _bar(_is_quiet(arguments))))
+
+
+def _add_demo(commands: Any) -> None:
+    told = [(inspect.getdoc(show) or "").partition("\n\nParameters")[0] for show in DEMOS.values()]
+    add = commands.add_parser(
+        "demo",
+        help="track shipped data by three methods: a towed source, or recorded infrasound",
+        description="\n\n".join(f"{n}: {text}" for n, text in zip(DEMOS, told, strict=True)),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    add.add_argument("name", nargs="?", default="swellex96", choices=tuple(DEMOS),
+                     help="(swellex96)")  # fmt: skip
+    add.add_argument("--out", default="arrivals-demo", metavar="DIR", help="(arrivals-demo)")
+    add.add_argument("--quiet", action="store_true", help="no progress bar")
+    add.set_defaults(
+        command=lambda arguments: DEMOS[arguments.name](arguments.out, _bar(arguments.quiet))
+    )
+
+
+def _setting(argument: str) -> tuple[str, Any]:
+    """Return name and value of NAME=VALUE; what is no Python literal is a string.
+
+    Examples
+    --------
+    >>> _setting("motion__kappa=300"), _setting("reference=first")
+    (('motion__kappa', 300), ('reference', 'first'))
+    """
+    name, equals, value = argument.partition("=")
+    if not (name and equals):
+        raise argparse.ArgumentTypeError(f"must be NAME=VALUE; got {argument!r}")
+    try:
+        return name, ast.literal_eval(value)
+    except (ValueError, SyntaxError):
+        return name, value
+
+
+def _bar(quiet: bool) -> Callable[..., Any]:
+    """Return tqdm on standard error, silent where nobody looks."""
+    from tqdm import tqdm
+
+    return partial(tqdm, file=sys.stderr, disable=quiet or None, unit="step")
+
+
+def _is_quiet(arguments: argparse.Namespace) -> bool:
+    """Tell whether a bar is not wanted, or would come between the lines of a live table."""
+    live = arguments.file == "-" and arguments.out is None
+    return bool(arguments.quiet or (live and sys.stdout.isatty()))
+
+
+def _list(arguments: argparse.Namespace) -> None:
+    kinds: list[tuple[str, list[str], Callable[[str], type]]] = [
+        ("trackers", available(), find),
+        ("scenarios", scenarios.available(), scenarios.find_scenario),
+    ]
+    for noun, names, find_kind in kinds:
+        if names:
+            print(noun)
+        for name in names:
+            print(f"  {name:<{max(map(len, names))}}  {_summary(find_kind, name)}")
+
+
+def _summary(find_kind: Callable[[str], type], name: str) -> str:
+    """Return the first line of the docstring, or why somebody's entry point does not load."""
+    try:
+        return (inspect.getdoc(find_kind(name)) or "").partition("\n")[0]
+    except Exception as error:
+        return f"(cannot be loaded: {error})"

@@ -1,0 +1,208 @@
+"""Separated sources from recordings: what a tracker of signals is given, and the files it makes."""
+
+from __future__ import annotations
+
+import inspect
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from arrivals.measurement_models import ArraySnapshot
+from arrivals.motion_models import AutoregressiveSources, yule_walker
+from arrivals.trackers import ARKalmanQRDRLS, Run
+from arrivals.trackers.run import replacing
+from arrivals.typing import Complex
+from arrivals.validation import count, positive
+
+# Sec. 5 and 7 of the specification: what speech wants, with its pauses
+FOR_SPEECH = {"ar_forgetting": 0.99, "ridge": 5.0, "gate": 0.3, "adapt_drive": False}
+ORDER = 2  # of the AR models that are started from
+QUIET = 0.01  # of the power of a recording: the noise that is started from
+
+
+def analytic(samples: ArrayLike, rate: float, band: Sequence[float] | None = None) -> Complex:
+    """Return real samples of an array as snapshots, one each: their analytic signals.
+
+    Parameters
+    ----------
+    samples : array_like, shape (n_samples, n_sensors)
+        NaN where missing.
+    rate : float
+        Hz.
+    band : (float, float), optional
+        Edges in Hz of what is kept; all if None.
+
+    Returns
+    -------
+    ndarray, shape (n_samples, n_sensors)
+        Their real parts are the samples, as far as they lie in the band.
+
+    Raises
+    ------
+    ValueError
+        If the band does not lie between 0 and half the rate.
+
+    Examples
+    --------
+    >>> t = np.arange(8) / 8
+    >>> np.abs(analytic(np.cos(2 * np.pi * t)[:, None], rate=8.0)[:3, 0]).round(3)
+    array([1., 1., 1.])
+    """
+    x = np.asarray(samples, dtype=np.float64)
+    low, high = (0.0, rate / 2) if band is None else (float(edge) for edge in band)
+    if not 0 <= low < high <= positive("rate", rate) / 2:
+        raise ValueError(
+            f"band must lie between 0 and half the rate, {rate / 2:g} Hz; got {low:g} and {high:g}"
+        )
+    there = np.isfinite(x)
+    n = len(x)
+    frequency = np.fft.fftfreq(n, 1 / rate)
+    weight = np.where((frequency > 0) & (frequency >= low) & (frequency <= high), 2.0, 0.0)
+    for edge in {0, n // 2} if n % 2 == 0 else {0}:
+        weight[edge] = float(low <= abs(frequency[edge]) <= high)
+    z = np.fft.ifft(weight[:, None] * np.fft.fft(np.where(there, x, 0.0), axis=0), axis=0)
+    return np.where(there, z, complex(np.nan, np.nan))
+
+
+def for_recording(
+    params: Mapping[str, Any], z: Complex, measurement: ArraySnapshot, real_valued: bool
+) -> tuple[ArraySnapshot, AutoregressiveSources]:
+    """Return the models to start from on snapshots of unknown power.
+
+    Noise is a hundredth of the recording's power; the sources share that equally and have its
+    spectrum, by Yule and Walker's equations of order 2 on one sensor. What is in `params`, by
+    nested names or as `motion`, goes before.
+
+    Parameters
+    ----------
+    params : mapping
+        Parameters of the tracker.
+    z : ndarray, shape (n_steps, n_sensors)
+    measurement : ArraySnapshot
+    real_valued : bool
+        Whether the sources are real-valued.
+
+    Examples
+    --------
+    >>> from arrivals.measurement_models import SensorArray
+    >>> model = ArraySnapshot(SensorArray.symmetric([0.5]), wavelength=1.0)
+    >>> z = np.random.default_rng(0).standard_normal((100, 3)) + 0j
+    >>> noise, motion = for_recording({}, z, model, real_valued=True)
+    >>> motion.n_sources, round(float(motion.power.sum() / np.mean(z.real**2)), 6)
+    (2, 1.0)
+    """
+    own = {key.partition("__")[2]: value for key, value in params.items()
+           if key.startswith("motion__")}  # fmt: skip
+    whole = z[np.isfinite(z).all(axis=1)]
+    if not np.any(whole):
+        raise ValueError(
+            "the recording is silent, or no sample of it is heard by all sensors: leave out those "
+            "that do not work, and their partners, by `missing` in the array file"
+        )
+    total = float(np.mean(whole.real**2 if real_valued else np.abs(whole) ** 2))
+    noisy = measurement.replace(noise=QUIET * total * (2 if real_valued else 1))
+    if "motion" in params:
+        return noisy, params["motion"]
+    heard = whole[:, whole.shape[1] // 2]
+    a, _ = yule_walker(heard.real if real_valued else heard, min(ORDER, len(heard) - 1))
+    coefficients = own.get("coefficients", [a.tolist()] * 2)
+    own = {"real_valued": real_valued} | own
+    motion = AutoregressiveSources(**{"coefficients": coefficients} | own)
+    if "noise" not in own:
+        motion = motion.scaled(total / motion.n_sources)
+    return noisy, motion
+
+
+def separator(
+    params: Mapping[str, Any], z: Complex, measurement: ArraySnapshot, real_samples: bool
+) -> ARKalmanQRDRLS:
+    """Make the tracker for a recording, with the settings for speech if it holds real samples."""
+    names = inspect.signature(ARKalmanQRDRLS).parameters
+    for name in params:
+        if name.partition("__")[0] == "measurement":
+            raise ValueError(f"--set {name}: the measurement comes from --array and --frequency")
+    noisy, motion = for_recording(params, z, measurement, real_samples)
+    plain = {name: value for name, value in params.items() if name in names and name != "motion"}
+    tracker = ARKalmanQRDRLS(noisy, motion, **(FOR_SPEECH if real_samples else {}) | plain)
+    return tracker.set_params(**{name: params[name] for name in params if name not in names})
+
+
+def thinned(run: Run, every: int) -> Run:
+    """Return every n-th step of a run, the n-th first; its extras stay whole.
+
+    Parameters
+    ----------
+    run : Run
+    every : int
+        n.
+    """
+    last = slice(count("every", every) - 1, None, every)
+    fields = {name: values[last] for name, values in run.fields.items()}
+    return replace(run, fields=fields, x=run.x[last], n_found=run.n_found[last],
+                   time=run.time[last])  # fmt: skip
+
+
+def check_suffix(path: str) -> None:
+    """Raise a ValueError if signals cannot be written to a file of such a name.
+
+    Examples
+    --------
+    >>> check_suffix("out.mp3")
+    Traceback (most recent call last):
+    ValueError: out.mp3: signals are written as .wav or .npy
+    """
+    if Path(path).suffix.lower() not in (".wav", ".npy"):
+        raise ValueError(f"{path}: signals are written as .wav or .npy")
+
+
+def check_writable(path: str, real_valued: bool, rate: float | None) -> None:
+    """Raise a ValueError if such signals do not go into such a file.
+
+    Examples
+    --------
+    >>> check_writable("out.wav", False, 8000.0)
+    Traceback (most recent call last):
+    ValueError: out.wav: a WAV file holds no complex signals: write them as .npy
+    """
+    check_suffix(path)
+    if Path(path).suffix.lower() == ".npy":
+        return
+    if not real_valued:
+        raise ValueError(f"{path}: a WAV file holds no complex signals: write them as .npy")
+    if rate is None:
+        raise ValueError(f"{path}: a WAV file wants the samples per second: pass --rate")
+
+
+def write_signals(
+    path: str | os.PathLike[str], signals: ArrayLike, rate: float | None = None
+) -> None:
+    """Write signals, (n_steps, n_sources), one channel a source; the file appears when complete.
+
+    Parameters
+    ----------
+    path : path
+        ``.wav``: 32 bit floats, silence where a signal is NaN; ``.npy``: numbers as they are.
+    signals : array_like
+        Real, or complex for ``.npy``.
+    rate : float, optional
+        Hz, for ``.wav``.
+
+    Raises
+    ------
+    ValueError
+        If a WAV file is to hold complex numbers, or has no rate.
+    """
+    from scipy.io import wavfile
+
+    values = np.asarray(signals)
+    check_writable(os.fspath(path), values.dtype.kind != "c", rate)
+    with replacing(path, binary=True) as file:
+        if Path(path).suffix.lower() == ".npy" or rate is None:
+            np.save(file, values)
+        else:
+            wavfile.write(file, round(rate), np.nan_to_num(values).astype(np.float32))

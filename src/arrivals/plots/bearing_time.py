@@ -1,0 +1,283 @@
+"""Pictures of results: they take an `ax` and give it back; matplotlib comes when it is wanted."""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TextIO, cast
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from arrivals.measurement_models import ArraySnapshot, SensorArray
+from arrivals.trackers.beamforming.cbf import beam_power, look_directions, looks_power
+from arrivals.trackers.run import Run, replacing
+from arrivals.typing import Bool, Float, Int
+from arrivals.validation import one_of, positive, shaped
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# Strong colours that differ from each other on grey, also for the colour-blind.
+PALETTE = (
+    "#d62728", "#1f77b4", "#ff7f0e", "#2ca02c", "#9467bd",
+    "#e377c2", "#17becf", "#8c564b", "#b8a900", "#00429d",
+)  # fmt: skip
+NEUTRAL = "#202020"
+N_DIRECTIONS, N_COLUMNS = 361, 1500  # of the beam's image, at most
+PICTURES = (".png", ".pdf", ".svg", ".jpg")
+N_NUMBERED = 32  # sensors that still have room for a number
+
+
+def plot_bearing_time(
+    run: Run,
+    *,
+    snapshots: ArrayLike | None = None,
+    measurement: ArraySnapshot | None = None,
+    time: ArrayLike | None = None,
+    dynamic_range_db: float = 30.0,
+    ax: Axes | None = None,
+) -> Axes:
+    """Draw directions over time, the conventional beam's power behind them.
+
+    Each label has a colour (they repeat), directions without a label are dark, and the opacity
+    is the existence; where a tracker gives none, all are opaque.
+
+    Parameters
+    ----------
+    run : Run
+        Of a tracker of directions, n_steps long.
+    snapshots : array_like, shape (n_steps, *measurement.shape), optional
+        What the tracker was given; the beam is not drawn without it.
+    measurement : ArraySnapshot, optional
+        Array and wavelength, wanted with `snapshots`.
+    time : array_like, shape (n_steps,), optional
+        Seconds, growing; the number of the step if None.
+    dynamic_range_db : float
+        Power shown, down from the highest of all steps, dB.
+    ax : matplotlib Axes, optional
+        A new figure's if None; it belongs to no window; `save` writes it.
+
+    Returns
+    -------
+    matplotlib Axes
+        Directions upwards, degrees; time to the right.
+
+    Raises
+    ------
+    ValueError
+        If shapes do not fit the run, or `snapshots` come without a `measurement`.
+    TypeError
+        If the run holds no directions.
+
+    Examples
+    --------
+    >>> from arrivals.trackers import SVALSE
+    >>> model = ArraySnapshot(SensorArray.ula(8, spacing=0.5), wavelength=1.0, noise=0.01)
+    >>> z = model.simulate([[0.50], [0.51], [0.52]], 1.0, np.random.default_rng(0))
+    >>> ax = plot_bearing_time(SVALSE(model).run(z), snapshots=z, measurement=model)
+    >>> ax.get_xlabel(), ax.get_ylabel()
+    ('step', 'direction of arrival, degrees')
+    """
+    if "doa" not in run.fields:
+        raise TypeError(f"the run must hold directions; it holds {run.kind.__name__}")
+    ax = _axes((9.0, 4.5)) if ax is None else ax
+    at = np.arange(len(run), dtype=np.float64) if time is None else shaped("time", time, len(run))
+    if snapshots is not None:
+        if measurement is None:
+            raise ValueError("the beam wants a measurement, its array and wavelength")
+        range_db = positive("dynamic_range_db", dynamic_range_db)
+        _draw_beam(ax, at, np.asarray(snapshots), measurement, range_db)
+    _draw_tracks(ax, at, run)
+    line = bool((np.abs(run.doa) > np.pi / 2).sum() == 0)
+    _name_axes(ax, line if measurement is None else measurement.array.dim == 1, time is None)
+    if len(at) > 0:
+        half = (at[-1] - at[0]) / max(1, len(at) - 1) / 2 or 0.5
+        ax.set_xlim(at[0] - half, at[-1] + half)
+    return ax
+
+
+def _name_axes(ax: Axes, line: bool, steps: bool) -> None:
+    limit, tick = (90, 30) if line else (180, 60)
+    ax.set(ylim=(-limit, limit), yticks=np.arange(-limit, limit + 1, tick))
+    ax.set_ylabel("direction of arrival, degrees" if line else "azimuth, degrees")
+    ax.set_xlabel("step" if steps else "time, s")
+
+
+def _draw_beam(
+    ax: Axes, at: Float, snapshots: Any, measurement: ArraySnapshot, range_db: float
+) -> None:
+    """Draw the beam power in grey, light enough for the tracks to stand out."""
+    from matplotlib.colors import LinearSegmentedColormap
+
+    shape = (len(at), *measurement.shape)
+    if snapshots.shape != shape:
+        raise ValueError(f"snapshots must have shape {shape}; got {snapshots.shape}")
+    if not (np.isfinite(snapshots) & (snapshots != 0)).any():
+        return  # silence
+    doa = look_directions(measurement.array, N_DIRECTIONS)
+    starts = np.arange(0, len(at), max(1, -(-len(at) // N_COLUMNS)))
+    blocks = np.split(snapshots, starts[1:])
+    power = np.array([_beam(measurement, doa, block) for block in blocks])
+    level = 10 * np.log10(np.maximum(power / power.max(), 1e-30))
+    light = LinearSegmentedColormap.from_list("light", ["#ffffff", "#c3c8cf", "#4d5560"])
+    image = ax.pcolormesh(
+        _edges(at[starts]), np.rad2deg(_edges(doa)), level.T,
+        cmap=light, vmin=-range_db, vmax=0, rasterized=True,
+    )  # fmt: skip
+    bar = ax.figure.colorbar(image, ax=ax, pad=0.015, aspect=25, extend="min")
+    bar.set_label("beam power, dB re maximum")
+    bar.outline.set_visible(False)
+
+
+def _beam(measurement: ArraySnapshot, doa: Float, block: Any) -> Float:
+    """Return the highest power in each direction of the steps of a block."""
+    if measurement.is_single and measurement.response is None:
+        A = measurement.steering_vector(doa)
+        return np.asarray(beam_power(A, block).max(axis=0))
+    steering = measurement.waves.steering(doa)
+    looks = block.reshape(len(block), measurement.n_bins, measurement.n_snapshots, -1)
+    return np.asarray(np.max([looks_power(steering, np.swapaxes(Y, 1, 2)) for Y in looks], axis=0))
+
+
+def _edges(centres: Float) -> Float:
+    """Return the edges of cells about their centres: one more than there are centres.
+
+    Examples
+    --------
+    >>> _edges(np.array([0.0, 1.0, 3.0]))
+    array([-0.5,  0.5,  2. ,  4. ])
+    """
+    if len(centres) == 1:
+        return np.array([centres[0] - 0.5, centres[0] + 0.5])
+    middle = (centres[1:] + centres[:-1]) / 2
+    first, last = 2 * centres[0] - middle[0], 2 * centres[-1] - middle[-1]
+    return np.concatenate([[first], middle, [last]])
+
+
+def _draw_tracks(ax: Axes, at: Float, run: Run) -> None:
+    """Draw each label as a line through successive steps, and what stands alone as dots."""
+    from matplotlib.collections import LineCollection
+
+    step, slot = np.nonzero(~np.isnan(run.doa))
+    order = np.lexsort([step, run.label[step, slot]])
+    step, slot = step[order], slot[order]
+    label, place = run.label[step, slot], np.stack([at[step], np.rad2deg(run.doa[step, slot])], 1)
+    colour = _colours(label, run.existence[step, slot])
+    joined = _joined(step, label, place[:, 1])
+    lines = list(np.stack([place[:-1][joined], place[1:][joined]], axis=1))
+    for width, paint in ((3.4, "white"), (1.7, colour[1:][joined])):
+        ax.add_collection(LineCollection(lines, colors=paint, linewidths=width, zorder=3))
+    alone = np.ones(len(step), dtype=np.bool_)
+    alone[:-1][joined] = False
+    alone[1:][joined] = False
+    x, y = place[alone].T
+    ax.scatter(x, y, s=9, c=colour[alone], edgecolors="white", linewidths=0.4, zorder=2)
+
+
+def _joined(step: Int, label: Int, degrees: Float) -> Bool:
+    """Tell which neighbours in a list sorted by label and step belong to one line."""
+    same = (np.diff(label) == 0) & (label[1:] >= 0) & (np.diff(step) == 1)
+    furthest = 180 if (np.abs(degrees) > 90).any() else 90  # not across ±180°, on lines ±90°
+    return np.asarray(same & (np.abs(np.diff(degrees)) < furthest))
+
+
+def _colours(label: Int, existence: Float) -> Float:
+    """Return RGBA rows: the colour from the label, the opacity from the existence."""
+    from matplotlib.colors import to_rgba_array
+
+    palette = to_rgba_array((*PALETTE, NEUTRAL))
+    colour = palette[np.where(label < 0, -1, label % len(PALETTE))]
+    colour[:, 3] = np.where(np.isnan(existence), 1.0, np.clip(existence, 0.0, 1.0))
+    return np.asarray(colour)
+
+
+def plot_array(array: SensorArray, *, ax: Axes | None = None) -> Axes:
+    """Draw where the sensors are, numbered from 0 if they are few.
+
+    Parameters
+    ----------
+    array : SensorArray
+    ax : matplotlib Axes, optional
+        A new figure's if None. Sensors in space want one of projection "3d".
+
+    Returns
+    -------
+    matplotlib Axes
+        Metres; a line lies along the horizontal axis.
+
+    Examples
+    --------
+    >>> plot_array(SensorArray.ula(8, spacing=0.5)).get_xlabel()
+    'position, m'
+    """
+    ax = _axes((7.0, 1.6) if array.dim == 1 else (4.5, 4.5), array.dim) if ax is None else ax
+    places = array.positions
+    if array.dim == 1:
+        places = np.column_stack([places, np.zeros(len(places))])
+    cast(Any, ax).scatter(*places.T, s=28, color=PALETTE[1], zorder=3)
+    if array.n_sensors <= N_NUMBERED and array.dim < 3:
+        for number, place in enumerate(places):
+            ax.annotate(str(number), place, (0, 6), textcoords="offset points",
+                        ha="center", fontsize=8)  # fmt: skip
+    _finish_array(ax, array.dim)
+    return ax
+
+
+def _finish_array(ax: Axes, dim: int) -> None:
+    """Name the axes; a line needs no second one."""
+    if dim == 1:
+        ax.axhline(0, color="0.8", linewidth=1, zorder=1)
+        ax.set(xlabel="position, m", yticks=[], ylim=(-1, 1))
+        ax.spines[["left", "right", "top"]].set_visible(False)
+        return
+    ax.set(xlabel="x, m", ylabel="y, m")
+    ax.margins(0.12)
+    if dim == 3:
+        cast(Any, ax).set_zlabel("z, m")
+    else:
+        ax.set_aspect("equal")
+        ax.grid(color="0.92")
+        ax.set_axisbelow(True)
+
+
+def _axes(size: tuple[float, float], dim: int = 2) -> Axes:
+    """Return the axes of a new figure that no window shows."""
+    from matplotlib.figure import Figure
+
+    projection = {"projection": "3d"} if dim == 3 else {}
+    figure = Figure(figsize=size, layout=None if dim == 3 else "constrained")
+    return figure.add_subplot(**projection)
+
+
+def save(ax: Axes, path: str | PathLike[str], *, dpi: float = 150.0) -> None:
+    """Write the figure that has `ax` to a file, which appears only when it is complete.
+
+    Raises
+    ------
+    ValueError
+        If the suffix is none of png, pdf, svg and jpg.
+    OSError
+        If the folder does not exist, or may not be written to.
+
+    Examples
+    --------
+    >>> save(plot_array(SensorArray.ula(8, spacing=0.5)), "array.sketch")
+    Traceback (most recent call last):
+    ValueError: the suffix of a picture must be one of '.png', '.pdf', '.svg', '.jpg'; got '.sketch'
+    """
+    kind = picture_format(path)
+    with replacing(path) as file:
+        cast("Figure", ax.figure).savefig(cast(TextIO, file).buffer, format=kind, dpi=dpi)
+
+
+def picture_format(path: str | PathLike[str]) -> str:
+    """Return the format that a picture's suffix stands for.
+
+    Examples
+    --------
+    >>> picture_format("tracks.PNG")
+    'png'
+    """
+    return one_of("the suffix of a picture", Path(path).suffix.lower(), PICTURES)[1:]

@@ -1,0 +1,111 @@
+"""Trackers that take real samples one by one, on recordings and on streams."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import islice
+from typing import BinaryIO
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from arrivals.measurement_models import ArraySamples, FlatBand, SensorArray
+from arrivals.trackers import Run, Tracker
+from arrivals.trackers.run import Recorder
+from arrivals.typing import Float
+from arrivals.validation import count, one_of, positive
+
+
+def band_samples(
+    array: SensorArray, rate: float, band: Sequence[float], snr_db: float = 0.0
+) -> ArraySamples:
+    """Return the model of a source that fills a band, its edges in Hz.
+
+    Parameters
+    ----------
+    array : SensorArray
+        A line with a wave speed.
+    rate : float
+        Samples per second, Hz.
+    band : (float, float)
+        Lower and upper edge, Hz.
+    snr_db : float
+
+    Raises
+    ------
+    ValueError
+        If the band does not fit the rate, or the array.
+
+    Examples
+    --------
+    >>> array = SensorArray.ula(8, spacing=0.2, speed=1500.0)
+    >>> round(band_samples(array, 16000.0, (1000.0, 3000.0)).kappa, 3)
+    2.133
+    """
+    low, high = (float(edge) for edge in band)
+    rate = positive("rate", rate)
+    if not 0 <= low < high <= rate / 2:
+        raise ValueError(
+            f"band must lie between 0 and half the rate, {rate / 2:g} Hz; got {low:g} and {high:g}"
+        )
+    return ArraySamples(array, rate, FlatBand(low / rate, high / rate), snr_db)
+
+
+def track_samples(
+    tracker: Tracker, samples: Iterable[ArrayLike], rate: float, every: int = 1
+) -> Run:
+    """Run a tracker on every sample, and keep every n-th estimate.
+
+    Parameters
+    ----------
+    tracker : Tracker
+    samples : array_like, shape (n_samples, n_sensors), or any iterable
+    rate : float
+        Samples per second, Hz.
+    every : int
+        n. Times in the run are seconds.
+
+    Examples
+    --------
+    >>> from arrivals.scenarios import create
+    >>> trial = create("interpolation_band").sample(np.random.default_rng(0))
+    >>> run = track_samples(trial.tracker("interpolation_ekf", doa=0.9), trial.measurements, 50, 20)
+    >>> run.time
+    array([0.38, 0.78, 1.18, 1.58, 1.98])
+    """
+    recorder = Recorder(type(tracker.estimate))
+    every = count("every", every)
+    stream = iter(samples)
+    while block := list(islice(stream, every)):
+        for z in block:
+            tracker.predict()
+            tracker.update(z)
+        if len(block) == every:
+            recorder.add(tracker.estimate, tracker.x)
+    run = recorder.run(dt=1.0, elapsed=np.nan)
+    return run.at((every * np.arange(1, len(run) + 1) - 1) / positive("rate", rate))
+
+
+def live_samples(source: BinaryIO, n_channels: int, *, dtype: str = "int16") -> Iterator[Float]:
+    """Yield the frames of a stream of interleaved real samples, one number a channel.
+
+    Parameters
+    ----------
+    source : binary file
+        Little-endian; its `read(n)` waits for n bytes or the end.
+    n_channels : int
+    dtype : str
+        int16 or int32 (scaled to [-1, 1)), float32, float64.
+
+    Examples
+    --------
+    >>> import io
+    >>> [z.tolist() for z in live_samples(io.BytesIO(np.array([0, 16384], "<i2").tobytes()), 2)]
+    [[0.0, 0.5]]
+    """
+    kinds = ("int16", "int32", "float32", "float64")
+    kind = np.dtype(one_of("dtype", dtype, kinds)).newbyteorder("<")
+    size = kind.itemsize * count("n_channels", n_channels)
+    scale = 2.0 ** (1 - 8 * kind.itemsize) if kind.kind == "i" else 1.0
+    while len(block := source.read(size)) == size:
+        yield scale * np.frombuffer(block, kind).astype(np.float64)

@@ -1,0 +1,183 @@
+"""A tracker on a stream of samples: each snapshot is used as soon as it is complete."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from arrivals.recordings.recording import default_window, narrowband
+from arrivals.trackers import Tracker
+from arrivals.trackers.base import missed
+from arrivals.trackers.run import header, text
+from arrivals.typing import Complex
+from arrivals.validation import count, one_of, positive
+
+DTYPES = {
+    "int16": "<i2",
+    "int32": "<i4",
+    "float32": "<f4",
+    "float64": "<f8",
+    "complex64": "<c8",
+    "complex128": "<c16",
+}
+
+
+def live_snapshots(
+    source: BinaryIO,
+    n_channels: int,
+    *,
+    dtype: str = "int16",
+    frequency: float | Sequence[float] | None = None,
+    rate: float | None = None,
+    window: int | None = None,
+    hop: int | None = None,
+) -> Iterator[tuple[float, Complex]]:
+    """Yield the snapshots of a stream of interleaved samples, each as soon as it is complete.
+
+    Parameters
+    ----------
+    source : binary file
+        Frames of one number a channel, little-endian; its `read(n)` waits for n bytes or the end.
+    n_channels : int
+    dtype : str
+        int16 or int32 (scaled to [-1, 1)), float32, float64; or complex64, complex128: then every
+        frame is a snapshot already.
+    frequency, rate, window, hop
+        As in `Recording.snapshots`, whose numbers these are; of several frequencies the lowest
+        sets the window. For complex frames only `rate`,
+        frames per second, has a meaning.
+
+    Yields
+    ------
+    float
+        Centre of the window, s from the first sample; the number of the step for complex frames
+        without a rate.
+    ndarray, shape (n_channels,) or (n_bins, n_channels)
+        Snapshot, at each of several frequencies; NaN where a channel held no finite number.
+
+    Raises
+    ------
+    ValueError
+        If the stream ends before one window is full, or holds no finite number; or if an argument
+        is out of range. A part of a frame or of a window at the end is dropped.
+
+    Examples
+    --------
+    >>> import io
+    >>> source = io.BytesIO(np.array([1j, 2, 3, 4j, 5], "<c8").tobytes())
+    >>> [(time, z.tolist()) for time, z in live_snapshots(source, 2, dtype="complex64")]
+    [(0.0, [1j, (2+0j)]), (1.0, [(3+0j), 4j])]
+    """
+    kind = np.dtype(DTYPES[one_of("dtype", dtype, tuple(DTYPES))])
+    frame = kind.itemsize * count("n_channels", n_channels)
+    if kind.kind == "c":
+        if window is not None or hop is not None:
+            raise ValueError("complex frames are snapshots already: they take no window or hop")
+        window, hop, half, rate = 1, 1, 0.0, 1.0 if rate is None else positive("rate", rate)
+    else:
+        if rate is None or frequency is None:
+            raise ValueError("real samples want a rate and a frequency, Hz")
+        lowest = frequency if isinstance(frequency, float | int) else min(frequency)
+        for each in [frequency] if isinstance(frequency, float | int) else frequency:
+            narrowband(np.empty((0, 1)), rate, each, 2, 1)  # checks both before it waits
+        window = default_window(rate, lowest) if window is None else count("window", window, 2)
+        hop, half = window if hop is None else count("hop", hop), window / 2
+    heard = False
+    for step, block in enumerate(_windows(source, frame, window, hop)):
+        samples = np.frombuffer(block, kind).reshape(window, n_channels)
+        z = _snapshot(samples, rate, frequency, step * hop)
+        heard = heard or bool(np.isfinite(z).any())
+        yield (step * hop + half) / rate, z
+    if not heard:
+        raise ValueError("no sample of the stream is finite")
+
+
+def _windows(source: BinaryIO, frame: int, window: int, hop: int) -> Iterator[bytes]:
+    """Yield the bytes of each full window; its beginnings are `hop` frames apart."""
+    size, step, complete = window * frame, hop * frame, False
+    held = source.read(size)
+    while len(held) == size:
+        complete = True
+        yield held
+        source.read(max(0, step - size))
+        held = held[step:]
+        held += source.read(size - len(held))
+    if not complete:
+        raise ValueError(
+            f"the stream ended after {len(held) // frame} frames of {frame} bytes; "
+            f"one window takes {window}"
+        )
+
+
+def _snapshot(
+    samples: NDArray[Any],
+    rate: float,
+    frequency: float | Sequence[float] | None,
+    first_sample: int,
+) -> Complex:
+    """Return the snapshot of one window of raw samples."""
+    if samples.dtype.kind == "c":
+        with np.errstate(invalid="ignore"):  # signalling NaN, in bytes that are no floats
+            z = samples[0].astype(np.complex128)
+        return np.where(np.isfinite(z), z, complex(np.nan, np.nan))
+    if samples.dtype.kind == "i":
+        samples = samples * 2.0 ** (1 - 8 * samples.itemsize)
+    assert frequency is not None
+    if not isinstance(frequency, float | int):
+        return np.stack([_snapshot(samples, rate, each, first_sample) for each in frequency])
+    window = len(samples)
+    return np.asarray(narrowband(samples, rate, frequency, window, window, first_sample)[0])
+
+
+def track_live(
+    tracker: Tracker,
+    snapshots: Iterable[tuple[float, Complex]],
+    write: Callable[[str], object],
+    every: int = 1,
+) -> int:
+    """Run a tracker and write the lines of the tracks file, those of each step in one call.
+
+    The heading comes with the first snapshot that holds a number.
+
+    Parameters
+    ----------
+    tracker : Tracker
+    snapshots : iterable of (float, ndarray)
+        Time, s, and snapshot, (n_sensors,).
+    write : callable
+        Takes whole lines, ended by a newline.
+    every : int
+        Write every so many steps only.
+
+    Returns
+    -------
+    int
+        Number of steps.
+
+    Examples
+    --------
+    >>> from arrivals.measurement_models import ArraySnapshot, SensorArray
+    >>> from arrivals.trackers import CBF
+    >>> model = ArraySnapshot(SensorArray.ula(4, spacing=0.5), wavelength=1.0)
+    >>> track_live(CBF(model, threshold_db=3.0), [(0.5, np.ones(4))], print)
+    step,time_s,label,doa_deg,std_deg,existence,level_db
+    0,0.5,-1,0,,,0
+    <BLANKLINE>
+    1
+    """
+    begun, n_steps = False, 0
+    for n_steps, (time, z) in enumerate(snapshots, start=1):
+        tracker.predict()
+        tracker.update(z)
+        if n_steps % every:
+            continue
+        estimate = tracker.estimate
+        rows: list[tuple[Any, ...]] = [] if begun or missed(z) else [header(type(estimate))]
+        rows += [(n_steps // every - 1, time, *row) for row in estimate.rows()]
+        if rows:
+            begun = True
+            write("".join(f"{','.join(text(row))}\n" for row in rows))
+    return n_steps

@@ -1,0 +1,226 @@
+"""What the command line answers to bad input."""
+
+import io
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from command_line import (
+    ARRAY,
+    RATE,
+    refused,
+    shell,
+    track,
+)
+from scipy.io import wavfile
+
+from arrivals.__main__ import main
+
+OUT = ("--out", "tracks.csv", "--plot", "tracks.png")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--frequency", "1010"), ("alias limit, 1008.82 Hz", "got 1010 Hz")),
+        (("--frequency", "1010", "--tracker", "cbf"), ("alias limit, 1008.82 Hz",)),
+        (("--frequency", "-5"), ("frequency must be finite and positive",)),
+        (("--frequency", "high"), ("invalid float value: 'high'",)),
+        (("--tracker", "svlase"), ("no tracker 'svlase'", "did you mean svalse")),
+        (("--set", "kapa=3"), ("no parameter 'kapa'",)),
+        (("--set", "motion__kapa=3"), ("no parameter 'kapa'",)),
+        (("--set", "motion=3"), ("motion must be a BernoulliVonMises; got 3",)),
+        (("--set", "merge"), ("NAME=VALUE",)),
+        (("--set", "tolerance=small"), ("tolerance must be a number; got 'small'",)),
+        (("--window", "1"), ("window must be at least 2",)),
+        (("--window", "100000"), ("one window takes 100000",)),
+        (("--hop", "0"), ("hop must be at least 1",)),
+        (("--out", "nowhere/tracks.csv"), ("nowhere: the folder does not exist",)),
+        (("--plot", "nowhere/tracks.png"), ("nowhere: the folder does not exist",)),
+        (("--plot", "tracks.xyz"), (".png", "'.xyz'")),
+        (("--out", "."), ("this is a folder",)),
+        (("--variable", "z"), ("variable is for npz and mat",)),
+        (("--dtype", "int16"), ("--dtype goes with samples from standard input",)),
+        (("--frobnicate",), ("unrecognized arguments",)),
+    ],
+)
+def test_a_wrong_argument_is_told_in_one_line(
+    arguments: tuple[str, ...], words: tuple[str, ...], scene: Path, here: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    refused(track(scene, *OUT, *arguments), capsys, here, *words)
+
+
+def test_nyquist_is_named_where_the_array_would_allow_more(
+    scene: Path, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (here / "fine.toml").write_text(ARRAY.replace("0.17", "0.01"))
+    arguments = track(scene, *OUT, "--frequency", "4500", array=str(here / "fine.toml"))
+    refused(arguments, capsys, here, "frequency", "4000 Hz", "got 4500 Hz")
+
+
+@pytest.mark.parametrize(
+    ("toml", "words"),
+    [
+        (ARRAY.replace("n_sensors = 8", "n_sensors = 6"), ("6 channels", "recording has 8")),
+        (ARRAY.replace("spacing = 0.17\n", ""), ("needs the key 'spacing'",)),
+        (ARRAY.replace("speed = 343.0\n", ""), ("'speed' is missing",)),
+        (ARRAY.replace('kind = "ula"\n', ""), ("'kind' is missing",)),
+        ('kind = "positions"\nspeed = 343.0\npositions = [0, 1, 1]\n', ("share the position",)),
+        ("sensors: 8\n", ("array.toml: ",)),
+        (
+            'kind = "positions"\npositions = [[0, 0], [0, 1]]\nchannels = [1, 2]\nspeed = 343.0\n',
+            ("at least 3 sensors",),
+        ),
+        (
+            'kind = "positions"\npositions = [[0, 0], [0, 0.1], [0, 0.3]]\nchannels = [1, 2, 3]\n'
+            "speed = 343.0\n",
+            ("front from back", "azimuths 120 and 60 degrees"),
+        ),
+    ],
+)
+def test_a_wrong_array_file_is_told_in_one_line(
+    toml: str, words: tuple[str, ...], scene: Path, here: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    (here / "array.toml").write_text(toml)
+    refused(track(scene, *OUT, array=str(here / "array.toml")), capsys, here, *words)
+
+
+def write_wav(path: Path, samples: Any) -> None:
+    wavfile.write(path, RATE, samples)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("empty.wav", b"", ("empty.wav: the file is empty",)),
+        ("short.wav", np.zeros((100, 8), "<i2"), ("one window takes 256",)),
+        ("nan.wav", np.full((1000, 8), np.nan, "<f4"), ("no sample of the recording is finite",)),
+        ("narrow.wav", np.zeros((1000, 3), "<i2"), ("wants 8 channels; the recording has 3",)),
+        ("absent.wav", None, ("absent.wav", "No such file")),
+        ("tow.ogg", b"OggS", ("suffix must be one of",)),
+    ],
+)
+def test_a_wrong_recording_is_told_in_one_line(
+    name: str, content: Any, words: tuple[str, ...], scene: Path, here: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    if isinstance(content, bytes):
+        (here / name).write_bytes(content)
+    elif content is not None:
+        write_wav(here / name, content)
+    arguments = track(here, *OUT, file=name, array=str(scene / "array.toml"))
+    refused(arguments, capsys, here, *words)
+
+
+def test_a_truncated_recording_is_told_in_one_line(
+    scene: Path, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (here / "cut.wav").write_bytes((scene / "tow.wav").read_bytes()[:-1000])
+    arguments = track(here, *OUT, file="cut.wav", array=str(scene / "array.toml"))
+    refused(arguments, capsys, here, "cut.wav: truncated")
+
+
+def test_the_array_s_own_channels_must_hold_something_finite(
+    scene: Path, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    samples = np.zeros((1000, 9), "<f4")
+    samples[:, :8] = np.nan
+    write_wav(here / "deaf.wav", samples)
+    (here / "array.toml").write_text(ARRAY.replace("= 8", "= 9") + "missing = [9]\n")
+    arguments = track(here, *OUT, file="deaf.wav")
+    refused(arguments, capsys, here, "no sample of the recording is finite")
+
+
+@pytest.mark.parametrize(
+    ("raw", "arguments", "words"),
+    [
+        (b"", (), ("ended after 0 frames", "one window takes 256")),
+        (b"\0" * 16 * 255, (), ("ended after 255 frames",)),
+        (np.full((300, 8), np.nan, "<f4").tobytes(), ("--dtype", "float32"), ("finite",)),
+        (b"", ("--dtype", "complex64"), ("ended after 0 frames",)),
+        (b"", ("--dtype", "complex64", "--hop", "5"), ("no window or hop",)),
+        (b"", ("--dtype", "int24"), ("invalid choice: 'int24'",)),
+        (b"", ("--rate", "1500"), ("750 Hz", "got 1000 Hz")),
+        (b"", ("--channels", "7"), ("wants 8 channels; the recording has 7",)),
+        (b"", ("--channels", "0"), ("channels must be at least 1",)),
+        (b"", ("--plot", "tracks.png"), ("--plot goes with a file",)),
+        (b"", ("--transpose",), ("--transpose goes with a file",)),
+    ],
+)
+def test_a_wrong_stream_is_told_in_one_line(
+    raw: bytes, arguments: tuple[str, ...], words: tuple[str, ...], scene: Path, here: Path,
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(raw)))
+    live = track(scene, "--rate", str(RATE), "--out", "live.csv", *arguments, file="-")
+    refused(live, capsys, here, *words)
+
+
+def test_a_stream_wants_a_rate_and_channels_that_are_known(
+    scene: Path, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    refused(track(scene, file="-"), capsys, here, "want a rate")
+    (here / "array.toml").write_text(ARRAY + "channels = [1, 3, 5, 7, 9, 11, 13, 15]\n")
+    live = track(here, "--rate", str(RATE), file="-")
+    refused(live, capsys, here, "pass --channels")
+
+
+@pytest.mark.parametrize("arguments", [[], ["fly"], ["track"], ["demo", "--out"]])
+def test_a_wrong_command_is_told_in_one_line(
+    arguments: list[str], here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    refused(arguments, capsys, here)
+
+
+def test_a_demo_that_cannot_make_its_folder_is_told_in_one_line(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (here / "taken").write_text("")
+    refused(["demo", "--out", "taken"], capsys, here, "taken: ")
+
+
+def test_an_error_keeps_what_was_there_before(
+    scene: Path, here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (here / "tracks.csv").write_text("of yesterday")
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(b"\0" * 100)))
+    live = track(scene, "--rate", str(RATE), "--out", "tracks.csv", file="-")
+    refused(live, capsys, here, "ended after")
+    assert (here / "tracks.csv").read_text() == "of yesterday"
+
+
+def test_the_shell_sees_status_and_line(scene: Path, here: Path) -> None:
+    done = shell(track(scene, "--tracker", "nobody", "--out", "tracks.csv"))
+    assert done.returncode == 2
+    assert done.stdout == b""
+    assert done.stderr.count(b"\n") == 1
+    assert done.stderr.startswith(b"arrivals: there is no tracker 'nobody'")
+
+
+def test_an_interrupt_is_status_130_and_leaves_no_file(
+    scene: Path, here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted(*_: Any, **__: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("arrivals.trackers.run.csv.writer", interrupted)
+    assert main(track(scene, "--out", "tracks.csv")) == 130
+    assert capsys.readouterr() == ("", "")
+    assert os.listdir(here) == []
+
+
+def test_an_output_never_takes_the_place_of_an_input(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    np.save("in.npy", np.ones((4, 4), complex))
+    Path("a.toml").write_text('kind = "ula"\nn_sensors = 4\nspacing = 0.5\nspeed = 100.0\n')
+    job = ["track", "in.npy", "--array", "a.toml", "--frequency", "50"]
+    for more in (["--out", "in.npy"], ["--out", "a.toml"], ["--out", "x.png", "--plot", "x.png"]):
+        assert main([*job, *more]) == 2
+        assert "must be different files" in capsys.readouterr().err
+    assert main([*job, "--set", "measurement__wavelength=9"]) == 2
+    assert "comes from --array and --frequency" in capsys.readouterr().err

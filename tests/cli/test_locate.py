@@ -1,0 +1,151 @@
+"""`arrivals locate` and the map: what they write, and what they refuse."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import arrivals.scenarios
+from arrivals.__main__ import main
+from arrivals.cli.locate import located
+from arrivals.plots.maps import ellipse, plot_map
+from arrivals.recordings.network_calibration import calibrate
+from arrivals.recordings.networks import Network
+from arrivals.scenarios import create, read_network
+from arrivals.scenarios.reproduce.rss.measured_network import FLOOR_DB, track_transmitter
+from arrivals.typing import Float
+
+POWDER = Path(arrivals.scenarios.__file__).parent / "data" / "powder.npz"
+
+
+def walk(n_steps: int = 12) -> tuple[Float, Float, Float]:
+    """Places, true positions, and levels in dBm of one source of 20 dBm at 1 m that walks."""
+    rng = np.random.default_rng(3)
+    places = rng.uniform(0, 200, (25, 2))
+    truth = np.stack([60 + 4.0 * np.arange(n_steps), np.full(n_steps, 90.0)], axis=-1)
+    far = np.linalg.norm(truth[:, None] - places, axis=-1)
+    levels = -20.0 - 20 * np.log10(np.maximum(far, 2)) + rng.normal(0, 1.0, far.shape)
+    return places, truth, levels
+
+
+def written(folder: Path) -> tuple[Path, Path]:
+    places, _, levels = walk()
+    sensors, readings = folder / "sensors.csv", folder / "readings.csv"
+    name = [f"s{k}" for k in range(len(places))]
+    with open(sensors, "w", newline="") as file:
+        table = csv.writer(file)
+        table.writerow(["name", "x_m", "y_m"])
+        table.writerows([one, *place] for one, place in zip(name, places.tolist(), strict=True))
+    with open(readings, "w", newline="") as file:
+        table = csv.writer(file)
+        table.writerow(["time_s", *name])
+        for step, row in enumerate(levels):
+            cells = ["" if step == 4 and k == 7 else f"{v:.2f}" for k, v in enumerate(row)]
+            table.writerow([4 * step, *cells])
+    return readings, sensors
+
+
+def test_locate_writes_positions_and_a_map(tmp_path: Path) -> None:
+    readings, sensors = written(tmp_path)
+    out, plot = tmp_path / "positions.csv", tmp_path / "map.png"
+    arguments = ["locate", str(readings), "--sensors", str(sensors), "--sources", "1",
+                 "--sigma", "1", "--out", str(out), "--plot", str(plot), "--quiet"]  # fmt: skip
+    assert main(arguments) == 0
+    rows = list(csv.DictReader(out.read_text().splitlines()))
+    assert list(rows[0]) == ["step", "time_s", "label", "x_m", "y_m", "std_x_m", "std_y_m",
+                             "corr", "existence", "level_db"]  # fmt: skip
+    assert [float(row["time_s"]) for row in rows] == [4.0 * k for k in range(12)]
+    found = np.array([[float(row["x_m"]), float(row["y_m"])] for row in rows])
+    assert np.abs(found - walk()[1]).max() < 8
+    assert {row["label"] for row in rows} == {"0"}
+    assert float(rows[-1]["level_db"]) == pytest.approx(-20.0, abs=1.5)
+    assert plot.read_bytes().startswith(b"\x89PNG")
+
+
+def test_locate_prints_without_an_output_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    readings, sensors = written(tmp_path)
+    command = ["locate", str(readings), "--sensors", str(sensors), "--sigma", "1", "--floor",
+               "-97", "--quiet"]  # fmt: skip
+    assert main(command) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith("step,time_s,label,x_m")
+    assert len(lines) == 11  # the number is not given: two steps pass until it is sure of one
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (["--sensors", "nowhere.csv"], "No such file"),
+        (["--plot", "map.sketch"], "suffix of a picture"),
+        (["--out", "nowhere/positions.csv"], "the folder does not exist"),
+        (["--alpha", "-2"], "alpha must be finite and positive"),
+        (["--sigma", "0"], "sigma must be positive"),
+        (["--sources", "0"], "n_sources must be at least 1"),
+        (["--tracker", "svalse"], "invalid choice"),
+    ],
+)
+def test_locate_refuses_in_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], change: list[str], message: str,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    readings, sensors = written(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    arguments = ["locate", str(readings), "--sensors", str(sensors), "--quiet"]
+    assert main([*arguments, *change]) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["readings.csv", "sensors.csv"]
+
+
+def test_inputs_are_not_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    readings, sensors = written(tmp_path)
+    before = readings.read_text()
+    command = ["locate", str(readings), "--sensors", str(sensors), "--out", str(readings)]
+    assert main(command) == 2
+    assert "must be different files" in capsys.readouterr().err
+    assert readings.read_text() == before
+
+
+def test_times_must_grow() -> None:
+    places, _, levels = walk(2)
+    network = Network.fixed([str(k) for k in range(25)], places, levels, np.array([1.0, 1.0]))
+    with pytest.raises(ValueError, match="times must grow"):
+        located(network)
+
+
+def test_ellipse_holds_its_share() -> None:
+    rng = np.random.default_rng(0)
+    P = np.array([[4.0, 1.5], [1.5, 2.0]])
+    drawn = rng.multivariate_normal([1.0, 2.0], P, 20000) - [1.0, 2.0]
+    x, y = ellipse(np.array([1.0, 2.0]), P)
+    edge = np.stack([x - 1.0, y - 2.0], axis=-1)
+    reach = np.einsum("ni,ij,nj->n", edge, np.linalg.inv(P), edge)
+    np.testing.assert_allclose(reach, reach[0], rtol=1e-9)
+    inside = np.einsum("ni,ij,nj->n", drawn, np.linalg.inv(P), drawn) < reach[0]
+    assert inside.mean() == pytest.approx(0.95, abs=0.01)
+
+
+def test_map_shows_tracks_and_truth_and_refuses_directions() -> None:
+    trial = create("rss_crossing", n_steps=6).sample(np.random.default_rng(0))
+    run = trial.tracker("rss_vb").run(trial.measurements)
+    ax = plot_map(run, sensors=np.zeros((2, 2)), truth=trial.truth, n_ellipses=3)
+    texts = [text.get_text() for text in ax.get_legend().get_texts()]  # type: ignore[union-attr]
+    assert texts == ["sensors", "truth", "source 0", "source 1", "source 2"]
+    assert len(ax.lines) == 3 * (1 + 1 + 3)
+    line = create("svalse_fig4", n_steps=2).sample(np.random.default_rng(0))
+    with pytest.raises(TypeError, match="the run must hold positions; it holds DirectionEstimate"):
+        plot_map(line.tracker("cbf").run(line.measurements))
+
+
+def test_shipped_walk_is_tracked() -> None:
+    network = read_network(POWDER)
+    assert network.rss_db.shape[0] == 300
+    known = calibrate(network.take(slice(150, 300)), floor_db=FLOOR_DB)
+    assert 2.0 < known.alpha < 3.2
+    found = track_transmitter(network.take(slice(0, 150)), known)
+    assert np.median(found.error) < 250  # ten minutes tell little of the receivers
+    assert np.median(found.nees) < 5.991

@@ -1,0 +1,1 @@
+"""Trackers and measurements of each family for the conformance checks."""

@@ -1,0 +1,167 @@
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.collections import LineCollection, PathCollection, QuadMesh
+from matplotlib.figure import Figure
+
+from arrivals.measurement_models import ArraySnapshot, SensorArray
+from arrivals.plots.bearing_time import plot_array, plot_bearing_time, save
+from arrivals.trackers import CBF, DirectionEstimate, PositionEstimate, Run
+from arrivals.trackers.run import Recorder
+from arrivals.typing import Complex
+
+LINE = ArraySnapshot(SensorArray.ula(8, spacing=0.5), wavelength=1.0, noise=0.01)
+CIRCLE = ArraySnapshot(SensorArray.uca(8, radius=0.4), wavelength=1.0, noise=0.01)
+
+
+def found(steps: list[list[tuple[float, int, float]]]) -> Run:
+    """Make a run from (degrees, label, existence) of each step."""
+    recorder = Recorder(DirectionEstimate)
+    for step in steps:
+        degrees, label, existence = np.array(step, dtype=float).reshape(-1, 3).T
+        none = np.full(len(step), np.nan)
+        recorder.add(
+            DirectionEstimate(
+                np.deg2rad(degrees), none, existence, none.astype(complex), label.astype(int)
+            ),
+            np.zeros(0),
+        )
+    return recorder.run(dt=1.0, elapsed=0.0)
+
+
+def scene(model: ArraySnapshot, n_steps: int = 20) -> Complex:
+    doa = np.linspace(0.2, 0.6, n_steps)[:, None]
+    return model.simulate(doa, 1.0, np.random.default_rng(0))
+
+
+def lines(ax: Any) -> tuple[Any, Any]:
+    halo, tracks = [c for c in ax.collections if isinstance(c, LineCollection)]
+    return halo, tracks
+
+
+def dots(ax: Any) -> Any:
+    (scatter,) = [c for c in ax.collections if isinstance(c, PathCollection)]
+    return scatter
+
+
+def test_a_label_is_one_line_of_one_colour_and_another_label_has_another() -> None:
+    ax = plot_bearing_time(found([[(10, 0, 1), (-40, 1, 1)], [(11, 0, 1), (-41, 1, 1)]]))
+    _, tracks = lines(ax)
+    np.testing.assert_allclose(tracks.get_segments()[0], [[0, 10], [1, 11]])
+    first, second = tracks.get_colors()
+    assert not np.array_equal(first, second)
+    assert len(dots(ax).get_offsets()) == 0
+
+
+def test_a_track_on_a_line_is_not_drawn_from_endfire_to_endfire() -> None:
+    steps: list[list[tuple[float, int, float]]] = [[(d, 0, 1)] for d in (85, 88, -87, -85)]
+    _, tracks = lines(plot_bearing_time(found(steps)))
+    ends = [segment[:, 1] for segment in tracks.get_segments()]
+    np.testing.assert_allclose(ends, [[85, 88], [-87, -85]])
+
+
+def test_existence_is_opacity_and_without_it_all_is_opaque() -> None:
+    ax = plot_bearing_time(found([[(10, 0, 0.25), (20, -1, np.nan)]]))
+    assert dots(ax).get_facecolors()[:, 3].tolist() == [1.0, 0.25]
+
+
+def test_directions_without_label_and_across_gaps_are_not_joined() -> None:
+    ax = plot_bearing_time(found([[(10, -1, 1)], [(10, -1, 1), (3, 0, 1)], [], [(3, 0, 1)]]))
+    assert len(lines(ax)[1].get_segments()) == 0
+    assert len(dots(ax).get_offsets()) == 4
+
+
+def test_a_track_through_180_degrees_is_not_drawn_across_the_picture() -> None:
+    run = found([[(178, 0, 1)], [(-178, 0, 1)], [(-175, 0, 1)]])
+    ax = plot_bearing_time(run)
+    assert len(lines(ax)[1].get_segments()) == 1
+    assert ax.get_ylim() == (-180, 180)
+
+
+@pytest.mark.parametrize(("model", "limit"), [(LINE, 90), (CIRCLE, 180)])
+def test_the_beam_is_highest_where_the_source_is(model: ArraySnapshot, limit: int) -> None:
+    z = scene(model)
+    ax = plot_bearing_time(CBF(model).run(z), snapshots=z, measurement=model)
+    (image,) = [c for c in ax.collections if isinstance(c, QuadMesh)]
+    power = np.asarray(image.get_array())
+    assert power.max() == 0
+    degrees = np.linspace(-limit, limit, 361, endpoint=limit == 90)
+    np.testing.assert_allclose(
+        degrees[power.argmax(axis=0)], np.rad2deg(np.linspace(0.2, 0.6, 20)), atol=3
+    )
+    assert image.get_clim() == (-30, 0)
+    assert ax.figure.axes[-1].get_ylabel() == "beam power, dB re maximum"
+
+
+def test_a_long_recording_is_drawn_in_a_bounded_number_of_columns() -> None:
+    z = scene(LINE, 4000)
+    ax = plot_bearing_time(found([[]] * 4000), snapshots=z, measurement=LINE)
+    (image,) = [c for c in ax.collections if isinstance(c, QuadMesh)]
+    assert np.asarray(image.get_array()).shape[1] <= 1500
+
+
+def test_time_stands_on_the_axis_where_it_is_given() -> None:
+    ax = plot_bearing_time(found([[(1, 0, 1)]] * 3), time=[10.0, 12.0, 14.0])
+    assert ax.get_xlabel() == "time, s"
+    assert ax.get_xlim() == (9, 15)
+
+
+def test_plots_draw_into_the_axes_they_are_given() -> None:
+    ax = Figure().add_subplot()
+    assert plot_bearing_time(found([[(1, 0, 1)]]), ax=ax) is ax
+    assert plot_array(SensorArray.ula(3, 0.5), ax=ax) is ax
+
+
+@pytest.mark.parametrize("n_steps", [0, 1, 2])
+def test_silence_and_few_steps_make_a_picture(n_steps: int, tmp_path: Path) -> None:
+    z = np.zeros((n_steps, 8))
+    ax = plot_bearing_time(CBF(LINE).run(z), snapshots=z, measurement=LINE)
+    save(ax, tmp_path / "a.png")
+    assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    "array",
+    [SensorArray.ula(9, 0.5), SensorArray.uca(40, 2.0), SensorArray(np.eye(3))],
+)
+def test_an_array_of_any_dimension_is_drawn(array: SensorArray, tmp_path: Path) -> None:
+    ax = plot_array(array)
+    assert len(ax.texts) == (9 if array.dim == 1 else 0)
+    save(ax, tmp_path / "array.png")
+
+
+def test_what_does_not_fit_the_run_is_refused() -> None:
+    run = found([[(1, 0, 1)]] * 3)
+    with pytest.raises(ValueError, match="wants a measurement"):
+        plot_bearing_time(run, snapshots=np.ones((3, 8)))
+    with pytest.raises(ValueError, match=r"snapshots must have shape \(3, 8\); got \(2, 8\)"):
+        plot_bearing_time(run, snapshots=np.ones((2, 8)), measurement=LINE)
+    with pytest.raises(ValueError, match="time must have shape"):
+        plot_bearing_time(run, time=[1.0])
+    with pytest.raises(ValueError, match="dynamic_range_db"):
+        plot_bearing_time(run, snapshots=np.ones((3, 8)), measurement=LINE, dynamic_range_db=-1.0)
+    with pytest.raises(TypeError, match="PositionEstimate"):
+        plot_bearing_time(Recorder(PositionEstimate).run(1.0, 0.0))
+
+
+def test_a_picture_that_fails_leaves_nothing_behind(tmp_path: Path) -> None:
+    ax = Figure().add_subplot()
+    with pytest.raises(ValueError, match="suffix"):
+        save(ax, tmp_path / "a.xyz")
+    ax.set_title("$\\nonsense{$")
+    with pytest.raises(ValueError, match="nonsense"):
+        save(ax, tmp_path / "a.png")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_plots_import_no_matplotlib_and_drawing_no_pyplot() -> None:
+    code = (
+        "import sys, arrivals.plots.bearing_time as p; assert 'matplotlib' not in sys.modules;"
+        "from arrivals.measurement_models import SensorArray as A; p.plot_array(A.ula(3, 1.0));"
+        "assert 'matplotlib.pyplot' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)

@@ -1,0 +1,189 @@
+"""Files of measured networks, their calibration, and the measured data themselves."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from arrivals.measurement_models import db_to_neper, neper_to_db
+from arrivals.recordings.network_calibration import calibrate
+from arrivals.recordings.networks import Network, read_network, read_sensors
+from arrivals.scenarios.reproduce.rss.measured_network import (
+    FLOOR_DB,
+    centre,
+    snapshot,
+    steps_of,
+    strongest,
+    track_transmitter,
+)
+from arrivals.typing import Float
+
+SENSORS = "name,x_m,y_m\na,0,0\nb,50,0\nc,0,50\n"
+WIDE = "time_s,a,b,c\n0,-60,-71.5,\n4,-61,,-80\n"
+LONG = "time_s,sensor,rss_dbm\n0,a,-60\n0,b,-71.5\n4,c,-80\n4,a,-61\n"
+
+
+def files(folder: Path, readings: str, sensors: str = SENSORS) -> tuple[Path, Path]:
+    one, other = folder / "readings.csv", folder / "sensors.csv"
+    one.write_text(readings)
+    other.write_text(sensors)
+    return one, other
+
+
+@pytest.mark.parametrize("readings", [WIDE, LONG])
+def test_both_forms_of_a_table_are_read(tmp_path: Path, readings: str) -> None:
+    network = read_network(*files(tmp_path, readings))
+    assert network.name == ("a", "b", "c")
+    np.testing.assert_array_equal(network.time, [0.0, 4.0])
+    np.testing.assert_array_equal(network.rss_db, [[-60, -71.5, np.nan], [-61, np.nan, -80]])
+    np.testing.assert_allclose(network.readings[0, 0], db_to_neper(-60.0))
+    np.testing.assert_array_equal(network.sensors[1], [[0, 0], [50, 0], [0, 50]])
+
+
+@pytest.mark.parametrize(
+    ("readings", "sensors", "message"),
+    [
+        (WIDE, SENSORS + "b,9,9\n", "the sensor 'b' is listed twice"),
+        (WIDE, "name,x_m\na,0\n", "the column 'y_m' is missing"),
+        (WIDE, "name,x_m,y_m\na,0,0\nb,50,\nc,0,50\n", "a place is missing"),
+        (WIDE, "name,x_m,y_m\na,0,east\n", "'east' is no number"),
+        (WIDE.replace(",c\n", ",d\n"), SENSORS, "the sensor 'd' is not in the table"),
+        (WIDE.replace(",c\n", ",a\n"), SENSORS, "the column 'a' is listed twice"),
+        (LONG.replace("4,c", "4,z"), SENSORS, "the sensor 'z' is not in the table"),
+        (LONG + "4,a,-62\n", SENSORS, "'a' has two readings at 4 s"),
+        ("sensor,rss_db\na,-60\n", SENSORS, "the column 'time_s' is missing"),
+        ("time_s,a,b,c\n0,,,\n", SENSORS, "all readings are missing"),
+        ("time_s,a,b,c\n", SENSORS, "there is no row below the headings"),
+        ("time_s,a,b,c\n0,1,2,3,4\n", SENSORS, "more cells than there are headings"),
+        (WIDE.replace("-61", "loud"), SENSORS, "'loud' is no number"),
+    ],
+)
+def test_bad_tables_are_told_in_one_line(
+    tmp_path: Path, readings: str, sensors: str, message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        read_network(*files(tmp_path, readings, sensors))
+
+
+def test_a_table_of_readings_needs_its_sensors(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="needs a table of sensors"):
+        read_network(tmp_path / "readings.csv")
+
+
+def test_two_sensors_at_one_place_are_warned_of(tmp_path: Path) -> None:
+    with pytest.warns(UserWarning, match="two sensors stand at the same place"):
+        read_network(*files(tmp_path, WIDE, "name,x_m,y_m\na,0,0\nb,0,0\nc,0,50\n"))
+    assert read_sensors(tmp_path / "sensors.csv")[0] == ["a", "b", "c"]
+
+
+def moving(n_steps: int = 300, seed: int = 0, sigma_db: float = 4.0) -> Network:
+    """One transmitter walks among sensors with offsets; one of them moves, some readings fail."""
+    rng = np.random.default_rng(seed)
+    sensors = np.broadcast_to(rng.uniform(-400, 400, (14, 2)), (n_steps, 14, 2)).copy()
+    sensors[:, 13, 0] += np.linspace(0, 200, n_steps)
+    truth = np.stack([np.linspace(-200, 250, n_steps), np.linspace(100, -150, n_steps)], axis=-1)
+    far = np.maximum(np.linalg.norm(truth[:, None] - sensors, axis=-1), 20.0)
+    offsets = np.random.default_rng(1).normal(0, 6, 14)
+    noise: Float = sigma_db * rng.standard_normal(far.shape)
+    rss_db = noise + offsets - 10 - 25 * np.log10(far)
+    rss_db[rng.random(far.shape) < 0.2] = np.nan
+    name = tuple(f"s{k}" for k in range(14))
+    return Network(name, np.arange(0.0, 4 * n_steps, 4.0), rss_db, sensors, truth[:, None])
+
+
+def test_npz_is_a_round_trip(tmp_path: Path) -> None:
+    network = moving(20)
+    truth = np.asarray(network.truth)
+    np.savez(tmp_path / "n.npz", rss_db=network.rss_db, sensor_xy=network.sensors,
+             sensor_name=network.name, time=network.time, tx_xy=truth)  # fmt: skip
+    back = read_network(tmp_path / "n.npz")
+    assert back.name == network.name
+    np.testing.assert_array_equal(back.rss_db, network.rss_db)
+    np.testing.assert_array_equal(back.truth, network.truth)
+    np.savez(tmp_path / "m.npz", rss_db=network.rss_db)
+    with pytest.raises(ValueError, match="the array 'sensor_xy' is missing"):
+        read_network(tmp_path / "m.npz")
+
+
+def test_a_reading_without_a_place_is_refused() -> None:
+    network = moving(3)
+    sensors = network.sensors.copy()
+    sensors[0, np.flatnonzero(np.isfinite(network.rss_db[0]))[0]] = np.nan
+    with pytest.raises(ValueError, match="has a reading, but no place, in step 0"):
+        Network(network.name, network.time, network.rss_db, sensors)
+
+
+def test_calibration_finds_what_was_put_in_and_outliers_do_not_matter() -> None:
+    network = moving()
+    rss_db = network.rss_db.copy()
+    rss_db[::15] += 40.0
+    found = calibrate(Network(network.name, network.time, rss_db, network.sensors, network.truth))
+    assert found.alpha == pytest.approx(2.5, abs=0.25)
+    offsets = np.random.default_rng(1).normal(0, 6, 14)
+    error = neper_to_db(found.offsets) - offsets
+    assert np.std(error) < 1.5
+    clean = calibrate(network)
+    assert float(neper_to_db(clean.sigma)) == pytest.approx(4.0, rel=0.1)
+
+
+def test_sensors_never_calibrated_are_less_trusted() -> None:
+    network = moving()
+    rss_db = network.rss_db.copy()
+    rss_db[:, 2] = np.nan
+    found = calibrate(Network(network.name, network.time, rss_db, network.sensors, network.truth))
+    model = found.model(network.sensors[0])
+    assert found.offsets[2] == 0
+    assert model.variance[2] == pytest.approx(found.sigma**2 + float(db_to_neper(7.0)) ** 2)
+
+
+def test_calibration_wants_one_known_transmitter() -> None:
+    network = moving(20)
+    one = np.asarray(network.truth)
+    for truth in (None, np.concatenate([one, one], axis=1)):
+        other = Network(network.name, network.time, network.rss_db, network.sensors, truth)
+        with pytest.raises(ValueError, match="true positions of one transmitter"):
+            calibrate(other)
+    few = np.where(np.arange(14) < 5, -60.0, np.nan)[None]
+    short = Network(network.name, network.time[:1], few, network.sensors[:1], one[:1])
+    with pytest.raises(ValueError, match="ten readings at least"):
+        calibrate(short)
+
+
+def test_a_walk_through_a_network_is_tracked() -> None:
+    known = calibrate(moving(seed=5))
+    found = track_transmitter(moving(120), known, tau=4.0)
+    assert np.median(found.error[20:]) < 40
+    assert np.mean(found.nees[20:] < 5.991) > 0.8
+
+
+# measured data, where they are
+
+
+def shared() -> Path:
+    folder = os.environ.get("ARRIVALS_DATA")
+    if folder is None or not (Path(folder) / "rss" / "powder_single_tx.npz").is_file():
+        pytest.skip("ARRIVALS_DATA does not name the measured data")
+    return Path(folder) / "rss" / "powder_single_tx.npz"
+
+
+def test_measured_transmitter_snapshots_and_track() -> None:
+    single = read_network(shared())
+    known = calibrate(single, floor_db=FLOOR_DB)
+    assert known.alpha == pytest.approx(2.5, abs=0.1)
+    assert float(neper_to_db(known.sigma)) == pytest.approx(6.6, abs=0.3)
+    eighth = single.take(np.arange(0, len(single), 8))
+    starts = {"strongest": lambda seen: strongest(seen) + 20.0, "centre": centre}
+    for start in starts.values():
+        far = [distance(snapshot(seen, known, start(seen)[None])[0], eighth, seen.step)
+               for seen in steps_of(eighth, known)]  # fmt: skip
+        assert 145 <= np.median(far) <= 190
+    july = int(np.argmax(np.diff(single.time))) + 1
+    found = track_transmitter(single.take(np.arange(july, july + 700)), known)
+    assert 110 <= np.median(found.error) <= 140
+    assert 0.7 <= np.median(found.nees) <= 2
+
+
+def distance(place: Float, network: Network, step: int) -> float:
+    assert network.truth is not None
+    return float(np.hypot(*(place - network.truth[step, 0])))

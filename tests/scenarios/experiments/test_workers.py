@@ -1,0 +1,134 @@
+"""A worker that is killed is told in one line, and nothing that was finished is lost."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from arrivals.__main__ import main
+from arrivals.scenarios import PairsInTurn, Study, monte_carlo
+from arrivals.scenarios.experiments.workers import spread
+from arrivals.scenarios.reproduce import studies as reproduce
+from arrivals.scenarios.reproduce.studies import Report
+from arrivals.trackers import CBF, Run, register
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="kills as POSIX does")
+RUNS = 6
+
+
+@register("is_killed")
+class IsKilled(CBF):
+    """Told by the environment, kills its process once a first run of the study has been kept."""
+
+    calls = 0
+
+    def run(self, measurements: Any, dt: float = 1.0) -> Run:
+        IsKilled.calls += 1
+        folder = os.environ.get("ARRIVALS_TEST_KILLED")
+        while folder and IsKilled.calls > 1:
+            if list(Path(folder).glob("study-*.csv")):
+                os.kill(os.getpid(), signal.SIGKILL)
+            time.sleep(0.02)
+        return super().run(measurements, dt)
+
+
+def study(runs: int, seed: int, out: Path | None = None) -> Report:
+    made = monte_carlo(
+        {"fig6": PairsInTurn(n_steps=3)}, ["is_killed", "cbf"], runs, seed, metrics=["gospa"],
+        out=out, batch=1,
+    )  # fmt: skip
+    values = [(method, float(v)) for method in made.methods for v in made.array("gospa", method)]
+    return Report("Killed", ["method", "GOSPA"], values)
+
+
+def called(script: str, killed: Path | None, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run a script that may import this module, in a process of its own."""
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parent)}
+    if killed is not None:
+        environment["ARRIVALS_TEST_KILLED"] = str(killed)
+    return subprocess.run(
+        [sys.executable, "-c", script, *arguments], env=environment, capture_output=True,
+        text=True, check=False,
+    )  # fmt: skip
+
+
+COMMAND = (
+    "import sys; from arrivals.scenarios.reproduce import studies as reproduce; from arrivals.__main__ import main\n"
+    "reproduce.STUDIES['killed'] = 'test_workers:study'; sys.exit(main(sys.argv[1:]))"
+)
+
+
+def test_study_whose_worker_was_killed_is_told_in_one_line_and_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = ["reproduce", "killed", "--runs", str(RUNS), "--out", str(tmp_path)]
+    done = called(COMMAND, tmp_path / "runs", *out, "--jobs", "2")
+    assert done.returncode == 2
+    (line,) = done.stderr.splitlines()
+    (path,) = (tmp_path / "runs").glob("study-*.csv")
+    assert line.startswith("arrivals: a worker process died (SIGKILL(-9)); finished runs are kept")
+    assert f"in {path}: call again to go on" in line
+    assert not (tmp_path / "killed.csv").exists()
+    kept = {row for row in Study.read(path).rows() if row.metric == "cpu_ms"}
+    assert 0 < len(kept) < 2 * RUNS
+
+    monkeypatch.setitem(reproduce.STUDIES, "killed", f"{__name__}:study")
+    assert main(out) == 0
+    again = Study.read(path).rows()
+    assert kept <= set(again)  # not computed again: their times are the old ones
+    whole = monte_carlo({"fig6": PairsInTurn(n_steps=3)}, ["is_killed", "cbf"], RUNS,
+                        metrics=["gospa"])  # fmt: skip
+    assert [row for row in again if row.metric == "gospa"] == [
+        row for row in whole.rows() if row.metric == "gospa"
+    ]
+    assert (tmp_path / "killed.csv").read_text().count("\n") == 1 + 2 * RUNS
+
+
+def deadly(n: int) -> int:
+    if n == 3:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return n
+
+
+def test_study_that_keeps_no_runs_says_so() -> None:
+    from joblib import parallel_config
+
+    with (
+        parallel_config(n_jobs=2),
+        pytest.raises(ChildProcessError, match=r"died \(SIGKILL.*keeps no runs") as told,
+    ):
+        spread(deadly, [(n,) for n in range(8)])
+    assert "\n" not in str(told.value)
+    assert spread(deadly, [(1,), (2,)]) == [1, 2]
+
+
+def written(runs: int, seed: int) -> Report:
+    return Report("Written", ["x"], [(float(x),) for x in np.arange(1000.0)], ["Holds: x (1)."])
+
+
+def test_full_disk_and_unwritable_folder_are_one_line(tmp_path: Path) -> None:
+    script = (
+        "import atexit, resource, signal; signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        "before = resource.getrlimit(resource.RLIMIT_FSIZE)\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (2000, before[1]))\n"
+        "atexit.register(resource.setrlimit, resource.RLIMIT_FSIZE, before)  # what measures\n"
+        f"{COMMAND.replace(':study', ':written')}"
+    )
+    done = called(script, None, "reproduce", "killed", "--out", str(tmp_path))
+    assert done.returncode == 2
+    assert done.stderr.splitlines() == [f"arrivals: {tmp_path / 'killed.csv'}: File too large"]
+    assert list(tmp_path.iterdir()) == []  # nothing half written
+    page = tmp_path / "nowhere" / "page.md"
+    done = called(COMMAND, None, "reproduce", "killed", "--out", str(tmp_path), "--page", str(page))
+    assert done.stderr.splitlines() == [f"arrivals: {page.parent}: the folder does not exist"]
+    assert list(tmp_path.iterdir()) == []  # said before anything was run
+    (tmp_path / "file").write_text("")
+    done = called(COMMAND, None, "reproduce", "killed", "--out", str(tmp_path / "file"))
+    assert done.returncode == 2
+    assert done.stderr.splitlines() == [f"arrivals: {tmp_path / 'file'}: File exists"]

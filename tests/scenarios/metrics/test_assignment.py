@@ -1,0 +1,142 @@
+"""Pairs, labels, and whether stated deviations are right: closed forms and brute force."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import ArrayLike
+
+from arrivals.scenarios import SixSources, create, gospa
+from arrivals.scenarios.metrics.assignment import label_switches, matches, track_lengths
+from arrivals.scenarios.metrics.consistency import (
+    circular_nees,
+    coverage,
+    position_coverage,
+    position_nees,
+)
+from arrivals.scenarios.metrics.registry import METRICS
+from arrivals.trackers import SVALSE
+
+ROWS = st.lists(st.one_of(st.floats(-180, 180), st.just(np.nan)), min_size=1, max_size=4)
+
+
+@given(ROWS, ROWS, st.sampled_from([None, 360.0]))
+def test_pairs_are_those_of_gospa(truth: list[float], found: list[float], period: float) -> None:
+    pairs = matches([truth], [found], c=10.0, period=period)
+    whole = gospa(truth, found, c=10.0, period=period)
+    assert np.abs(pairs.error).sum() == pytest.approx(whole.distance)
+    n_true = int((~np.isnan(truth)).sum())
+    assert 5.0 * (n_true - len(pairs.step)) == pytest.approx(whole.missed)
+
+
+def test_error_takes_the_shorter_way_round() -> None:
+    assert matches([[-179.0]], [[178.0]], c=10, period=360).error == pytest.approx([-3.0])
+    assert matches([[-179.0]], [[178.0]], c=10).error.size == 0
+
+
+def test_switches_and_lengths_by_hand() -> None:
+    truth = np.array([[0.0, 50.0]] * 6)
+    found = [[0.0, 50.0], [0, 50], [50, np.nan], [50, 0], [50, 0], [50, 0]]
+    label = [[1, 2], [1, 2], [2, -1], [3, 1], [3, 1], [3, 1]]
+    pairs = matches(truth, np.array(found, dtype=float), c=10)
+    assert label_switches(pairs, label) == 1  # 50 goes from label 2 to 3; 0 comes back as 1
+    assert sorted(track_lengths(pairs, label)) == [2, 3, 3, 3]
+
+
+@pytest.mark.parametrize("std", [0.01, 0.3, 1.5])
+def test_right_deviations_have_nees_one_and_cover_what_they_say(std: float) -> None:
+    error = np.random.default_rng(0).normal(0, std, 200_000)
+    stated = np.full(error.shape, std)
+    assert circular_nees(error, stated) == pytest.approx(1.0, abs=0.02)
+    assert circular_nees(error, stated / 2) > 1.5
+    if std < 1:  # wider ones wrap
+        assert coverage(error, stated, 0.68) == pytest.approx(0.68, abs=0.005)
+        assert coverage(error, stated, 0.95) == pytest.approx(0.95, abs=0.005)
+
+
+@given(st.integers(0, 5), st.integers(0, 5), st.integers(0, 10_000))
+def test_pairs_of_positions_are_those_of_gospa(n_true: int, n_found: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    truth, found = rng.uniform(0, 20, (1, n_true, 2)), rng.uniform(0, 20, (1, n_found, 2))
+    pairs = matches(truth, found, c=10.0)
+    whole = gospa(truth[0], found[0], c=10.0)
+    assert np.linalg.norm(pairs.error, axis=-1).sum() == pytest.approx(whole.distance)
+    assert 5.0 * (n_true - len(pairs.step)) == pytest.approx(whole.missed)
+
+
+def test_right_covariances_have_nees_one_and_cover_what_they_say() -> None:
+    P = np.array([[4.0, 1.5], [1.5, 1.0]])
+    error = np.random.default_rng(0).multivariate_normal([0, 0], P, 100_000)
+    stated = np.broadcast_to(P, (len(error), 2, 2))
+    assert position_nees(error, stated) == pytest.approx(1.0, abs=0.02)
+    assert position_nees(error, stated / 4) == pytest.approx(4.0, abs=0.08)
+    assert position_coverage(error, stated, 0.68) == pytest.approx(0.68, abs=0.005)
+    assert position_coverage(error, stated, 0.95) == pytest.approx(0.95, abs=0.005)
+    for bad in (-P, P * np.nan):
+        with pytest.raises(ValueError, match="positive definite"):
+            position_nees(error[:1], bad[None])
+    with pytest.raises(ValueError, match=r"\(n, dim\) and \(n, dim, dim\); got \(2,\)"):
+        position_coverage(error[0], P)
+
+
+def test_nees_of_von_mises_errors_is_one() -> None:
+    """The deviation of a density of resultant R is √(-2 ln R), whatever its shape."""
+    from scipy.special import ive
+
+    for kappa in (0.5, 5.0, 500.0):
+        error = np.random.default_rng(1).vonmises(0, kappa, 200_000)
+        std = np.sqrt(-2 * np.log(ive(1, kappa) / ive(0, kappa)))
+        stated = np.full(error.shape, std)
+        assert circular_nees(error, stated) == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("error", "std", "message"),
+    [([0.1], [0.0], "positive"), ([0.1], [np.nan], "positive"), ([0.1], [1, 1], "same shape")],
+)
+def test_nonsense_is_refused(error: ArrayLike, std: ArrayLike, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        circular_nees(error, std)
+    with pytest.raises(ValueError, match="level must lie"):
+        coverage([0.1], [0.1], level=1.0)
+
+
+def test_svalse_states_the_right_deviation_for_one_source() -> None:
+    n_steps = 100
+    model = SixSources().measurement.replace(noise=0.02)
+    rng = np.random.default_rng(2)
+    phases = np.exp(2j * np.pi * rng.random((n_steps, 1)))
+    truth = np.full((n_steps, 1), 0.3)
+    run = SVALSE(model).run(model.simulate(truth, phases, rng))
+    first = run.doa[:, :1]
+    assert circular_nees((first - truth)[:, 0], run.std[:, 0]) == pytest.approx(1.0, abs=0.5)
+
+
+def test_metrics_of_a_perfect_run() -> None:
+    trial = create("svalse_fig6", n_steps=4).sample(np.random.default_rng(0))
+    run = trial.tracker("svalse").run(trial.measurements)
+    n = trial.truth.shape[1]
+    perfect = type(run)(
+        run.kind,
+        {name: np.tile(v[:, :1], (1, n)) if v.ndim > 1 else v for name, v in run.fields.items()}
+        | {"doa": trial.truth, "label": np.tile(np.arange(n), (4, 1)), "std": np.ones((4, n))},
+        run.x,
+        (~np.isnan(trial.truth)).sum(axis=1),
+        run.time,
+        run.elapsed,
+    )
+    found = {name: metric(trial, perfect) for name, metric in METRICS.items()}
+    assert found == {
+        "gospa": 0, "distance": 0, "missed": 0, "false": 0, "rmse": 0, "ospa": 0,
+        "cardinality": 0, "nees": 0, "coverage68": 1, "coverage95": 1, "label_switches": 0,
+        "track_length": 4, "converged": found["converged"],
+    }  # fmt: skip
+
+
+def test_metrics_that_cannot_be_given_say_why() -> None:
+    trial = create("svalse_fig6", n_steps=2).sample(np.random.default_rng(0))
+    run = trial.tracker("cbf").run(trial.measurements)
+    with pytest.raises(ValueError, match="states no standard deviations"):
+        METRICS["nees"](trial, run)
+    with pytest.raises(ValueError, match="gives no labels"):
+        METRICS["track_length"](trial, run)

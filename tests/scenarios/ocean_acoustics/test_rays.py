@@ -1,0 +1,173 @@
+"""Rays against images of the source, circles, the eikonal and the field of the modes."""
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from arrivals.scenarios.ocean_acoustics.eigenrays import eigenrays, path_names
+from arrivals.scenarios.ocean_acoustics.rays import floor_reflection, ray_line, traced
+from arrivals.scenarios.ocean_acoustics.waveguide import BottomLayer, Waveguide
+from arrivals.scenarios.reproduce.swellex96.claims import beam
+from arrivals.scenarios.simulations.swellex96 import TowPastLine, environment
+from arrivals.typing import Float
+
+FLAT = Waveguide(np.array([0.0, 100.0]), np.array([1500.0] * 2), rigid=True)
+
+
+def image_depth(path: str, source: float, depth: float) -> float:
+    """Unfold the path: the height of the image above the sensor, positive for one from above."""
+    z, up = source, path.startswith("S")
+    travelled = 0.0
+    for bounce in path.replace("D", ""):
+        travelled += z if bounce == "S" else 100.0 - z
+        z, up = (0.0, False) if bounce == "S" else (100.0, True)
+    travelled += abs(z - depth)
+    from_above = not up if path != "D" else depth > source
+    return travelled if from_above else -travelled
+
+
+@settings(max_examples=20)
+@given(st.floats(5, 95), st.floats(5, 95), st.floats(200, 600))
+def test_rays_in_even_water_come_from_the_images(
+    source: float, depth: float, distance: float
+) -> None:
+    assume(abs(source - depth) > 10)  # the fan has no ray along the horizontal
+    steep = np.deg2rad(75)
+    found = eigenrays(FLAT, 100.0, source, [depth], [distance], n_bottom=1, steepest=steep)
+    assert sorted(found.path) == sorted(path_names(1))
+    for path, doa, time, p in zip(found.path, found.doa, found.time, found.pressure, strict=True):
+        height = image_depth(path, source, depth)
+        r = np.hypot(distance, height)
+        assert doa == pytest.approx(np.arctan2(height, distance), abs=1e-5)
+        assert time == pytest.approx(r / 1500, rel=1e-6)
+        sign = (-1.0) ** path.count("S")
+        wanted = sign * np.exp(-2j * np.pi * 100 * r / 1500) / (4 * np.pi * r)
+        assert abs(p - wanted) < 1e-2 * abs(wanted)
+
+
+@pytest.mark.parametrize("slope", [0.05, -0.05])
+@pytest.mark.parametrize(
+    ("source", "depth", "distance"),
+    [(50.0, 120.0, 400.0), (120.0, 50.0, 400.0), (100.0, 100.0, 3000.0), (90.0, 110.0, 3500.0)],
+)
+def test_rays_in_water_of_an_even_slope_are_circles(
+    source: float, depth: float, distance: float, slope: float
+) -> None:
+    """cosh(g t) = 1 + g² R²/(2 c₁ c₂); far rays turn on their way, and touch no caustic."""
+    guide = Waveguide(np.array([0.0, 200.0]), 1500 + slope * np.array([0.0, 200.0]), rigid=True)
+    c1, c2 = 1500 + slope * source, 1500 + slope * depth
+    straight = np.hypot(distance, source - depth)
+    time = np.arccosh(1 + (slope * straight) ** 2 / (2 * c1 * c2)) / abs(slope)
+    found = eigenrays(guide, 100.0, source, [depth], [distance], n_bottom=1)
+    first = np.argmin(found.time)
+    assert found.path[first] == ("D" if distance == 400 else "B" if slope > 0 else "S")
+    assert found.time[first] == pytest.approx(time, rel=1e-7)
+    p = found.pressure[first] * np.exp(2j * np.pi * 100 * time)
+    assert np.angle(p) == pytest.approx(0, abs=0.01)
+    assert abs(p) == pytest.approx(1 / (4 * np.pi * straight), rel=0.03)
+
+
+def test_travel_times_obey_the_eikonal_of_the_water() -> None:
+    """∂t/∂r = cos β/c and ∂t/∂z = sin β/c at the sensor: Snell's and Fermat's laws at once."""
+    guide, z, r = environment(), np.array([149.9, 150.0, 150.1]), np.array([2999.0, 3000.0, 3001.0])
+    found = eigenrays(guide, 198.0, 9.0, z, r, n_bottom=4)
+    c = float(guide.speed(150.0))
+    times: dict[str, Float] = {}
+    for path in np.unique(found.path):
+        mine = found.path == path
+        if np.bincount(found.step[mine] * 3 + found.sensor[mine], minlength=9).tolist() == [1] * 9:
+            times[path] = np.zeros((3, 3))
+            times[path][found.step[mine], found.sensor[mine]] = found.time[mine]
+    assert len(times) >= 8
+    for path, t in times.items():
+        doa = float(found.doa[(found.path == path) & (found.step == 1) & (found.sensor == 1)][0])
+        assert (t[2, 1] - t[0, 1]) / 2 == pytest.approx(np.cos(doa) / c, rel=1e-4)
+        assert (t[1, 2] - t[1, 0]) / 0.2 == pytest.approx(np.sin(doa) / c, rel=3e-2)
+
+
+def test_a_ray_keeps_its_parameter_and_stays_between_its_turning_points() -> None:
+    guide = environment()
+    fan = traced(guide, np.deg2rad([1.0, 2.0, 10.0]), 9.0, [150.0])
+    speed = np.interp(fan.depth, guide.depths, guide.speeds)
+    came = ~np.isnan(fan.range)
+    assert (speed[:, None] * fan.slowness < 1)[came].all()
+    np.testing.assert_array_equal(fan.turns_above, [True, True, False])
+    assert not fan.turns_below.any()
+    assert (np.diff(fan.range[-300:], axis=0) > 0).all()
+
+
+def test_a_drawn_ray_goes_from_the_source_to_the_sensor() -> None:
+    guide = environment()
+    found = eigenrays(guide, 198.0, 9.0, [153.0], [2540.0])
+    for path, doa, p in zip(found.path, found.doa, found.pressure, strict=True):
+        if abs(p) < 1e-3 * np.abs(found.pressure).max():
+            continue
+        x, z = ray_line(guide, 9.0, 153.0, path, doa)
+        assert (x[0], z[0], z[-1]) == (0.0, 9.0, 153.0)
+        assert x[-1] == pytest.approx(2540.0, rel=0.02)
+        assert (np.diff(x) >= 0).all()
+
+
+def test_the_floor_reflects_as_the_closed_forms_say() -> None:
+    a = np.linspace(1e-4, 1 / 1500 - 1e-9, 50)
+    depths, speeds = np.array([0.0, 100.0]), np.array([1500.0] * 2)
+    hard, soft = Waveguide(depths, speeds, rigid=True), Waveguide(depths, speeds)
+    assert (floor_reflection(hard, 100.0, a) == 1).all()
+    assert (floor_reflection(soft, 100.0, a) == -1).all()
+    half = Waveguide(depths, speeds, [BottomLayer(100.0, 200.0, 1700.0, 1700.0, 1.5)])
+    R = floor_reflection(half, 100.0, a)
+    total = a > 1 / 1700
+    np.testing.assert_allclose(np.abs(R[total]), 1)
+    sine, under = np.sqrt(1 - (1500 * a) ** 2), np.sqrt(1 - (1700 * a[~total]) ** 2)
+    Z0, Z1 = 1500 / sine[~total], 1.5 * 1700 / under
+    np.testing.assert_allclose(R[~total], (Z1 - Z0) / (Z1 + Z0))
+    # grazing sound is turned as by a free surface, and loss takes from it
+    assert R[-1] == pytest.approx(-1, abs=0.02)
+    lossy = Waveguide(depths, speeds, [BottomLayer(100.0, 200.0, 1700.0, 1700.0, 1.5, 0.5)])
+    assert (np.abs(floor_reflection(lossy, 100.0, a)) < 1).all()
+
+
+def test_a_layer_cut_in_two_reflects_as_before() -> None:
+    a = np.linspace(1e-4, 1 / 1501, 40)
+    rest = BottomLayer(140.0, 900.0, 1900.0, 1900.0, 2.0, 0.1)
+    one = [BottomLayer(100.0, 140.0, 1600.0, 1600.0, 1.6, 0.3), rest]
+    two = [
+        BottomLayer(100.0, 115.0, 1600.0, 1600.0, 1.6, 0.3),
+        BottomLayer(115.0, 140.0, 1600.0, 1600.0, 1.6, 0.3),
+        rest,
+    ]
+    R1, R2 = (
+        floor_reflection(Waveguide(FLAT.depths, FLAT.speeds, layers), 120.0, a)
+        for layers in (one, two)
+    )
+    np.testing.assert_allclose(R1, R2, atol=1e-12)
+
+
+def test_rays_and_modes_give_the_same_picture() -> None:
+    """The beam powers of two independent models; the specification's rays reach 0.90."""
+    ranges = tuple(np.linspace(950, 7700, 40))
+    modal, traced_ = (TowPastLine(ranges=ranges, model=m) for m in ("modes", "rays"))
+    pictures = [beam(modal, s.field())[1] for s in (modal, traced_)]
+    correlation = [np.corrcoef(a, b)[0, 1] for a, b in zip(*pictures, strict=True)]
+    assert np.median(correlation) > 0.88
+    levels = [10 * np.log10((np.abs(s.field()) ** 2).mean(axis=1)) for s in (modal, traced_)]
+    assert abs(np.median(levels[1] - levels[0])) < 1.5
+
+
+@pytest.mark.parametrize(
+    ("change", "match"),
+    [
+        ({"source_depth": 101.0}, "source_depth must lie in the water"),
+        ({"depths": [-1.0]}, "depths must lie in the water"),
+        ({"ranges": [0.0]}, "ranges must be finite and positive"),
+        ({"steepest": 2.0}, "steepest must lie in"),
+        ({"n_rays": 1}, "n_rays must be at least 2"),
+        ({"n_bottom": -1}, "n_bottom must be at least 0"),
+        ({"frequency": -5.0}, "frequency must be finite and positive"),
+    ],
+)
+def test_rays_that_make_no_sense_are_refused(change: dict[str, object], match: str) -> None:
+    given_ = {"frequency": 100.0, "source_depth": 20.0, "depths": [50.0], "ranges": [500.0]}
+    with pytest.raises(ValueError, match=match):
+        eigenrays(FLAT, **given_ | change)  # type: ignore[arg-type]

@@ -1,0 +1,125 @@
+"""Comparators and studies of the third paper."""
+
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from arrivals.measurement_models import ArraySnapshot, SensorArray
+from arrivals.recordings.sample_stream import band_samples, live_samples, track_samples
+from arrivals.scenarios import create, read
+from arrivals.scenarios.reproduce.interpolation.beamformers import scan
+from arrivals.scenarios.reproduce.interpolation.figures import SOURCES
+from arrivals.scenarios.reproduce.interpolation.trials import bound_deg, draws, rms, scanned
+from arrivals.scenarios.reproduce.studies import reproduce
+from arrivals.scenarios.simulations.sampled_source import heard
+from arrivals.trackers import CBF, MVDR, InterpolationEKF
+
+MODEL = ArraySnapshot(SensorArray.ula(10, spacing=0.5), wavelength=1.0, noise=0.1)
+
+
+def test_fig_8_the_conventional_scan_attains_the_bound_for_a_tone() -> None:
+    scenario = SOURCES["tone"]
+    error = scanned(scenario, draws(scenario, 40, 0), "conventional") - 60
+    assert rms(error) < 1.4 * bound_deg(scenario)
+
+
+def test_table_1_mvdrs_zero_variance_is_the_grids() -> None:
+    scenario = SOURCES["tone"].replace(doa_deg=30.0)
+    samples = draws(scenario, 20, 0)
+    np.testing.assert_allclose(scanned(scenario, samples, "mvdr", refine=False), 30.0, atol=1e-12)
+    assert 0.05 < scanned(scenario, samples, "mvdr").std() < 0.25
+
+
+@pytest.mark.parametrize("method", ["conventional", "mvdr"])
+@pytest.mark.parametrize("name", ["tone", "band", "qpc"])
+def test_scans_find_either_side(name: str, method: Any) -> None:
+    for doa in (-40.0, 25.0):
+        scenario = SOURCES[name].replace(doa_deg=doa)
+        z = scenario.sample(np.random.default_rng(1)).measurements
+        found = scan(z, scenario.measurement, method)
+        assert np.rad2deg(found) == pytest.approx(doa, abs=2)
+
+
+def test_mvdr_separates_what_the_conventional_beam_does_not() -> None:
+    doa = np.tile(np.deg2rad([10.0, 18.0]), (400, 1))
+    rng = np.random.default_rng(0)
+    phases = np.exp(2j * np.pi * rng.random(doa.shape))
+    z = MODEL.replace(noise=1e-3).simulate(doa, phases, rng)
+    tracker = MVDR(MODEL, loading=1e-4, forgetting=1.0, max_sources=2)
+    np.testing.assert_allclose(np.sort(np.rad2deg(tracker.run(z).doa[-1])), [10, 18], atol=0.5)
+
+
+def test_mvdr_of_one_snapshot_peaks_where_the_conventional_beam_does() -> None:
+    z = MODEL.array.steering_vector(0.3, 1.0)
+    one, other = MVDR(MODEL, max_sources=1), CBF(MODEL, max_sources=1)
+    for tracker in (one, other):
+        tracker.update(z)
+    np.testing.assert_allclose(one.estimate.doa, other.estimate.doa, atol=1e-3)
+    np.testing.assert_allclose(abs(one.estimate.amplitude), 1.0, atol=0.1)
+
+
+def test_mvdr_survives_missing_sensors_and_silence() -> None:
+    z = MODEL.simulate(np.full((30, 1), 0.4), 1.0, np.random.default_rng(0))
+    z[5:, 3] = np.nan
+    run = MVDR(MODEL, max_sources=1).run(z)
+    assert run.doa[-1, 0] == pytest.approx(0.4, abs=0.02)
+    silent = MVDR(MODEL)
+    silent.update(np.zeros(10))
+    assert silent.estimate.n_found == 0
+
+
+def test_scans_refuse_what_does_not_fit() -> None:
+    model = SOURCES["tone"].measurement
+    with pytest.raises(ValueError, match=r"\(n_steps, 10\)"):
+        scan(np.zeros((5, 3)), model)
+    with pytest.raises(ValueError, match="method"):
+        scan(np.zeros((5, 10)), model, "music")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", ["table1", "convergence", "rmse"])
+def test_a_study_writes_its_table_page_and_pictures(name: str, tmp_path: Path) -> None:
+    written = reproduce(f"interpolation-{name}", tmp_path / "new", runs=2)
+    assert [path.suffix for path in written[:2]] == [".csv", ".md"]
+    assert all(path.stat().st_size > 1000 for path in written)
+    page = written[1].read_text()
+    assert "Not reproduced" in page or "The paper" in page
+
+
+def test_scenarios_refuse_directions_that_are_none() -> None:
+    with pytest.raises(ValueError, match="doa_deg"):
+        create("interpolation_tone", doa_deg=91.0)
+    with pytest.raises(ValueError, match="reference"):
+        create("interpolation_tone", reference="last")
+
+
+def test_a_wav_is_tracked_sample_by_sample(tmp_path: Path) -> None:
+    """A band from -25 degrees, 16-bit samples of unknown level, as `arrivals track` reads them."""
+    from scipy.io import wavfile
+
+    array = SensorArray.ula(8, spacing=0.1, speed=340.0)
+    rate, band = 8000, (600.0, 1600.0)
+    model = band_samples(array, rate, band, snr_db=10.0)
+    rng = np.random.default_rng(0)
+    frequencies, weights = rng.uniform(600, 1600, 300) / rate, rng.standard_normal((300, 2))
+    earlier = rate / 340 * np.sin(np.deg2rad(-25)) * array.positions.T
+    waves = heard(frequencies, weights @ np.array([1, 1j]), earlier, 800)
+    waves += 0.3 * waves.std() * rng.standard_normal(waves.shape)
+    wavfile.write(tmp_path / "a.wav", rate, (1000 * waves / waves.std()).astype(np.int16))
+    recording = read(tmp_path / "a.wav")
+    samples = array.select(recording.samples)
+    run = track_samples(InterpolationEKF(model), samples, rate, every=100)
+    assert run.doa.shape == (8, 1)
+    assert np.rad2deg(run.doa[-1, 0]) == pytest.approx(-25, abs=1)
+    assert run.time[-1] == pytest.approx(799 / rate)
+
+
+def test_a_stream_gives_its_frames_and_drops_a_part_of_one() -> None:
+    stream = io.BytesIO(np.arange(7, dtype="<i2").tobytes())
+    assert len(list(live_samples(stream, 3))) == 2
+    with pytest.raises(ValueError, match="dtype"):
+        next(live_samples(stream, 3, dtype="complex64"))
+    with pytest.raises(ValueError, match="half the rate"):
+        band_samples(SensorArray.ula(4, 0.1, speed=340.0), 8000.0, (600.0, 4600.0))

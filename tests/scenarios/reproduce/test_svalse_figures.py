@@ -1,0 +1,181 @@
+"""The studies of SVALSE's paper, cut short: their tables, claims and pictures."""
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from arrivals.scenarios import Study, base
+from arrivals.scenarios.reproduce import studies as reproduce
+from arrivals.scenarios.reproduce.studies import RUNS, STUDIES, Report
+from arrivals.scenarios.reproduce.svalse import any_array as reproduce_any_array
+from arrivals.scenarios.reproduce.svalse import figures_4_to_7 as reproduce_svalse
+from arrivals.scenarios.reproduce.svalse import figures_8_to_10 as reproduce_svalse_snr
+from arrivals.scenarios.reproduce.svalse.published_values import ACTIVATION, REBUILT, SWEEP
+from arrivals.scenarios.reproduce.swellex96 import figures_11_12 as reproduce_swellex
+
+
+@pytest.fixture
+def short(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Scenarios of one step."""
+
+    def create(name: str, **params: Any) -> base.Scenario:
+        return base.create(name, **{"n_steps": 1} | params)
+
+    for module in (reproduce_svalse, reproduce_svalse_snr):
+        monkeypatch.setattr(module, "create", create)
+    reproduce_svalse_snr.sweep.cache_clear()
+
+
+def table(path: Path) -> list[dict[str, str]]:
+    with path.open() as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.mark.usefixtures("short")
+@pytest.mark.parametrize("number", [4, 7])
+def test_scenes_make_table_claims_and_pictures(number: int, tmp_path: Path) -> None:
+    name = f"svalse-fig{number}"
+    written = reproduce.reproduce(name, tmp_path, runs=2, quick=True)
+    assert {path.name for path in written} >= {f"{name}.csv", f"{name}.md", f"{name}-tracks.png"}
+    rows = table(tmp_path / f"{name}.csv")
+    if number == 4:
+        assert [row["method"] for row in rows] == list(reproduce_svalse.FAST)
+        known = {row["method"]: row["rebuilt"] for row in rows}
+        assert float(known["svalse"]) == REBUILT["svalse_fig4"]["svalse"].gospa
+        assert known["peaks_gnn"] == ""
+    else:
+        assert [float(row["paper's run"]) for row in rows] == [
+            known.paper for known in ACTIVATION.values()
+        ]
+        (path,) = (tmp_path / "runs").glob("study-*.csv")
+        params = [method["params"] for method in Study.read(path).config["methods"]]
+        assert [one["motion"]["p_activate"] for one in params] == [0.1, 0.1, 0.0, 1.0, 0.1]
+        assert {one["engine"] for one in params} == {"coordinate"}
+    page = (tmp_path / f"{name}.md").read_text()
+    assert "Holds: " in page or "Does not hold: " in page
+    assert list((tmp_path / "runs").glob("study-*.csv"))
+
+
+@pytest.mark.usefixtures("short")
+def test_sweeps_are_computed_once_for_three_figures(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(reproduce_svalse, "FAST", ("sbl", "ssbl", "valse", "svalse"))
+    reproduce.reproduce("svalse-fig9", tmp_path, runs=2, quick=True)
+    rows = table(tmp_path / "svalse-fig9.csv")
+    assert len(rows) == 9 * 4
+    sbl = [row for row in rows if row["method"] == "sbl"]
+    assert [float(row["rebuilt"]) for row in sbl] == [
+        four[0][0] for four in SWEEP["svalse_scenario2"].values()
+    ]
+    before = {path: path.stat().st_mtime_ns for path in (tmp_path / "runs").iterdir()}
+    monkeypatch.setattr(reproduce_svalse_snr, "SCENES", {"svalse_scenario2": "six"})
+    reproduce_svalse_snr.sweep.cache_clear()
+    report = reproduce_svalse_snr.fig10(2, 0, tmp_path / "runs", quick=True)
+    assert {path: path.stat().st_mtime_ns for path in (tmp_path / "runs").iterdir()} == before
+    assert [row[3] for row in report.rows] == [
+        pytest.approx(float(row["RMSE"]), abs=1e-7) for row in rows
+    ]
+
+
+@pytest.mark.usefixtures("short")
+def test_pictures_of_runs_name_their_marks_and_tell_the_paper_s_number(tmp_path: Path) -> None:
+    report = reproduce_svalse.fig4(2, 0, tmp_path, quick=True)
+    figure = report.figures["tracks"]
+    titles = [ax.get_title() for ax in figure.axes]
+    assert "(paper 4.87°)" in titles[list(reproduce_svalse.SHOWN).index("svalse")]
+    assert figure.legends[0].get_texts()[0].get_text() == "truth"
+    bars = [ax for ax in figure.axes if ax.get_ylabel() == "beam power, dB re maximum"]
+    assert len(bars) == 1
+    columns = list(report.columns)
+    rows = {row[0]: row for row in report.rows}
+    for wanted in ("label switches", "track length", "NEES", "in 68 %", "in 95 %"):
+        assert np.isnan(rows["cbf"][columns.index(wanted)])
+    assert rows["svalse"][columns.index("NEES")] > 0
+    told = [line for line in report.remarks if "svalse states the standard deviations" in line]
+    assert len(told) == 1
+
+
+def test_what_a_user_would_write_stands_in_every_table_of_directions() -> None:
+    for methods in (reproduce_svalse.FAST, reproduce_swellex.METHODS):
+        assert set(methods) >= {"cbf", "peaks_gnn", "sbl", "ssbl", "valse", "svalse"}
+    scenes = {case.told for case in reproduce_any_array.CASES if not case.params.get("carry")}
+    assert {c.told for c in reproduce_any_array.CASES if c.method == "peaks_gnn"} == scenes
+
+
+def test_claims_on_any_array_go_by_paired_differences() -> None:
+    cases = reproduce_any_array.CASES
+    fewer = np.array([case.method == "svalse" and not case.params for case in cases])
+    gospa = np.where(fewer, 1.0, 2.0)[:, None] + [[0.0, 0.1, 0.2]]
+    claims = reproduce_any_array._claims(gospa)
+    assert len(claims) == len(reproduce_any_array.ORDER)
+    assert claims[0].startswith("Holds: on the circle SVALSE is below VALSE")
+    assert claims[-1].startswith("Does not hold: for that, whole densities")
+    assert "1.00 ± 0.00" in claims[0]
+
+
+def brief(runs: int, seed: int) -> Report:
+    calls.append(runs)
+    return Report(f"Brief, {runs}", ["a"], [(1.0,)], ["Holds: it is brief (1).", "A word."])
+
+
+calls: list[int] = []
+
+
+def test_all_writes_every_study_and_one_page(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        reproduce, "STUDIES", {"one": f"{__name__}:brief", "two": f"{__name__}:brief"}
+    )
+    monkeypatch.setattr(reproduce, "RUNS", {"two": (30, 3)})
+    monkeypatch.chdir(tmp_path)
+    page = Path("page.md")
+    written = reproduce.reproduce("all", tmp_path / "out", quick=True, seed=7, page=page)
+    assert [path.name for path in written] == ["one.csv", "one.md", "two.csv", "two.md", "page.md"]
+    text = page.read_text()
+    assert "    arrivals reproduce all --quick --seed 7 --out out --page page.md\n" in text
+    assert text.index("### Brief, 10\n") < text.index("### Brief, 3\n")
+    assert text.count("* **Holds**: it is brief (1).") == 2
+    assert "* [Brief, 3](#two): 1 claim holds, 0 do not" in text
+    assert "`arrivals reproduce two`, seed 7, 3 runs, arrivals " in text
+    assert str(tmp_path) not in text
+
+
+def test_page_is_made_again_without_what_is_finished(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        reproduce, "STUDIES", {"one": f"{__name__}:brief", "two": f"{__name__}:brief"}
+    )
+    calls.clear()
+    first = reproduce.reproduce("all", tmp_path, runs=2)
+    page = first[-1].read_text()
+    assert reproduce.reproduce("all", tmp_path, runs=2) == first
+    assert calls == [2, 2]
+    assert first[-1].read_text() == page
+    (tmp_path / "two.csv").unlink()
+    reproduce.reproduce("all", tmp_path, runs=2)
+    reproduce.reproduce("one", tmp_path, runs=2)  # by its name: again
+    assert calls == [2, 2, 2, 2]
+    reproduce.reproduce("all", tmp_path, runs=2, seed=1)
+    monkeypatch.setattr(reproduce, "code_mark", lambda: "other")
+    reproduce.reproduce("all", tmp_path, runs=2, seed=1)
+    assert len(calls) == 8
+
+
+def test_every_study_of_other_runs_exists() -> None:
+    assert set(RUNS) <= set(STUDIES)
+
+
+def test_a_page_must_be_a_file_and_that_is_known_before_the_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(reproduce, "STUDIES", {"one": f"{__name__}:brief"})
+    before = len(calls)
+    with pytest.raises(IsADirectoryError, match="page must be a file"):
+        reproduce.reproduce("one", tmp_path / "out", quick=True, page=tmp_path)
+    assert len(calls) == before

@@ -1,0 +1,265 @@
+"""The tow past the SWellEx-96 line: its scenario, its study and the recorded arrays."""
+
+import csv
+import os
+import pickle
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from sklearn.base import clone
+
+from arrivals.scenarios import create, mean_gospa
+from arrivals.scenarios.demos.swellex96 import swellex96 as shipped
+from arrivals.scenarios.reproduce.studies import reproduce
+from arrivals.scenarios.reproduce.swellex96 import figures_11_12 as reproduce_swellex
+from arrivals.scenarios.reproduce.swellex96.claims import beam
+from arrivals.scenarios.reproduce.swellex96.figures_11_12 import strong
+from arrivals.scenarios.simulations.swellex96 import TowPastLine, environment, line, track
+from arrivals.trackers import Run
+from arrivals.typing import Complex, Float
+
+WAY = tuple(track()["range_m"].tolist())
+
+
+def rng(seed: int = 0) -> np.random.Generator:
+    return np.random.default_rng(seed)
+
+
+# the scenario
+
+
+def test_noise_lies_so_many_db_below_the_field_at_the_median_step() -> None:
+    scenario = TowPastLine(ranges=WAY[::10], snr_db=7.0)
+    trial, field = scenario.sample(rng()), scenario.field()
+    noise = (np.abs(trial.measurements - field) ** 2).mean()
+    power = np.median((np.abs(field) ** 2).mean(axis=1))
+    assert 10 * np.log10(power / noise) == pytest.approx(7.0, abs=0.3)
+    assert scenario.noise == pytest.approx(noise, rel=0.1)
+
+
+def test_the_same_draw_with_and_without_element_43() -> None:
+    scenario = TowPastLine(ranges=WAY[:3])
+    most, whole = scenario.sample(rng()), scenario.replace(missing=()).sample(rng())
+    assert (most.measurements.shape[1], whole.measurements.shape[1]) == (63, 64)
+    np.testing.assert_array_equal(most.measurements, np.delete(whole.measurements, 42, axis=1))
+    np.testing.assert_array_equal(most.truth, whole.truth)
+    np.testing.assert_array_equal(most.measurements, scenario.sample(rng()).measurements)
+    assert (most.measurements != scenario.sample(rng(1)).measurements).all()
+
+
+def test_a_trial_may_be_written_to_and_the_next_is_whole() -> None:
+    scenario = TowPastLine(ranges=WAY[:2])
+    first = scenario.sample(rng())
+    kept = first.measurements.copy(), first.truth.copy()
+    first.measurements[:] = 0
+    first.truth[:] = 0
+    scenario.field()[:] = 0
+    again = scenario.sample(rng())
+    np.testing.assert_array_equal(again.measurements, kept[0])
+    np.testing.assert_array_equal(again.truth, kept[1])
+
+
+def test_the_sound_that_ships_is_of_this_scenario() -> None:
+    """The demo's snapshots less our field are white, and 10 dB below it at the median step."""
+    measurement, snapshots, time = shipped()
+    scenario = TowPastLine()
+    np.testing.assert_allclose(time, track()["time_s"], atol=1e-3)
+    np.testing.assert_array_equal(scenario.measurement.array.positions, measurement.array.positions)
+    noise = snapshots - scenario.field()
+    assert (np.abs(noise) ** 2).mean() == pytest.approx(scenario.noise, rel=0.02)
+
+
+def test_paths_are_where_the_description_of_the_data_says() -> None:
+    names, doa, level_db = TowPastLine().paths()
+    degrees, step = np.rad2deg(doa), np.arange(1, 351)
+    strongest = np.array(names)[np.nanargmax(level_db, axis=1)]
+    assert (strongest[(step > 255) & (step < 330)] == "B").all()
+    B = degrees[(step >= 250) & (step <= 330), names.index("B")]
+    assert -17.7 < B.min() < -17.3
+    assert -12.3 < B.max() < -11.7
+    at_206 = degrees[205]
+    assert at_206[names.index("BS")] == pytest.approx(14.6, abs=0.5)
+    assert at_206[names.index("BSB")] == pytest.approx(-17.2, abs=0.5)
+    assert np.nanmin(np.abs(degrees)) > 11  # the flattest ray: acos(1489/1519)
+
+
+def test_truth_is_what_is_strong() -> None:
+    scenario = TowPastLine(ranges=WAY[::25])
+    near, wide = scenario.truth(10.0), scenario.truth(30.0)
+    assert (np.isnan(near) | (near == wide)).all()
+    assert ((~np.isnan(near)).sum(axis=1) >= 1).all()
+    assert np.isnan(near).sum() > np.isnan(wide).sum()
+    np.testing.assert_array_equal(scenario.sample(rng()).truth, near)
+
+
+def test_the_highest_peak_of_the_beam_is_a_path() -> None:
+    scenario = TowPastLine(ranges=WAY[::10])
+    grid, power = beam(scenario, scenario.field())
+    off = np.abs(scenario.truth() - grid[power.argmax(axis=1)][:, None])
+    assert np.median(np.rad2deg(np.nanmin(off, axis=1))) < 0.7
+
+
+def test_another_depth_tone_model_and_way_give_another_field() -> None:
+    base = TowPastLine(ranges=(2000.0, 2100.0))
+    others: list[dict[str, Any]] = [
+        {"source_depth": 54.0},
+        {"frequency": 127.0},
+        {"model": "rays"},
+        {"ranges": (2000.0, 2200.0)},
+    ]
+    for change in others:
+        field = base.replace(**change).field()
+        assert field.shape == (2, 63)
+        assert np.abs(field - base.field()).max() > 0.1 * np.abs(base.field()).max()
+    assert base.replace(n_steps=1).sample(rng()).measurements.shape == (1, 63)
+    assert base.replace(frequency=127.0).measurement.wavelength == pytest.approx(1489 / 127)
+
+
+def test_a_configuration_makes_the_round_trip() -> None:
+    scenario = create("swellex96", ranges=[2000.0, 2100.0], missing=[1, 43], snr_db=3.0)
+    for back in (
+        TowPastLine.from_dict(scenario.to_dict()),
+        pickle.loads(pickle.dumps(scenario)),
+        clone(scenario),
+    ):
+        assert back == scenario
+    assert hash(scenario) == hash(scenario.replace())
+
+
+@pytest.mark.parametrize(
+    ("change", "match"),
+    [
+        ({"source_depth": 300.0}, "source_depth must lie in the water"),
+        ({"ranges": ()}, "number of ranges must be at least 1"),
+        ({"ranges": (1000.0, np.nan)}, "ranges must be finite and positive"),
+        ({"model": "parabolic"}, "model must be one of 'modes', 'rays'"),
+        ({"missing": (65,)}, "missing names element 65 of 64"),
+        ({"missing": (0,)}, "missing"),
+        ({"frequency": 0.0}, "frequency must be finite and positive"),
+        ({"n_steps": 0}, "n_steps must be at least 1"),
+        ({"snr_db": np.inf}, "snr_db must be finite"),
+    ],
+)
+def test_a_scene_that_makes_no_sense_is_refused(change: dict[str, Any], match: str) -> None:
+    with pytest.raises(ValueError, match=match):
+        TowPastLine(**change)
+
+
+# the study
+
+
+def test_valse_and_svalse_tell_more_paths_apart_far_away_than_the_beamformer() -> None:
+    """Steps 61 to 80 of the paper's 1 to 100, where many paths lie near each other."""
+    scenario = TowPastLine(ranges=WAY[60:80])
+    trial = scenario.sample(rng())
+    score = {
+        name: mean_gospa(
+            np.rad2deg(trial.truth), strong(trial.tracker(name).run(trial.measurements)), c=10.0
+        ).total
+        for name in ("cbf", "valse", "svalse")
+    }
+    assert score["valse"] < 0.8 * score["cbf"]
+    assert score["svalse"] < 0.8 * score["cbf"]
+
+
+def test_the_study_writes_table_statements_and_pictures(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Every tenth step, with the beamformer in place of all six methods, which take a minute."""
+
+    def conventional(scenario: TowPastLine, name: str, seed: int, draw: int) -> tuple[Run, float]:
+        trial = scenario.sample(np.random.default_rng([seed, draw]))
+        return trial.tracker("cbf").run(trial.measurements), 1.0
+
+    monkeypatch.setattr(reproduce_swellex, "found", conventional)
+    monkeypatch.setattr(reproduce_swellex, "steps", lambda runs: np.arange(1, 351, 10))
+    written = reproduce("swellex96", tmp_path, quick=True)
+    assert [path.suffix for path in written] == [".csv", ".md", ".png", ".png", ".png"]
+    with open(tmp_path / "swellex96.csv", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 2 * 6 * 5
+    assert [row["method"] for row in rows[::5]] == list(reproduce_swellex.METHODS) * 2
+    for row in rows:
+        parts = [float(row[key]) for key in ("distance", "missed", "false")]
+        assert float(row["GOSPA"]) == pytest.approx(sum(parts))
+        assert row["std"] == ""  # of one draw
+    page = (tmp_path / "swellex96.md").read_text(encoding="utf-8")
+    assert "every second step" in page
+    assert "Not decided: in steps 1 to 100 svalse has a lower GOSPA than valse" in page
+    assert "| steps 220-249: BS and BSB dominate | 15° and -17° |" in page
+
+
+# the recorded arrays
+
+
+FOLDER = Path(os.environ.get("ARRIVALS_DATA", "")) / "swellex96"
+recorded = pytest.mark.skipif(
+    "ARRIVALS_DATA" not in os.environ, reason="ARRIVALS_DATA does not name the folder"
+)
+
+
+def correlation(a: Complex, b: Complex) -> Float:
+    size = (np.abs(a) ** 2).sum(axis=1) * (np.abs(b) ** 2).sum(axis=1)
+    return np.asarray(np.abs((a.conj() * b).sum(axis=1)) / np.sqrt(size))
+
+
+@recorded
+def test_the_field_of_the_modes_is_the_recorded_one() -> None:
+    """That one lacks the loss of half a cell of sediment: 0.8 % in power, less with its step."""
+    z, scenario = np.load(FOLDER / "s5_shallow_198hz.npz"), TowPastLine(missing=())
+    clean = z["clean"].T.astype(np.complex128)
+    field = scenario.field()
+    assert np.abs(field - clean).max() < 2e-3 * np.abs(clean).max()
+    assert correlation(field, clean).min() > 0.9999
+    assert scenario.noise == pytest.approx(float(z["noise_power"]), rel=1e-2)
+    assert line(missing=()).positions[:, 0] == pytest.approx(-z["depth_m"])
+
+
+@recorded
+def test_our_rays_are_nearer_to_the_modes_than_the_recorded_ones() -> None:
+    """Those have no phase jump at caustics; beam powers correlate by 0.92 here, by 0.90 there."""
+    z, scenario = np.load(FOLDER / "s5_shallow_198hz.npz"), TowPastLine(missing=(), model="rays")
+    modal, theirs = (z[key].T.astype(np.complex128) for key in ("clean", "rays"))
+    pictures = [beam(scenario, p)[1] for p in (modal, theirs, scenario.field())]
+    there, here = (
+        np.median([np.corrcoef(a, b)[0, 1] for a, b in zip(pictures[0], other, strict=True)])
+        for other in pictures[1:]
+    )
+    assert here > there > 0.85
+    level = 10 * np.log10(
+        (np.abs(scenario.field()) ** 2).mean(axis=1) / (np.abs(modal) ** 2).mean(axis=1)
+    )
+    assert abs(level.mean()) < 1.3
+    assert level.std() < 1.1
+
+
+@recorded
+def test_the_paths_have_the_recorded_angles() -> None:
+    with open(FOLDER / "arrivals.csv", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    names, doa, _ = TowPastLine().paths()
+    top = {int(row["step"]): -np.inf for row in rows}
+    for row in rows:
+        top[int(row["step"])] = max(top[int(row["step"])], float(row["level_db"]))
+    strong_ = [r for r in rows if float(r["level_db"]) > top[int(r["step"])] - 15]
+    ours = np.rad2deg([doa[int(r["step"]) - 1, names.index(r["path"])] for r in strong_])
+    assert np.isnan(ours).mean() < 0.06  # rays that graze their turning point, or touch none
+    off = np.abs(ours - [float(r["angle_deg"]) for r in strong_])
+    assert np.nanmax(off) < 0.05
+
+
+@recorded
+def test_the_tables_are_the_recorded_ones() -> None:
+    guide, way = environment(), track()
+    ssp = np.loadtxt(FOLDER / "ssp.csv", delimiter=",", skiprows=1)
+    np.testing.assert_array_equal(np.stack([guide.depths, guide.speeds], axis=1), ssp)
+    with open(FOLDER / "track.csv", encoding="utf-8") as file:
+        np.testing.assert_array_equal(
+            way["range_m"], [float(r["range_m"]) for r in csv.DictReader(file)]
+        )
+    with open(FOLDER / "array.csv", encoding="utf-8") as file:
+        elements = list(csv.DictReader(file))
+    assert [-float(e["depth_m"]) for e in elements] == line(missing=()).positions[:, 0].tolist()
+    assert [int(e["element"]) for e in elements if e["usable"] == "0"] == [43]

@@ -1,0 +1,168 @@
+"""The IMM: laws of mixtures, and what it does with faulty members."""
+
+import copy
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from arrivals.measurement_models import LinearMeasurement
+from arrivals.motion_models import ConstantVelocity, RandomWalk, VonMisesWalk
+from arrivals.trackers import EKF, IMM, UKF, Kalman, Particle, create
+from arrivals.trackers.conformance import difference
+from arrivals.trackers.gaussian.imm import mixture
+
+SEEN = LinearMeasurement([[1.0]], [[0.04]])
+M = np.array([[0.9, 0.1], [0.2, 0.8]])
+
+
+def member(q: float, x: float = 0.0) -> Kalman:
+    return Kalman(RandomWalk(q, 1), SEEN, [x], [[1.0]])
+
+
+def two(**changes: Any) -> IMM:
+    params: dict[str, Any] = {"filters": [member(0.01), member(1.0)], "mu": [0.5, 0.5], "M": M}
+    return IMM(**(params | changes))
+
+
+@given(st.integers(0, 10_000))
+def test_mixture_has_the_moments_of_its_draws(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    means, A = rng.normal(size=(3, 2)), rng.normal(size=(3, 2, 2))
+    covariances, weights = A @ A.swapaxes(1, 2), rng.dirichlet(np.ones(3), size=4)
+    x, P = mixture(means, covariances, weights)
+    second = np.einsum("ki,ijl->kjl", weights, covariances + means[:, :, None] * means[:, None])
+    np.testing.assert_allclose(x, weights @ means, atol=1e-12)
+    np.testing.assert_allclose(P, second - x[:, :, None] * x[:, None], atol=1e-12)
+
+
+@given(st.floats(-10, 10), st.floats(0.01, 0.99))
+def test_turning_a_mixture_turns_its_mean(turn: float, weight: float) -> None:
+    weights, covariances = np.array([weight, 1 - weight]), np.ones((2, 1, 1))
+    (x, P), (y, V) = (
+        mixture(np.array([[0.4], [-0.7]]) + t, covariances, weights, (0,)) for t in (0.0, turn)
+    )
+    assert np.cos(y[0] - x[0] - turn) == pytest.approx(1.0)
+    np.testing.assert_allclose(P, V, atol=1e-9)
+
+
+def test_equal_members_are_one_filter() -> None:
+    bank, alone = two(filters=[member(0.1), member(0.1)]), member(0.1)
+    for z in ([0.3], None, [0.1], [np.nan], [-0.2]):
+        for f in (bank, alone):
+            f.predict()
+            f.update(z)
+        np.testing.assert_allclose(bank.x, alone.x, atol=1e-14)
+        np.testing.assert_allclose(bank.P, alone.P, atol=1e-14)
+        assert bank.log_likelihood == pytest.approx(alone.log_likelihood)
+
+
+def test_probabilities_are_bayes_over_all_histories_of_models() -> None:
+    """Models that never switch: p(i | z) ∝ μᵢ Π p(zₜ | i), by independent filters."""
+    zs = np.random.default_rng(0).normal(size=(6, 1))
+    bank = two(M=np.eye(2), mu=[0.3, 0.7])
+    bank.run(zs)
+    log = np.log([0.3, 0.7])
+    for i, q in enumerate((0.01, 1.0)):
+        alone = member(q)
+        for z in zs:
+            alone.predict()
+            alone.update(z)
+            log[i] += alone.log_likelihood
+    np.testing.assert_allclose(bank.mu, np.exp(log - np.logaddexp(*log)), rtol=1e-10)
+
+
+def test_a_missed_measurement_leaves_the_predicted_probabilities() -> None:
+    bank = two()
+    bank.predict()
+    assert bank.mu == pytest.approx([0.55, 0.45])
+    bank.update(None)
+    assert bank.mu == pytest.approx([0.55, 0.45])
+    np.testing.assert_array_equal(bank.likelihood, 1.0)
+
+
+def test_a_second_update_is_no_second_transition() -> None:
+    apart = two()
+    apart.predict()
+    log = [np.log(apart.mu)]
+    for z in ([0.2], [0.5]):
+        apart.update(z)
+        log.append(np.log(apart.likelihood))
+    odds = np.sum(log, axis=0)
+    np.testing.assert_allclose(np.log(apart.mu[0] / apart.mu[1]), odds[0] - odds[1])
+
+
+def test_any_of_our_trackers_may_be_mixed() -> None:
+    walk = VonMisesWalk(30.0)
+    bank = IMM(
+        [
+            EKF(walk, SEEN, [3.0], [[0.1]]),
+            UKF(walk, SEEN, [3.0], [[0.1]]),
+            Particle(walk, SEEN, [3.0], [[0.1]], 500, rng=0),
+        ],
+        np.ones(3) / 3,
+        np.full((3, 3), 1 / 3),
+    )
+    run = bank.run([[3.0], None, [3.1]], dt=0.5)
+    assert run.x[-1] == pytest.approx(3.05, abs=0.1)
+
+
+def test_it_notices_a_turn_and_is_made_by_name() -> None:
+    seen = LinearMeasurement(np.eye(4)[::2], np.eye(2))
+    filters = [
+        Kalman(ConstantVelocity(q), seen, [0.0, 5.0, 0.0, 0.0], np.eye(4)) for q in (1e-4, 4.0)
+    ]
+    bank = create("imm", filters=filters, mu=[0.5, 0.5], M=[[0.97, 0.03], [0.03, 0.97]])
+    t = np.arange(20)
+    straight = np.stack([5.0 + 5.0 * t, 0.0 * t], axis=1)
+    turned = straight[-1] + np.stack([0.0 * t[:5], 5.0 * t[:5] + 5], axis=1)
+    bank.run(straight)
+    assert bank.mu[0] > 0.6  # type: ignore[attr-defined]
+    bank.run(turned)
+    assert bank.mu[1] > 0.6  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("call", ["update", "predict"])
+def test_a_member_that_fails_leaves_all_as_they_were(call: str) -> None:
+    class Faulty(Kalman):
+        def update(self, *args: Any, **kwargs: Any) -> None:
+            raise RuntimeError("sensor on fire")
+
+        def predict(self, *args: Any, **kwargs: Any) -> None:
+            raise RuntimeError("sensor on fire")
+
+    bank = two(filters=[member(0.1), Faulty(RandomWalk(1.0, 1), SEEN, [0.0], [[1.0]])])
+    before = copy.deepcopy(vars(bank))
+    with pytest.raises(RuntimeError, match="on fire"):
+        getattr(bank, call)(*([[1.0]] if call == "update" else []))
+    assert difference(before, vars(bank)) is None
+
+
+@pytest.mark.parametrize(
+    ("changes", "error", "message"),
+    [
+        ({"filters": [member(1.0)], "mu": [1.0], "M": [[1.0]]}, ValueError, "two filters"),
+        ({"filters": [member(1.0), "text"]}, TypeError, "str lacks x, P, predict, update, like"),
+        ({"mu": [0.5]}, ValueError, r"mu must have shape \(2,\); got \(1,\)"),
+        ({"mu": [-0.5, 1.5]}, ValueError, "mu must hold probabilities"),
+        ({"mu": [0.0, 0.0]}, ValueError, "mu must hold probabilities"),
+        ({"M": np.eye(3)}, ValueError, r"M must have shape \(2, 2\)"),
+        ({"M": np.ones((2, 2))}, ValueError, r"the rows of M must have sum 1; got \[2.0, 2.0\]"),
+        (
+            {"filters": [member(1.0), Kalman(RandomWalk(1.0, 1), SEEN, [[0.0]], [[1.0]])]},
+            ValueError,
+            r"the members' x must have one shape; got \[\(1,\), \(1, 1\)\]",
+        ),
+    ],
+)
+def test_bad_parameters_are_refused(
+    changes: dict[str, Any], error: type[Exception], message: str
+) -> None:
+    with pytest.raises(error, match=message):
+        two(**changes)
+
+
+def test_probabilities_are_brought_to_sum_one() -> None:
+    np.testing.assert_allclose(two(mu=[1, 3]).mu, [0.25, 0.75])

@@ -1,0 +1,453 @@
+"""What SVALSE and VALSE promise beyond the conformance list."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import ArrayLike
+
+from arrivals.measurement_models import ArraySnapshot, SensorArray
+from arrivals.measurement_models.manifolds.manifold import Reference
+from arrivals.motion_models import BernoulliVonMises, VonMisesWalk
+from arrivals.scenarios import Trial, create, mean_gospa
+from arrivals.trackers import SVALSE, VALSE, Run
+from arrivals.typing import Complex
+
+LINE = ArraySnapshot(SensorArray.ula(15, spacing=0.5), wavelength=1.0)
+PAPER: dict[str, Any] = {
+    "engine": "coordinate",
+    "reference": "first",
+    "tolerance": 1e-6,
+    "max_iterations": 5000,
+}
+COORDINATE: dict[str, Any] = {"engine": "coordinate"}
+MIXTURE: dict[str, Any] = {"engine": "coordinate", "posterior": "mixture"}
+
+
+def short(seed: int = 0, n_steps: int = 4, name: str = "svalse_fig4") -> Trial:
+    return create(name, n_steps=n_steps).sample(np.random.default_rng(seed))
+
+
+def tone(doa: ArrayLike, noise: float, seed: int = 0, model: ArraySnapshot = LINE) -> Complex:
+    """Snapshots (n_steps, n_sensors) of sources of amplitude 1 and random phase."""
+    rng = np.random.default_rng(seed)
+    doa = np.atleast_2d(np.asarray(doa, dtype=float))
+    phase = np.exp(2j * np.pi * rng.random(doa.shape))
+    return model.replace(noise=noise).simulate(doa, phase, rng)
+
+
+def gospa_deg(trial: Trial, run: Run) -> float:
+    return mean_gospa(np.rad2deg(trial.truth), np.rad2deg(run.doa), c=10.0).total
+
+
+# -- laws of section 12.6 ---------------------------------------------------------------------
+
+
+@settings(deadline=None, max_examples=8)
+@given(st.floats(-8, 8), st.floats(0, 6.28), st.sampled_from([{}, COORDINATE, MIXTURE]))
+def test_scale_and_common_phase_change_nothing(
+    log10: float, phase: float, form: dict[str, Any]
+) -> None:
+    trial = short(1, 2)
+    tracker = SVALSE(LINE, **form)
+    one, other = tracker.run_batch(
+        [trial.measurements, trial.measurements * 10**log10 * np.exp(1j * phase)]
+    )
+    np.testing.assert_allclose(other.doa, one.doa, atol=1e-8)
+    assert other.iterations.tolist() == one.iterations.tolist()
+
+
+@pytest.mark.parametrize("form", [{}, COORDINATE, MIXTURE])
+@pytest.mark.parametrize("reference", ["first", "middle"])
+def test_conjugation_mirrors_every_direction(form: dict[str, Any], reference: Any) -> None:
+    trial = short(2, 3)
+    tracker = SVALSE(LINE, reference=reference, **form)
+    one, other = tracker.run_batch([trial.measurements, trial.measurements.conj()])
+    np.testing.assert_allclose(-other.doa, one.doa, atol=1e-8)
+    np.testing.assert_array_equal(other.label, one.label)
+
+
+def test_turning_the_line_round_mirrors_every_direction() -> None:
+    """Array and source together: the reversed line hears from -β what the line hears from β."""
+    trial = short(3, 3)
+    reversed_line = LINE.replace(array=SensorArray(-LINE.array.positions))
+    one = SVALSE(LINE).run(trial.measurements)
+    other = SVALSE(reversed_line).run(trial.measurements)
+    np.testing.assert_allclose(-other.doa, one.doa, atol=1e-9)
+
+
+def test_an_array_moved_along_its_line_finds_the_same() -> None:
+    trial = short(3, 3)
+    moved = LINE.replace(array=SensorArray(LINE.array.positions + 12.3))
+    one, other = SVALSE(LINE).run(trial.measurements), SVALSE(moved).run(trial.measurements)
+    np.testing.assert_allclose(other.doa, one.doa, atol=1e-9)
+    np.testing.assert_allclose(np.abs(other.amplitude), np.abs(one.amplitude), atol=1e-9)
+
+
+@pytest.mark.parametrize("dead", [[0], [7], [3, 4, 14]])
+def test_a_silent_sensor_equals_the_array_without_it(dead: list[int]) -> None:
+    z = short(4, 3).measurements.copy()
+    z[:, dead] = [np.nan, np.inf, complex(0, np.nan)][: len(dead)]
+    without = LINE.replace(array=LINE.array.without(dead))
+    one = SVALSE(LINE).run(z)
+    other = SVALSE(without).run(np.delete(z, dead, axis=1))
+    np.testing.assert_allclose(one.doa, other.doa, atol=1e-12)
+    np.testing.assert_allclose(one.amplitude, other.amplitude, atol=1e-12)
+
+
+@pytest.mark.parametrize("reference", ["first", "middle"])
+def test_amplitudes_rebuild_the_snapshot(reference: Reference) -> None:
+    model = LINE.replace(array=SensorArray.ula(14, 0.5, missing=[2]))
+    y = tone([-0.6, 0.1, 0.9], noise=1e-8, model=model)[0]
+    tracker = VALSE(model, reference=reference, tolerance=1e-8)
+    tracker.update(y)
+    found = tracker.estimate
+    a = model.array.steering_vector(found.doa, 1.0)
+    np.testing.assert_allclose(found.amplitude @ a, y, atol=1e-3)
+
+
+@pytest.mark.parametrize("scale", [1e-200, 1e-130, 1e130, 1e200])
+def test_numbers_near_the_ends_of_the_scale_do_no_harm(scale: float) -> None:
+    z = tone([0.3], noise=1e-3)[0]
+    for tracker in (SVALSE(LINE), VALSE(LINE)):
+        if scale > 1e140:
+            with pytest.raises(ValueError, match="no sensor of the snapshot gave a finite number"):
+                tracker.update(z * scale)
+        else:
+            tracker.update(z * scale)
+            assert tracker.estimate.n_found == (1 if scale > 1e-140 else 0)
+
+
+# -- what is found ----------------------------------------------------------------------------
+
+
+def test_an_asymmetric_scene_keeps_its_sign() -> None:
+    run = SVALSE(LINE).run(tone([[0.2, 0.9]] * 3, noise=1e-3))
+    np.testing.assert_allclose(np.sort(run.doa[-1, :2]), [0.2, 0.9], atol=5e-3)
+
+
+def test_without_noise_there_is_one_source_and_no_division_by_zero() -> None:
+    z = LINE.array.steering_vector(np.full(5, 0.4), 1.0)
+    run = SVALSE(LINE).run(z)
+    assert run.n_found.tolist() == [1] * 5
+    np.testing.assert_allclose(run.doa[:, 0], 0.4, atol=1e-6)
+
+
+@pytest.mark.parametrize("n_sensors", [2, 3, 4, 8])
+def test_few_and_even_numbers_of_sensors_run(n_sensors: int) -> None:
+    model = LINE.replace(array=SensorArray.ula(n_sensors, spacing=0.5))
+    for tracker in (SVALSE(model), SVALSE(model, **COORDINATE), SVALSE(model, **MIXTURE),
+                    VALSE(model), VALSE(model, **COORDINATE)):  # fmt: skip
+        if isinstance(tracker, SVALSE) or n_sensors > 2:  # no lags to estimate the noise from
+            run = tracker.run(tone([[0.3]] * 4, noise=1e-4, model=model))
+            assert run.n_found.max() <= n_sensors - 1
+            np.testing.assert_allclose(run.doa[-1, 0], 0.3, atol=0.05)
+
+
+def test_silence_holds_no_source_and_warns_of_nothing() -> None:
+    run = SVALSE(LINE).run([np.zeros(15), tone([0.1], 1e-3)[0], np.zeros(15), np.zeros(15)])
+    assert run.n_found.tolist() == [0, 1, 0, 0]
+    assert run.converged.all()
+
+
+def test_a_line_with_gaps_resolves_with_its_whole_aperture() -> None:
+    """Six sensors with high sidelobes are the fast engine's weak spot: 11 of 20 seeds, 16 slow."""
+    array = SensorArray(np.array([0, 1, 4, 9, 11, 14]) * 0.5)  # a sparse ruler
+    model = LINE.replace(array=array)
+    run = SVALSE(model, **COORDINATE).run(tone([[-0.10, 0.05]] * 6, noise=1e-4, model=model))
+    np.testing.assert_allclose(np.sort(run.doa[-1, :2]), [-0.10, 0.05], atol=0.01)
+    array = SensorArray(np.array([0, 1, 2, 3, 4, 5, 6, 7, 9, 11, 14, 15, 19]) * 0.5)
+    model = LINE.replace(array=array)
+    doa = [-0.6, -0.1, 0.0, 0.7]
+    for engine in (SVALSE(model), SVALSE(model, **COORDINATE)):
+        run = engine.run(tone([doa] * 6, noise=1e-4, model=model))
+        np.testing.assert_allclose(np.sort(run.doa[-1, :4]), doa, atol=0.01)
+
+
+def test_below_half_a_wavelength_nothing_unphysical_is_reported() -> None:
+    close = ArraySnapshot(SensorArray.ula(16, spacing=0.2), wavelength=1.0)
+    rng = np.random.default_rng(0)
+    noise = rng.standard_normal((30, 16)) + 1j * rng.standard_normal((30, 16))
+    tracker = SVALSE(close)
+    beyond = 0
+    for z in noise:
+        tracker.predict()
+        tracker.update(z)
+        theta = tracker.mu[tracker.carried]
+        beyond += (np.abs(theta) > 2 * np.pi * 0.2 + 0.5).sum()
+        doa = tracker.estimate.doa
+        assert np.isfinite(doa).all()
+        assert (np.abs(doa) <= np.pi / 2).all()
+    assert beyond > 0  # there was something to leave out
+
+
+def test_a_source_at_endfire_is_reported_at_endfire() -> None:
+    close = ArraySnapshot(SensorArray.ula(16, spacing=0.25), wavelength=1.0)
+    run = SVALSE(close).run(tone([[np.pi / 2]] * 10, noise=0.03, model=close))
+    assert (run.n_found >= 1).all()
+    assert (run.doa[:, 0] > np.deg2rad(75)).all()
+    assert np.isfinite(run.std[:, 0]).all()
+
+
+def test_a_prediction_that_left_the_physical_range_is_not_reported() -> None:
+    close = ArraySnapshot(SensorArray.ula(16, spacing=0.2), wavelength=1.0)
+    tracker = SVALSE(close)
+    tracker.run(tone([[0.3]] * 2, noise=1e-3, model=close))
+    outside = tracker.mu.copy()
+    outside[0] = 3.0  # 2π d/λ is 1.26
+    tracker.mu = outside
+    tracker.predict()
+    assert tracker.estimate.n_found == 0
+
+
+# -- what is carried --------------------------------------------------------------------------
+
+
+def test_a_label_stays_with_its_source_and_a_new_source_gets_a_new_one() -> None:
+    first, second = np.full(12, -0.4), np.where(np.arange(12) < 5, np.nan, 0.6)
+    run = SVALSE(LINE).run(tone(np.stack([first, second], axis=1), noise=1e-3))
+    of_first = run.label[np.abs(run.doa + 0.4) < 0.1]
+    of_second = run.label[np.abs(run.doa - 0.6) < 0.1]
+    assert len(of_first) == 12
+    assert len(of_second) == 7
+    assert set(of_first) == {0}
+    assert len(set(of_second)) == 1
+    assert of_second[0] > 0
+
+
+def test_what_was_lost_for_long_comes_back_under_a_new_label() -> None:
+    doa = np.where((np.arange(12) >= 4) & (np.arange(12) < 8), np.nan, 0.3)
+    run = SVALSE(LINE).run(tone(np.stack([doa, np.full(12, -0.5)], axis=1), noise=1e-3))
+    before = run.label[:4][np.abs(run.doa[:4] - 0.3) < 0.1]
+    after = run.label[8:][np.abs(run.doa[8:] - 0.3) < 0.1]
+    assert set(before).isdisjoint(after)
+
+
+def test_prediction_is_the_motion_model_s() -> None:
+    motion = BernoulliVonMises(kappa=200.0, p_activate=0.2, p_deactivate=0.3)
+    tracker = SVALSE(LINE, motion)
+    tracker.predict()
+    tracker.update(tone([0.3], 1e-3)[0])
+    kappa, on = tracker.kappa[0], tracker.carried
+    tracker.predict()
+    assert tracker.kappa[0] == pytest.approx(VonMisesWalk(200.0).blur(kappa))
+    assert set(tracker.existence[on]) <= {0.7, 0.2}
+    assert tracker.existence[0] == 0.7
+
+
+def test_missed_measurements_widen_the_belief_until_the_source_is_given_up() -> None:
+    tracker = SVALSE(LINE)
+    tracker.run(tone([[0.3]] * 3, 1e-3))
+    std, found = [], []
+    for _ in range(4):
+        tracker.predict()
+        tracker.update(None)
+        found.append(tracker.estimate.n_found)
+        std += tracker.estimate.std.tolist()
+        assert tracker.estimate.label.tolist() == [0] * found[-1]
+    assert found == [1, 1, 0, 0]  # existence 0.75, 0.5875, 0.48
+    assert np.diff(std).min() > 0
+
+
+def test_replacing_the_motion_model_between_steps_works() -> None:
+    tracker = SVALSE(LINE)
+    tracker.run(tone([[0.3]] * 2, 1e-3))
+    tracker.motion = BernoulliVonMises(p_deactivate=1.0)
+    tracker.predict()
+    assert tracker.existence[0] == 0.0
+
+
+@pytest.mark.parametrize("form", [{}, COORDINATE])
+@pytest.mark.parametrize("p", [(0.0, 0.1), (0.25, 0.0), (0.25, 1.0), (1.0, 0.1)])
+def test_certain_births_and_deaths_are_allowed(
+    p: tuple[float, float], form: dict[str, Any]
+) -> None:
+    """Fig. 7: ρ of 0 and 1 force a component off and on."""
+    motion = BernoulliVonMises(p_deactivate=p[0], p_activate=p[1])
+    trial = short(5, 5, "svalse_fig6")
+    run = SVALSE(LINE, motion, max_iterations=60, **form).run(trial.measurements)
+    if p[1] == 1.0:  # four are there; the fast engine merges what is forced on and finds nothing
+        assert run.n_found[1:].min() > (4 if form else 3)
+    if p[1] == 0.0:
+        assert run.label.max() < run.n_found[0]  # nothing new after the first step
+    if p[0] == 0.0:
+        assert set(run.label[0][run.label[0] >= 0]) <= set(run.label[-1])
+
+
+def test_certain_birth_is_the_limit_of_one_that_is_nearly_so() -> None:
+    """Coordinate ascent, the paper's form; Fig. 7 (d) has a probability of 1."""
+    trial = short(5, 5, "svalse_fig6")
+    found = [
+        SVALSE(LINE, BernoulliVonMises(p_activate=p), max_iterations=100, **COORDINATE)
+        .run(trial.measurements[:3]).doa
+        for p in (1.0, 1 - 1e-12)
+    ]  # fmt: skip
+    assert found[0] == pytest.approx(found[1], abs=1e-3, nan_ok=True)
+
+
+def test_crossing_sources_are_merged_into_one_while_they_are_too_near() -> None:
+    z = tone([[0.0, np.deg2rad(1.0)]], noise=1e-7)
+    apart = SVALSE(LINE, merge=0.0).run(z)
+    merged = SVALSE(LINE).run(z)
+    near = np.abs(np.subtract.outer(merged.doa[0], merged.doa[0]))
+    assert apart.n_found[0] >= 2
+    assert np.nanmin(near[near > 0], initial=1.0) > np.deg2rad(1.5)
+
+
+# -- what is reported of it -------------------------------------------------------------------
+
+
+def test_existence_ranks_and_standard_deviations_shrink_with_the_noise() -> None:
+    z = tone([[-0.5, 0.5]] * 10, noise=1e-4)
+    z += 0.2 * tone([[1.1]] * 10, noise=1e-9, seed=1)
+    run = SVALSE(LINE).run(z)
+    faint = SVALSE(LINE).run(z + tone([[]] * 10, noise=0.05, seed=2))
+    is_strong, is_weak = np.abs(faint.amplitude) > 0.5, np.abs(faint.amplitude) < 0.4
+    assert np.abs(run.amplitude[run.label >= 0]).min() == pytest.approx(0.2, abs=0.05)
+    assert faint.existence[is_strong].min() > np.median(faint.existence[is_weak])
+    loud = SVALSE(LINE).run(tone([[0.4]] * 20, noise=0.1)).std[:, 0]
+    quiet = SVALSE(LINE).run(tone([[0.4]] * 20, noise=0.001)).std[:, 0]
+    np.testing.assert_allclose(np.median(loud) / np.median(quiet), 10, rtol=0.3)
+
+
+def test_for_a_single_source_the_standard_deviation_is_right() -> None:
+    """Phase reference in mid array; with the first sensor it would be too small by half."""
+    errors = {}
+    references: list[Reference] = ["middle", "first"]
+    for reference in references:
+        tracker = VALSE(LINE, reference=reference, tolerance=1e-6)
+        run = tracker.run(tone([[0.4]] * 200, noise=0.02))
+        best = np.nanargmin(np.abs(run.doa - 0.4), axis=1)[:, None]
+        error = np.take_along_axis(run.doa - 0.4, best, axis=1)
+        std = np.take_along_axis(run.std, best, axis=1)
+        errors[reference] = float(np.sqrt(np.mean((error / std) ** 2)))
+    assert 0.85 < errors["middle"] < 1.3
+    assert 1.6 < errors["first"] < 2.3
+
+
+def test_a_step_that_does_not_converge_says_so() -> None:
+    z = short(0, 1).measurements
+    run = SVALSE(LINE, max_iterations=3).run(z)
+    assert run.converged.tolist() == [False]
+    assert run.iterations.tolist() == [3]
+    assert SVALSE(LINE).run(z).converged.all()
+
+
+def test_a_limit_cycle_of_merging_is_cut_short_and_reported() -> None:
+    """Two sources half a degree apart: the search revives what merging removes."""
+    z = tone([[0.0, np.deg2rad(0.5)]] * 5, noise=1e-3)
+    run = SVALSE(LINE, BernoulliVonMises(), **COORDINATE).run(z)
+    assert run.iterations[~run.converged].tolist() == pytest.approx([120, 120], abs=10)
+    assert run.converged.sum() == 3
+    assert SVALSE(LINE).run(z).converged.all()  # the fast engine cannot cycle: its record rises
+
+
+def test_at_0_db_ghosts_starve_without_dying_and_the_step_is_reported() -> None:
+    """Section 12.4 lays these steps to merging; but nothing merges in them.
+
+    Carried components whose source has gone share a variance τ that shrinks to nothing and takes
+    the evidence against them along: their prior odds of 3 to 1 keep them, ever weaker.
+    """
+    trial = create("svalse_scenario2", snr_db=0.0, n_steps=20).sample(np.random.default_rng(4))
+    tracker = trial.tracker("svalse", motion=BernoulliVonMises(), **COORDINATE)
+    runs = [tracker.set_params(merge=m).run_batch([trial.measurements])[0] for m in (0.0, 0.026)]
+    for run in runs:
+        starved = ~run.converged
+        assert starved.sum() >= 3
+        assert run.iterations[starved].min() == 500
+        power = np.nansum(np.abs(run.amplitude[starved]) ** 2, axis=1) * 15
+        assert (power < 0.1 * run.noise[starved]).all()
+
+
+# -- golden figures, small versions of benchmarks/svalse_figures.py ---------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "svalse", "walk", "valse"),
+    [
+        ("svalse_fig4", 6.3, 5.4, 14.4),
+        ("svalse_fig5", 3.2, 3.15, 4.8),
+        ("svalse_fig6", 2.8, 2.6, 5.1),
+    ],
+)
+def test_coordinate_ascent_on_figures_4_to_6(
+    name: str, svalse: float, walk: float, valse: float
+) -> None:
+    """Limits of the 20-seed means, widened by two standard deviations of a run."""
+    trial = create(name).sample(np.random.default_rng(1))
+    means = [
+        gospa_deg(trial, tracker.run(trial.measurements))
+        for tracker in (
+            SVALSE(LINE, BernoulliVonMises(), **COORDINATE),
+            SVALSE(LINE, BernoulliVonMises()),
+            VALSE(LINE, **COORDINATE),
+        )
+    ]
+    assert means[0] < svalse + 1.0
+    assert means[1] < walk + 0.8
+    assert means[2] < valse + 1.0
+    assert means[0] < 0.9 * means[2]
+
+
+# -- what is refused --------------------------------------------------------------------------
+
+
+def test_a_grid_wider_than_half_a_wavelength_warns_of_the_first_two_directions_alike() -> None:
+    with pytest.warns(UserWarning, match=r"directions -90\.0 and 53\.1 degrees look alike"):
+        SVALSE(LINE.replace(wavelength=0.9))
+
+
+@pytest.mark.parametrize(
+    ("params", "message"),
+    [
+        ({"motion": VonMisesWalk(100.0)}, "motion must be a BernoulliVonMises"),
+        ({"measurement": LINE.array}, "measurement must be an ArraySnapshot"),
+        ({"reference": "last"}, "reference must be one of 'middle', 'first'"),
+        ({"posterior": "laplace"}, "posterior must be one of 'quadrature', 'mixture'"),
+        ({"tolerance": 0.0}, "tolerance must be finite and positive"),
+        ({"max_iterations": 2.5}, "max_iterations must be a whole number"),
+        ({"merge": -1.0}, "merge must be finite and not negative"),
+        ({"max_components": 0}, "max_components must be at least 1"),
+        ({"engine": "slow"}, "engine must be one of 'fast', 'coordinate'"),
+        ({"posterior": "mixture"}, "posterior='mixture' needs engine='coordinate'"),
+        ({"kl": 1.5}, r"kl must lie in \[0, 1\]"),
+    ],
+)
+def test_parts_and_numbers_that_do_not_fit_are_refused(
+    params: dict[str, Any], message: str
+) -> None:
+    with pytest.raises((ValueError, TypeError), match=message):
+        SVALSE(**{"measurement": LINE} | params)
+
+
+def test_snapshots_of_the_wrong_shape_or_kind_leave_the_belief_as_it_was() -> None:
+    tracker = SVALSE(LINE)
+    tracker.run(tone([[0.3]] * 2, 1e-3))
+    mu, estimate = tracker.mu, tracker.estimate
+    for bad in (np.ones(14), np.ones((1, 15)), 3.0, np.array(["a"] * 15), np.full(15, np.inf)):
+        with pytest.raises((ValueError, TypeError), match="snapshot"):
+            tracker.update(bad)
+    assert tracker.mu is mu
+    assert tracker.estimate is estimate
+
+
+def test_a_step_that_few_sensors_heard_costs_no_track() -> None:
+    z = tone([[-0.5, 0.1, 0.7]] * 6, noise=1e-3)
+    for n_heard in (1, 2, 3, 5):
+        damaged = z.copy()
+        damaged[3, n_heard:] = np.nan
+        run = SVALSE(LINE).run(damaged)
+        assert set(run.label[5][run.label[5] >= 0]) == {0, 1, 2}
+
+
+@pytest.mark.parametrize("span", [100, 257, 400])
+def test_long_sparse_lines_run(span: int) -> None:
+    places = np.unique(
+        np.concatenate([[0, 1, span], np.random.default_rng(1).integers(2, span, 10)])
+    )
+    model = LINE.replace(array=SensorArray(0.5 * places))
+    z = tone([[0.2]] * 2, noise=1e-3, model=model)
+    for tracker in (SVALSE(model), VALSE(model)):
+        np.testing.assert_allclose(tracker.run(z).doa[:, 0], 0.2, atol=0.01)

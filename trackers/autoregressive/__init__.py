@@ -1,0 +1,1 @@
+"""AR Kalman filter with QRD-RLS."""

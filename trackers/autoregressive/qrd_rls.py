@@ -1,0 +1,222 @@
+"""Recursive least squares by QR decomposition: forgetting, ridge, many right-hand sides."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from arrivals.parameters import Configurable
+from arrivals.typing import Float
+from arrivals.validation import count, positive, real
+
+# Kernels. A factor [R | U] is triangular, (..., n_coef + n_rhs, n_coef + n_rhs): RᵀR is the Gram
+# matrix of the regressors, R⁻¹U the solution, and what stands below U the residuals.
+
+
+def folded(factor: Float, *rows: Float) -> Float:
+    """Return the triangular factor of a factor and more rows, (..., n, n).
+
+    Examples
+    --------
+    >>> np.abs(folded(np.zeros((1, 1)), np.array([[3.0], [4.0]]))).round(12)
+    array([[5.]])
+    """
+    stack = np.concatenate([factor, *rows], axis=-2)
+    return np.asarray(np.linalg.qr(stack, mode="r"))
+
+
+def solution(factor: Float, n_coef: int) -> Float:
+    """Return W = R⁻¹U of a factor: (..., n_coef, n_rhs)."""
+    R, U = factor[..., :n_coef, :n_coef], factor[..., :n_coef, n_coef:]
+    return np.asarray(np.linalg.solve(R, U))
+
+
+def ridge_rows(weight: ArrayLike, target: Float) -> Float:
+    """Return the rows √weight [I | target], (..., n_coef, n_coef + n_rhs).
+
+    Parameters
+    ----------
+    weight : array_like, shape (..., n_coef)
+        One for each coefficient.
+    target : ndarray, shape (..., n_coef, n_rhs)
+        What the solution is drawn to.
+    """
+    n = target.shape[-2]
+    eye = np.broadcast_to(np.eye(n), (*target.shape[:-1], n))
+    root = np.sqrt(np.asarray(weight, dtype=np.float64))[..., None]
+    return np.asarray(root * np.concatenate([eye, target], axis=-1))
+
+
+def ages(heard: Float, forgetting: float) -> tuple[Float, Float]:
+    """Return √λ^age of samples (..., n) and λ^n, where only those heard (1, not 0) count.
+
+    Examples
+    --------
+    >>> ages(np.array([1.0, 0.0, 1.0]), 0.25)
+    (array([0.5, 0. , 1. ]), array(0.0625))
+    """
+    until = np.cumsum(heard, axis=-1)
+    n = until[..., -1:]
+    return heard * forgetting ** ((n - until) / 2), np.asarray(forgetting ** n[..., 0])
+
+
+def huber_weight(error: ArrayLike, threshold: float) -> Float:
+    """Return Huber's weights of errors: 1 up to the threshold, then threshold / |error|.
+
+    Examples
+    --------
+    >>> huber_weight([0.5, -4.0], 1.0)
+    array([1.  , 0.25])
+    """
+    size = np.abs(np.asarray(error, dtype=np.float64))
+    return np.asarray(threshold / np.maximum(size, threshold))
+
+
+class QRDRLS(Configurable):
+    """Least squares over samples that come in time, the old ones forgotten bit by bit.
+
+    Minimises Σ λ^age (y - xᵀW)² + μ |W - target|² for each right-hand side, all with the same
+    regressors. A block of samples gives what the samples give one after the other.
+
+    Parameters
+    ----------
+    n_coef, n_rhs : int
+        Regressors, and right-hand sides.
+    forgetting : float
+        λ per sample, in (0, 1].
+    ridge : float
+        μ; above 0, so that there is a solution from the start.
+    target : array_like, shape (..., n_coef, n_rhs), optional
+        Zero if None: the leaky form. A target assigned later is approached as the old one is
+        forgotten.
+    huber : float, optional
+        Error beyond which a sample counts less: the root of the mean square over its right-hand
+        sides, before the block that it comes in.
+
+    Attributes
+    ----------
+    factor : ndarray, shape (..., n_coef + n_rhs, n_coef + n_rhs)
+    weight : ndarray, shape (...)
+        Σ λ^age of the samples.
+
+    Raises
+    ------
+    ValueError
+        If a number is out of range or a shape does not fit.
+
+    Notes
+    -----
+    Leading axes are independent problems; they come with `target`, or with the first samples.
+    Of complex samples both parts are equations for the same real solution. Signs of the factor's
+    rows are arbitrary: compare
+    solutions.
+
+    References
+    ----------
+    Zhang, Chan, Zhou and Hu, ISCAS 2009, 1193-1196 (regularised QRD-RLS).
+
+    Examples
+    --------
+    >>> rls = QRDRLS(1, 1, forgetting=1.0, ridge=1e-6)
+    >>> rls.update([[1.0], [2.0]], [[3.0], [6.0]])
+    >>> rls.solve().round(3)
+    array([[3.]])
+    """
+
+    def __init__(
+        self,
+        n_coef: int,
+        n_rhs: int = 1,
+        *,
+        forgetting: float = 0.99,
+        ridge: float = 0.01,
+        target: ArrayLike | None = None,
+        huber: float | None = None,
+    ) -> None:
+        self.n_coef, self.n_rhs = count("n_coef", n_coef), count("n_rhs", n_rhs)
+        self.forgetting, self.ridge = positive("forgetting", forgetting), positive("ridge", ridge)
+        if self.forgetting > 1:
+            raise ValueError(f"forgetting must lie in (0, 1]; got {forgetting}")
+        self.target, self.huber = target, huber
+        if huber is not None:
+            positive("huber", huber)
+        goal = self._goal()
+        first = ridge_rows(np.full(goal.shape[:-1], self.ridge), goal)
+        below = np.zeros((*goal.shape[:-2], self.n_rhs, self.n_coef + self.n_rhs))
+        self.factor = np.concatenate([first, below], axis=-2)
+        self.weight = np.zeros(goal.shape[:-2])
+
+    def update(
+        self,
+        X: ArrayLike,
+        Y: ArrayLike,
+        weights: ArrayLike | None = None,
+        extra_rows: ArrayLike | None = None,
+    ) -> None:
+        """Take in samples in the order of time.
+
+        Parameters
+        ----------
+        X : array_like, shape (..., n_samples, n_coef)
+            Regressors.
+        Y : array_like, shape (..., n_samples, n_rhs)
+        weights : array_like, shape (..., n_samples), optional
+            Of the squared errors; 1 if None. A sample of weight 0 still takes its time.
+        extra_rows : array_like, shape (..., n_rows, n_coef + n_rhs), optional
+            Rows [x | y] that are not samples, taken as they are, such as the Cholesky factor of
+            the regressors' error covariance.
+        """
+        parts = 2 if np.iscomplexobj(X) or np.iscomplexobj(Y) else 1
+        X, Y = self._rows("X", X, self.n_coef, parts), self._rows("Y", Y, self.n_rhs, parts)
+        if X.shape[:-1] != Y.shape[:-1]:
+            raise ValueError(f"X and Y must have as many samples; got {X.shape} and {Y.shape}")
+        n = X.shape[-2] // parts
+        w = np.ones(n) if weights is None else real("weights", weights)
+        if w.shape[-1:] != (n,) or not (w >= 0).all():
+            raise ValueError(f"weights must be {n} numbers, not negative; got {weights!r}")
+        w = np.repeat(w, parts, axis=-1)
+        if self.huber is not None:
+            error = np.sqrt(parts * ((Y - X @ self.solve()) ** 2).mean(axis=-1))
+            w = w * huber_weight(error, self.huber)
+        age = np.repeat(self.forgetting ** np.arange(n - 1, -1, -1.0), parts)
+        kept = self.forgetting**n
+        data = np.sqrt(w * age)[..., None] * np.concatenate([X, Y], axis=-1)
+        goal = np.broadcast_to(self._goal(), (*X.shape[:-2], self.n_coef, self.n_rhs))
+        rows = [data, ridge_rows(np.full(goal.shape[:-1], self.ridge * (1 - kept)), goal)]
+        if extra_rows is not None:
+            extra = self._rows("extra_rows", extra_rows, self.n_coef + self.n_rhs, 1)
+            rows.append(np.broadcast_to(extra, (*X.shape[:-2], *extra.shape[-2:])))
+        old = np.broadcast_to(self.factor, (*X.shape[:-2], *self.factor.shape[-2:]))
+        self.factor = folded(np.sqrt(kept) * old, *rows)
+        self.weight = kept * self.weight + (w * age).sum(axis=-1) / parts
+
+    def solve(self) -> Float:
+        """Return W, (..., n_coef, n_rhs)."""
+        return solution(self.factor, self.n_coef)
+
+    def residual_power(self) -> Float:
+        """Return the mean square of the errors, (..., n_rhs); NaN before there is a sample.
+
+        What the ridge costs is included.
+        """
+        below = self.factor[..., self.n_coef :, self.n_coef :]
+        weight = np.where(self.weight > 0, self.weight, np.nan)
+        return np.asarray((below**2).sum(axis=-2) / weight[..., None])
+
+    def _goal(self) -> Float:
+        zeros = np.zeros((self.n_coef, self.n_rhs))
+        goal = zeros if self.target is None else real("target", self.target)
+        if goal.shape[-2:] != zeros.shape:
+            raise ValueError(f"target must have shape (..., {self.n_coef}, {self.n_rhs}); "
+                             f"got {goal.shape}")  # fmt: skip
+        return goal
+
+    def _rows(self, name: str, value: ArrayLike, n: int, parts: int) -> Float:
+        """Return samples as real rows, (..., parts n_samples, n): both parts of complex ones."""
+        array = np.asarray(value)
+        if array.ndim < 2 or array.shape[-1] != n:
+            raise ValueError(f"{name} must have shape (..., n_samples, {n}); got {array.shape}")
+        if parts == 1:
+            return real(name, array)
+        both = np.stack([array.real, array.imag], axis=-2)
+        return real(name, both.reshape(*array.shape[:-2], -1, n))

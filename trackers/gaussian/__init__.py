@@ -1,0 +1,1 @@
+"""Gaussian and particle filters, and filterpy's contract."""

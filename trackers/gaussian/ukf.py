@@ -1,0 +1,142 @@
+"""The unscented Kalman filter."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from arrivals.measurement_models.base import MeasurementModel
+from arrivals.motion_models.base import MotionModel
+from arrivals.trackers.gaussian.circular import difference, spread, wrapped
+from arrivals.trackers.gaussian.equations import apply, cholesky
+from arrivals.trackers.gaussian.linearization import Linear
+from arrivals.trackers.gaussian.smoothing import KalmanType
+from arrivals.trackers.registry import register
+from arrivals.typing import Float
+from arrivals.validation import number, positive
+
+
+def merwe_weights(n: int, alpha: float, beta: float, kappa: float) -> tuple[Float, Float, float]:
+    """Return weights of mean and covariance of 2n+1 sigma points, and their scale n + λ.
+
+    Examples
+    --------
+    >>> mean, covariance, scale = merwe_weights(2, alpha=1.0, beta=2.0, kappa=1.0)
+    >>> mean.round(3), scale
+    (array([0.333, 0.167, 0.167, 0.167, 0.167]), 3.0)
+    """
+    scale = alpha**2 * (n + kappa)
+    mean = np.full(2 * n + 1, 0.5 / scale)
+    mean[0] = 1 - n / scale
+    covariance = mean.copy()
+    covariance[0] += 1 - alpha**2 + beta
+    return mean, covariance, scale
+
+
+@register("ukf")
+class UKF(KalmanType):
+    """The unscented Kalman filter: the models' regressions over Merwe's sigma points.
+
+    Parameters
+    ----------
+    motion : MotionModel
+    measurement : MeasurementModel
+    x : array_like, shape (n,) or (n, 1)
+        Mean.
+    P : array_like, shape (n, n)
+        Covariance.
+    alpha : float
+        Distance of the sigma points from the mean, against √(n + κ) standard deviations.
+    beta : float
+        2 is best for Gaussian beliefs.
+    kappa : float
+        Above -n.
+
+    Raises
+    ------
+    ValueError
+        If `alpha` is not positive or `kappa` not above -n; else as in `KalmanType`.
+
+    Notes
+    -----
+    Everything else is that of `KalmanType`. Every `update` draws sigma points from the belief of
+    that moment, the second after a `predict` too. Means are taken in the tangent space at the
+    middle sigma point, where angles are differences. A sigma-point step is a Kalman step with the
+    regression of the function on the state for a matrix, and its residue for more noise.
+
+    References
+    ----------
+    Wan and van der Merwe, "The unscented Kalman filter", in Haykin (ed.), *Kalman Filtering and
+    Neural Networks*, 2001, table 7.3.2; García-Fernández et al., "Posterior linearization filter",
+    IEEE TSP 63(20), 2015, for the form.
+
+    Examples
+    --------
+    >>> from arrivals.measurement_models import Bearing
+    >>> from arrivals.motion_models import RandomWalk
+    >>> seen = Bearing([[0.0, 0.0], [10.0, 0.0]], noise=1e-4, position=(0, 1))
+    >>> tracker = UKF(RandomWalk(q=0.01), seen, x=[4.0, 6.0], P=np.eye(2))
+    >>> tracker.predict()
+    >>> tracker.update(seen.h([5.0, 5.0]))
+    >>> tracker.x.round(1)
+    array([5., 5.])
+    """
+
+    def __init__(
+        self,
+        motion: MotionModel,
+        measurement: MeasurementModel,
+        x: ArrayLike,
+        P: ArrayLike,
+        alpha: float = 0.5,
+        beta: float = 2.0,
+        kappa: float = 0.0,
+    ) -> None:
+        super().__init__(motion, measurement, x, P)
+        self.alpha, self.beta = positive("alpha", alpha), number("beta", beta)
+        self.kappa = number("kappa", kappa)
+        if not kappa > -self.dim_x:
+            raise ValueError(f"kappa must be above -{self.dim_x}; got {kappa}")
+
+    def linear_motion(self, x: Float, P: Float, dt: float) -> Linear:
+        """Return the regression of f over the sigma points."""
+        angles = self.motion.angles
+        near = self._regression(
+            x,
+            P,
+            lambda points: self.motion.f(points, dt),
+            lambda a, b: difference(a, b, angles),
+        )
+        return near._replace(mean=wrapped(near.mean, angles))
+
+    def linear_measurement(self, x: Float, P: Float) -> Linear:
+        """Return the regression of h over the sigma points."""
+        return self._regression(x, P, self.measurement.h, self.measurement.residual)
+
+    def _regression(
+        self,
+        x: Float,
+        P: Float,
+        function: Callable[[Float], Float],
+        subtract: Callable[[Float, Float], Float],
+    ) -> Linear:
+        mean, covariance, scale = merwe_weights(self.dim_x, self.alpha, self.beta, self.kappa)
+        P, L, jittered = cholesky(P)
+        steps = self._steps(np.sqrt(scale) * L)
+        images = function(x[..., None, :] + steps)
+        middle = images[..., :1, :]
+        moved = subtract(images, middle)
+        shift = apply(moved.swapaxes(-1, -2), mean)
+        rest = moved - shift[..., None, :]
+        cross = (covariance[:, None] * steps).swapaxes(-1, -2) @ rest
+        matrix = np.asarray(np.linalg.solve(P, cross), np.float64).swapaxes(-1, -2)
+        excess = spread(rest, covariance) - matrix @ cross
+        return Linear(middle[..., 0, :] + shift, matrix, excess, jittered)
+
+    @staticmethod
+    def _steps(L: Float) -> Float:
+        """Return the way from the mean to each sigma point, (..., 2n+1, n)."""
+        U = L.swapaxes(-1, -2)
+        return np.concatenate([np.zeros_like(U[..., :1, :]), U, -U], axis=-2)

@@ -1,0 +1,1 @@
+"""Detection followed by data association."""

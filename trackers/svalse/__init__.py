@@ -1,0 +1,1 @@
+"""VALSE and SVALSE."""
