@@ -21,7 +21,7 @@ from filterpy.kalman import ExtendedKalmanFilter, IMMEstimator, KalmanFilter
 from arrivals.measurement_models import Bearing, LinearMeasurement
 from arrivals.motion_models import ConstantVelocity, LinearMotion
 from arrivals.trackers import EKF, IMM, Kalman
-from arrivals.trackers.run import Recorder
+from arrivals.trackers.run import RunRecorder
 from arrivals.typing import Float
 
 Step = Callable[[], object]
@@ -89,7 +89,7 @@ def recording() -> tuple[Step, Step]:
     """Record one step."""
     kf, tracker = theirs(), ours()
     saver = Saver(kf)
-    recorder = Recorder(type(tracker.estimate))
+    recorder = RunRecorder(type(tracker.estimate))
     return saver.save, lambda: recorder.add(tracker.estimate, tracker.x)
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import copy
+import dataclasses
 import os
 import resource
 import subprocess
@@ -49,10 +50,15 @@ from arrivals.scenarios.simulations.signal_strength import (
 )
 from arrivals.trackers import Run
 from arrivals.trackers.rss.inference.goodness_of_fit import quality
-from arrivals.trackers.rss.inference.joint_posterior import Prior, Problem, inverse_2x2, marginals
+from arrivals.trackers.rss.inference.joint_posterior import (
+    JointPosterior,
+    Prior,
+    inverse_2x2,
+    marginals,
+)
 from arrivals.trackers.rss.inference.map_search import maximum
-from arrivals.trackers.rss.inference.variational import Cycling, Sweep, solve
-from arrivals.trackers.rss.model_order.grid_search import Newcomers
+from arrivals.trackers.rss.inference.variational import Sweep, VariationalSettings, solve
+from arrivals.trackers.rss.model_order.grid_search import NewSourcePrior
 from arrivals.trackers.rss.model_order.model_selection import best, grown
 from arrivals.typing import Float
 
@@ -198,7 +204,7 @@ def covariances_and_flags(runs: int) -> None:
     heading("Section 7, three sources from the prior")
     trials = draws(Table1K3(), 6 * runs, 5)
     problem = trials.problem
-    how = Cycling(max_cycles=60, tol_u=1e-4, tol_theta=1e-3)
+    how = VariationalSettings(max_cycles=60, tol_u=1e-4, tol_theta=1e-3)
     found = solve(problem, problem.prior.mu, problem.prior.theta, how)
     J = problem.information(problem.field.levels(found.u, found.theta))
     joint, factor = marginals(J).Sigma, inverse_2x2(found.P)
@@ -241,10 +247,13 @@ def literal_ratio(cycles: int) -> float:
     heard = LogNormalRSS(in_disc(rng, (100,), 100.0), log_noise=float(db_to_neper(40.0)))
     theta, u = np.zeros((1, 1, 2)) + 5.0, np.full((1, 1), 9.2)
     prior = Prior(u, np.full((1, 1), 1e-6), theta, np.eye(2)[None, None] * 1e-6)
-    problem = Problem(heard.field, heard.draw(u, theta, rng), 1 / heard.variance[None], prior)
-    exact = {"tol_u": 0.0, "tol_theta": 0.0, "guard": False}
-    right = solve(problem, u, theta, Cycling(**exact))  # type: ignore[arg-type]
-    wrong = solve(problem, u, theta, Cycling(refresh="literal", max_cycles=cycles, **exact))  # type: ignore[arg-type]
+    problem = JointPosterior(
+        heard.field, heard.draw(u, theta, rng), 1 / heard.variance[None], prior
+    )
+    exact = VariationalSettings(tol_u=0.0, tol_theta=0.0, guard=False)
+    literal = dataclasses.replace(exact, refresh="literal", max_cycles=cycles)
+    right = solve(problem, u, theta, exact)
+    wrong = solve(problem, u, theta, literal)
     return float(np.sqrt(np.trace(right.P[0, 0]) / np.trace(wrong.P[0, 0])))
 
 
@@ -260,7 +269,7 @@ def counting(runs: int) -> None:
         for run in range(runs):
             heard, u, theta, rng = scattered(K, np.random.default_rng([9, K, run]))
             xi = heard.draw(u, theta, rng)
-            new = Newcomers.among(heard.sensors, float(db_to_neper(80.0)),
+            new = NewSourcePrior.among(heard.sensors, float(db_to_neper(80.0)),
                                   float(db_to_neper(3.0)) ** 2)  # fmt: skip
             fit = best(grown(heard.field, xi, 1 / heard.variance, new, 7, patience=2), new)
             if len(fit.u) == K:
@@ -367,8 +376,10 @@ def cycle_ms(K: int, M: int, sweep: Sweep = "gauss-seidel") -> float:
     start = theta + 5 * rng.standard_normal(theta.shape)
     prior = Prior(np.full((1, K), 9.21), np.full((1, K), 8.38), start,
                   np.tile(np.eye(2) / 100, (1, K, 1, 1)))  # fmt: skip
-    problem = Problem(heard.field, heard.draw(u, theta, rng), 1 / heard.variance[None], prior)
-    how = Cycling(sweep=sweep, damping=0.5 if sweep == "jacobi" else 1.0, max_cycles=4,
+    problem = JointPosterior(
+        heard.field, heard.draw(u, theta, rng), 1 / heard.variance[None], prior
+    )
+    how = VariationalSettings(sweep=sweep, damping=0.5 if sweep == "jacobi" else 1.0, max_cycles=4,
                   tol_u=0.0, tol_theta=1e-6)  # fmt: skip
     best_time = np.inf
     for _ in range(3):
@@ -446,7 +457,7 @@ def against_lm(K: int, runs: int) -> str:
         trials = draws(scenario, 1, run + 1)
         problem, start = trials.problem, trials.problem.prior.theta
         started = time.process_time()
-        vb = solve(problem, problem.prior.mu, start, Cycling(max_cycles=60))
+        vb = solve(problem, problem.prior.mu, start, VariationalSettings(max_cycles=60))
         between_them = time.process_time()
         one = one_of_batch(problem, 0)
         lm = maximum(one, one.prior.mu, start[0], tolerance=1e-4)

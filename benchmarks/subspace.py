@@ -19,7 +19,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 
 from arrivals.measurement_models import ArraySnapshot, SensorArray
-from arrivals.measurement_models.manifolds.manifold import GridLine
+from arrivals.measurement_models.manifolds.manifold import UniformLineManifold
 from arrivals.scenarios import ar_signals, best_assignment_rmse
 from arrivals.trackers import MUSIC, PAST
 from arrivals.trackers.subspace.base import Subspaces, on_grid
@@ -87,7 +87,9 @@ def cases() -> Iterator[Case]:
     yield Case(what, (0.25, 0.5), 30, 0.95, {"esprit": 0.13}, moving=True)
 
 
-def snapshots(case: Case, runs: int, rng: np.random.Generator) -> tuple[GridLine, Complex]:
+def snapshots(
+    case: Case, runs: int, rng: np.random.Generator
+) -> tuple[UniformLineManifold, Complex]:
     """Return the line, and snapshots (n_runs, n_intervals, length, n_sensors)."""
     noise = 10 ** (-case.snr_db / 10)
     model = ArraySnapshot(SensorArray.symmetric(case.distances), wavelength=1.0, noise=noise)

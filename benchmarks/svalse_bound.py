@@ -19,8 +19,8 @@ from arrivals.motion_models import BernoulliVonMises
 from arrivals.motion_models.bessel import log_i0
 from arrivals.scenarios import create
 from arrivals.trackers import SVALSE
-from arrivals.trackers.svalse.components import Fit, Prediction
-from arrivals.trackers.svalse.coordinate.solver import Ascent, CoordinateAscent
+from arrivals.trackers.svalse.components import ComponentPosterior, ComponentPrior
+from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver, SingleSnapshotAscent
 from arrivals.trackers.svalse.newton.candidates import LOG_2PI
 from arrivals.trackers.svalse.newton.elbo import (
     KL_CONSTANT,
@@ -32,15 +32,15 @@ from arrivals.trackers.svalse.newton.elbo import (
     S,
     evaluate,
 )  # fmt: skip
-from arrivals.trackers.svalse.newton.expected_response import Response
-from arrivals.trackers.svalse.newton.solver import JointNewton
+from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
+from arrivals.trackers.svalse.newton.solver import NewtonSolver
 from arrivals.trackers.svalse.newton.state import log_odds
 from arrivals.typing import Complex
 
 FIGURES = ("svalse_fig4", "svalse_fig5", "svalse_fig6")
 
 
-class Watched(Ascent):
+class Watched(SingleSnapshotAscent):
     """An ascent that keeps the exponents of its angles' densities, by component."""
 
     exponent: dict[int, Complex]
@@ -66,12 +66,14 @@ class Watched(Ascent):
         return self.elbo() - float(np.log1p(-self.rho).sum()) - sum(cost)
 
 
-class WatchedAscent(CoordinateAscent):
+class WatchedAscent(CoordinateSolver):
     """Coordinate ascent whose working state can be looked at afterwards."""
 
     last: list[Watched] = []  # noqa: RUF012
 
-    def step(self, y: Complex, manifold: Manifold, prediction: Prediction | None) -> Ascent:
+    def step(
+        self, y: Complex, manifold: Manifold, prediction: ComponentPrior | None
+    ) -> SingleSnapshotAscent:
         """Return the working state, and remember it."""
         self.last[:] = [Watched(self, y, manifold, prediction)]
         return self.last[0]
@@ -88,7 +90,7 @@ def divergence(c: Complex, prior: complex) -> float:
     return float((np.exp(log_q) * (log_q - log_p)).mean() * 2 * np.pi)
 
 
-def bound(y: Complex, manifold: Manifold, known: Prediction, fit: Fit) -> float:
+def bound(y: Complex, manifold: Manifold, known: ComponentPrior, fit: ComponentPosterior) -> float:
     """Return the ELBO of a fast fit, F, from its angles and variances."""
     on = np.flatnonzero(fit.active)
     facts = np.zeros((1, N_FACTS, max(len(on), 1)))
@@ -105,7 +107,9 @@ def bound(y: Complex, manifold: Manifold, known: Prediction, fit: Fit) -> float:
     power = float(np.vdot(y, y).real) / len(y)
     nu, tau = np.array([[fit.noise / power]]), np.array([[fit.power / power]])
     Y = (y / np.sqrt(power))[None, None, :, None]
-    state = evaluate(Response(manifold), Y, facts, np.array([len(on)]), nu, tau, np.zeros(1))
+    state = evaluate(
+        ExpectedResponse(manifold), Y, facts, np.array([len(on)]), nu, tau, np.zeros(1)
+    )
     return float(state.F[0] - len(y) * np.log(power))
 
 
@@ -124,7 +128,7 @@ def gains(name: str, seeds: range) -> dict[str, list[float]]:
             if t % 3 == 2:
                 known, Y = tracker._prediction(), y[None, :, None]
                 assert known is not None
-                ours = bound(y, middle, known, JointNewton().fit(Y, middle, known))
+                ours = bound(y, middle, known, NewtonSolver().fit(Y, middle, known))
                 for reference, manifold in (("first", first), ("middle", middle)):
                     slow.fit(Y, manifold, known)
                     out[reference].append(ours - slow.last[0].bound())

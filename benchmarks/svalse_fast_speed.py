@@ -24,7 +24,7 @@ from arrivals.scenarios import create
 from arrivals.trackers import SVALSE, Tracker
 from arrivals.trackers.svalse.newton.candidates import LOG_2PI
 from arrivals.trackers.svalse.newton.elbo import KL_CONSTANT, MU, N_FACTS, S, evaluate
-from arrivals.trackers.svalse.newton.expected_response import Response
+from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
 from arrivals.trackers.svalse.newton.step import ascend
 from arrivals.typing import Complex, Float
 
@@ -101,7 +101,7 @@ def batch(n: int, repeats: int) -> None:
             copies = [copy.deepcopy(tracker) for _ in range(n)]
             for t in range(z.shape[1]):
                 started = time.process_time()
-                tracker._together(copies, list(z[:, t]), 1.0)
+                tracker.step_batch(copies, list(z[:, t]), 1.0)
                 best[t] = min(best[t], 1e3 * (time.process_time() - started) / n)
         what = f"{name}: batch of {n}, CPU ms a step and run"
         row(what, f"{best.mean():.2f}", "<= 0.6", bool(best.mean() <= 0.6))
@@ -155,7 +155,7 @@ def calls() -> None:
         (y / np.sqrt((np.abs(y) ** 2).mean()))[:, None, :, None], facts, np.array([6]),
         np.full((1, 1), 0.01), np.full((1, 1), 0.2), np.zeros(1),
     ]  # fmt: skip
-    response = Response(manifold)
+    response = ExpectedResponse(manifold)
     state = evaluate(response, *[array.view(Counted) for array in given])
     for learn in (False, True):
         Counted.calls = 0

@@ -17,7 +17,7 @@ from arrivals.measurement_models.delays.source_correlation import (
 )
 from arrivals.measurement_models.linear import LinearMeasurement
 from arrivals.measurement_models.manifolds.fourier import FourierManifold, fourier_manifold
-from arrivals.measurement_models.manifolds.manifold import GridLine, Manifold
+from arrivals.measurement_models.manifolds.manifold import Manifold, UniformLineManifold
 from arrivals.measurement_models.manifolds.symmetric_line import ArrayManifold
 from arrivals.measurement_models.signal_strength.decibels import (
     db_to_neper,
@@ -44,7 +44,7 @@ __all__ = [
     "ElementResponse",
     "FlatBand",
     "FourierManifold",
-    "GridLine",
+    "UniformLineManifold",
     "InterpolationDelay",
     "LinearMeasurement",
     "LogNormalRSS",

@@ -16,7 +16,7 @@ from arrivals.measurement_models.arrays.plane_waves import PlaneWaves
 from arrivals.measurement_models.arrays.sensor_array import SensorArray, direction
 from arrivals.measurement_models.base import MeasurementModel
 from arrivals.measurement_models.manifolds.fourier import fourier_manifold
-from arrivals.measurement_models.manifolds.manifold import GridLine, Manifold, Reference
+from arrivals.measurement_models.manifolds.manifold import Manifold, Reference, UniformLineManifold
 from arrivals.typing import Complex, Float
 from arrivals.validation import count, instance, one_of, positive, real, shaped, state
 
@@ -332,7 +332,9 @@ class ArraySnapshot(MeasurementModel):
 
 
 @lru_cache(maxsize=256)
-def grid_line(array: SensorArray, wavelength: float, reference: Reference) -> GridLine | None:
+def grid_line(
+    array: SensorArray, wavelength: float, reference: Reference
+) -> UniformLineManifold | None:
     """Return the manifold of a line on a uniform grid within half a wavelength; else None."""
     spacing = array.spacing
     if spacing is None or wavelength < 2 * spacing * (1 - 1e-6):
@@ -340,7 +342,7 @@ def grid_line(array: SensorArray, wavelength: float, reference: Reference) -> Gr
     coordinates = array.positions[:, 0]
     places = np.rint((coordinates - coordinates.min()) / spacing).astype(np.int64)
     step = min(2 * np.pi * spacing / wavelength, np.pi)
-    return GridLine(places, step, -float(coordinates.min()) / spacing, reference)
+    return UniformLineManifold(places, step, -float(coordinates.min()) / spacing, reference)
 
 
 def _log_marginal(Y: Complex, A: Complex, noise: float, power: float) -> Float:

@@ -5,11 +5,11 @@ from abc import ABC, abstractmethod
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.parameters import Model
+from arrivals.parameters import FrozenModel
 from arrivals.typing import Float
 
 
-class MeasurementModel(Model, ABC):
+class MeasurementModel(FrozenModel, ABC):
     """What a sensor sees of a state: z = h(x) + v, v ~ (0, R).
 
     A model is frozen. The members below are its Gaussian face, in filterpy's calling convention;

@@ -13,7 +13,7 @@ from arrivals.typing import Bool, Complex, Float
 
 
 @dataclass(frozen=True, eq=False)
-class Heard:
+class ObservedSnapshots:
     """What of a step can be used: a block of looks without gaps.
 
     Parameters
@@ -26,7 +26,7 @@ class Heard:
     snapshots: Bool
 
     @classmethod
-    def of(cls, Y: Complex) -> Heard:
+    def of(cls, Y: Complex) -> ObservedSnapshots:
         """Leave out bins and snapshots without a number, then sensors with a gap in the others.
 
         Bins that hold nothing but zeros are left out, too, as long as others do not.
@@ -40,7 +40,7 @@ class Heard:
         --------
         >>> Y = np.ones((2, 3, 4), dtype=complex)
         >>> Y[1], Y[0, 2, 3] = np.nan, np.nan
-        >>> heard = Heard.of(Y)
+        >>> heard = ObservedSnapshots.of(Y)
         >>> heard.bins, heard.sensors
         (array([ True, False]), array([ True,  True, False]))
         """

@@ -16,7 +16,7 @@ from arrivals.motion_models.bessel import (
     log_bessel_ratio,
     log_i0,
 )
-from arrivals.motion_models.combined import Stacked
+from arrivals.motion_models.combined import CombinedMotion
 from arrivals.motion_models.coordinated_turn import CoordinatedTurn
 from arrivals.motion_models.delay import DelayDrift, DelayWalk
 from arrivals.motion_models.linear import ConstantVelocity, LinearMotion, RandomWalk
@@ -39,7 +39,7 @@ __all__ = [
     "LinearMotion",
     "MotionModel",
     "RandomWalk",
-    "Stacked",
+    "CombinedMotion",
     "VonMisesWalk",
     "autocovariance",
     "bessel_ratio",

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from arrivals.motion_models.base import MotionModel
 from arrivals.motion_models.combined import block_diagonal
-from arrivals.motion_models.companion_form import Blocks, blocks, radius, stationary
+from arrivals.motion_models.companion_form import CompanionLayout, blocks, radius, stationary
 from arrivals.typing import Complex, Float
 from arrivals.validation import positive, real, state
 
@@ -99,7 +99,7 @@ class AutoregressiveSources(MotionModel):
         return len(self.coefficients)
 
     @property
-    def blocks(self) -> Blocks:
+    def blocks(self) -> CompanionLayout:
         """Where the lags of the sources stand in the state of real sources."""
         return blocks(self.orders)
 

@@ -5,11 +5,11 @@ from abc import ABC, abstractmethod
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.parameters import Model
+from arrivals.parameters import FrozenModel
 from arrivals.typing import Float
 
 
-class MotionModel(Model, ABC):
+class MotionModel(FrozenModel, ABC):
     """How a state moves in one step: x' = f(x) + w, w ~ (0, Q).
 
     A model is frozen. The members below are its Gaussian face, in filterpy's calling convention;

@@ -11,7 +11,7 @@ from arrivals.validation import instance, state
 
 
 @dataclass(frozen=True)
-class Stacked(MotionModel):
+class CombinedMotion(MotionModel):
     """A state [x₁, x₂] whose parts move independently.
 
     Parameters
@@ -25,7 +25,7 @@ class Stacked(MotionModel):
     Examples
     --------
     >>> from arrivals.motion_models import DelayWalk, LinearMotion
-    >>> Stacked(DelayWalk(q=1.0), LinearMotion([[0.5]], [[2.0]])).F()
+    >>> CombinedMotion(DelayWalk(q=1.0), LinearMotion([[0.5]], [[2.0]])).F()
     array([[1. , 0. ],
            [0. , 0.5]])
     """

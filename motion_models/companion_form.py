@@ -11,7 +11,7 @@ from arrivals.typing import Bool, Float, Int
 
 
 @dataclass(frozen=True, eq=False)
-class Blocks:
+class CompanionLayout:
     """Places in a state in which source k has p_k + 1 lags, the current sample first.
 
     Attributes
@@ -62,7 +62,7 @@ class Blocks:
 
 
 @lru_cache(maxsize=256)
-def blocks(orders: tuple[int, ...], lag_by_lag: bool = False) -> Blocks:
+def blocks(orders: tuple[int, ...], lag_by_lag: bool = False) -> CompanionLayout:
     """Return the places for sources of the given orders, counted source by source or lag by lag.
 
     Examples
@@ -91,7 +91,7 @@ def blocks(orders: tuple[int, ...], lag_by_lag: bool = False) -> Blocks:
     back = np.argsort(order)
     for array in (lags, used, columns, shift, order, back):
         array.setflags(write=False)
-    return Blocks(orders, lags[:, 0], lags, used, columns, shift, order, back)
+    return CompanionLayout(orders, lags[:, 0], lags, used, columns, shift, order, back)
 
 
 def radius(coefficients: Float) -> Float:

@@ -11,9 +11,9 @@ import numpy as np
 
 from arrivals.measurement_models import ArraySamples, ArraySnapshot, LogNormalRSS
 from arrivals.motion_models import MotionModel
-from arrivals.parameters import Model
+from arrivals.parameters import FrozenModel
+from arrivals.registry import Registry
 from arrivals.trackers import Tracker, find
-from arrivals.trackers.registry import Registry
 from arrivals.typing import Complex, Float
 
 
@@ -59,7 +59,7 @@ class Trial:
         return {"measurement": self.measurement, "motion": self.motion}
 
 
-class Scenario(Model, ABC):
+class Scenario(FrozenModel, ABC):
     """A situation that trackers are tried on; frozen, its numbers are its parameters."""
 
     @abstractmethod

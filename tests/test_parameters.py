@@ -13,7 +13,7 @@ from recording_tracker import SNAPSHOTS, Hands
 
 from arrivals.measurement_models import ArraySnapshot, MeasurementModel, SensorArray
 from arrivals.motion_models import BernoulliVonMises, LinearMotion, RandomWalk, VonMisesWalk
-from arrivals.parameters import Configurable, Model
+from arrivals.parameters import Configurable, FrozenModel
 from arrivals.trackers import (
     CBF,
     SVALSE,
@@ -141,7 +141,7 @@ def test_configuration_may_hold_a_tracker() -> None:
 
 
 @dataclass(frozen=True)
-class Several(Model):
+class Several(FrozenModel):
     parts: Any
 
 

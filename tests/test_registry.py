@@ -10,13 +10,13 @@ from typing import Any
 import pytest
 from recording_tracker import SNAPSHOTS
 
+from arrivals.registry import Registry
 from arrivals.trackers import (
     CBF,
     available,
     create,
     find,
 )
-from arrivals.trackers.registry import Registry
 
 # the registry
 
@@ -99,7 +99,7 @@ def foreign(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[list[En
     def entry_points(*, group: str) -> EntryPoints:
         return EntryPoints(points).select(group=group)
 
-    monkeypatch.setattr("arrivals.trackers.registry.entry_points", entry_points)
+    monkeypatch.setattr("arrivals.registry.entry_points", entry_points)
     yield points
     for module in ("farm", "farm_facade"):
         sys.modules.pop(module, None)
@@ -173,7 +173,7 @@ def test_a_tracker_that_cannot_be_imported_says_so(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     point = EntryPoint("broken", "no_such_package_here:Thing", "arrivals.trackers")
-    monkeypatch.setattr("arrivals.trackers.registry.entry_points", lambda group: [point])
+    monkeypatch.setattr("arrivals.registry.entry_points", lambda group: [point])
     with pytest.raises(ValueError, match="tracker 'broken', no_such_package_here:Thing, cannot"):
         find("broken")
     with pytest.raises(TypeError, match="named by a string; got 3"):

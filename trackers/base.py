@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from arrivals.parameters import Configurable
 from arrivals.trackers.estimates import Estimate
-from arrivals.trackers.run import Recorder, Run
+from arrivals.trackers.run import Run, RunRecorder
 from arrivals.typing import Float
 from arrivals.validation import positive
 
@@ -65,7 +65,7 @@ class Tracker(Configurable, ABC):
             The estimates as rectangular arrays over time.
         """
         positive("dt", dt)
-        recorder = Recorder(type(self.estimate))
+        recorder = RunRecorder(type(self.estimate))
         started = time.perf_counter()
         for z in measurements:
             self.predict(dt=dt)
@@ -98,17 +98,17 @@ class Tracker(Configurable, ABC):
 
     @classmethod
     def _type_name(cls) -> str:
-        from arrivals.trackers.registry import _trackers
+        from arrivals.trackers.registry import TRACKERS
 
-        return _trackers.name_of(cls) or super()._type_name()
+        return TRACKERS.name_of(cls) or super()._type_name()
 
 
-def missed(z: ArrayLike | None) -> bool:
+def is_missing(z: ArrayLike | None) -> bool:
     """Tell whether a measurement is missing: None, or nothing but NaN.
 
     Examples
     --------
-    >>> missed(None), missed(np.nan), missed([np.nan, 1.0])
+    >>> is_missing(None), is_missing(np.nan), is_missing([np.nan, 1.0])
     (True, True, False)
     """
     if z is None:

@@ -1,4 +1,4 @@
-"""Variable numbers of sources in arrays of one size."""
+"""Base classes of trackers that estimate a varying number of directions."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from numpy.typing import ArrayLike
 
 from arrivals.trackers.base import Tracker
 from arrivals.trackers.estimates import DirectionEstimate
-from arrivals.trackers.run import Recorder, Run
+from arrivals.trackers.run import Run, RunRecorder
 from arrivals.typing import Bool, Float, Int
 from arrivals.validation import positive
 
-OVER: Any = object()  # in place of a measurement, where one sequence has ended and others go on
+ENDED: Any = object()  # in place of a measurement: this sequence has ended, others go on
 
 
 def padded(values: Float | Int | Bool, n: int, filler: float) -> Float:
-    """Return the first n values, as floats, followed by fillers up to length n.
+    """Return the first n values as floats, filled up to length n.
 
     Examples
     --------
@@ -35,66 +35,116 @@ def padded(values: Float | Int | Bool, n: int, filler: float) -> Float:
 
 
 class DirectionTracker(Tracker):
-    """A tracker that reports as many directions as there are.
+    """Base of trackers that estimate a varying number of directions.
+
+    A subclass has `n_slots` and calls `report` at the end of `update`, and `reset` in its
+    constructor.
 
     Attributes
     ----------
-    x, P : ndarray, shapes (n_slots,), (n_slots, n_slots)
-        The directions reported, rad, NaN in unused places, and their variances on a diagonal, 0
-        where they are not known.
+    x : ndarray, shape (n_slots,)
+        Directions reported last, rad; NaN in unused slots.
+    P : ndarray, shape (n_slots, n_slots)
+        Their variances on the diagonal, rad²; 0 where unknown.
     estimate : DirectionEstimate
-        Read-only, as is
+        Directions reported last; read-only.
     noise : float
-        Variance of the noise of one sensor as estimated last; NaN where it is not.
+        Estimated noise variance of one sensor; NaN where the method gives none; read-only.
     """
 
     @property
     @abstractmethod
     def n_slots(self) -> int:
-        """Number of directions that may be reported at once."""
+        """Largest number of directions in one estimate."""
 
     @property
     def estimate(self) -> DirectionEstimate:
-        """The directions reported last."""
+        """Directions reported last."""
         return self._estimate
 
     @property
     def noise(self) -> float:
-        """Variance of the noise of one sensor as estimated last; NaN where it is not."""
+        """Estimated noise variance of one sensor; NaN where the method gives none."""
         return self._estimate.noise
 
-    def _show(self, estimate: DirectionEstimate) -> None:
-        """Report directions."""
-        self._estimate = estimate
+    def reset(self) -> None:
+        """Report no direction; a subclass with a belief also returns to its initial one."""
+        self.report([])
+
+    def report(
+        self,
+        doa: ArrayLike,
+        std: ArrayLike | None = None,
+        existence: ArrayLike | None = None,
+        amplitude: ArrayLike | None = None,
+        label: ArrayLike | None = None,
+        *,
+        converged: bool = True,
+        iterations: int = 0,
+        noise: float = np.nan,
+    ) -> None:
+        """Make directions the present estimate, and set `x` and `P`.
+
+        Parameters
+        ----------
+        doa : array_like, shape (n_sources,)
+            Directions of arrival, rad; at most `n_slots` of them.
+        std, existence, amplitude : array_like, shape (n_sources,), optional
+            As in `DirectionEstimate`; NaN if None.
+        label : array_like of int, shape (n_sources,), optional
+            As in `DirectionEstimate`; -1 if None.
+        converged : bool
+            False if an iterative method stopped before it met its tolerance.
+        iterations : int
+            Number of iterations of this step.
+        noise : float
+            Estimated noise variance of one sensor.
+        """
+        doa = np.asarray(doa, dtype=np.float64)
+        n = len(doa)
+        self._estimate = estimate = DirectionEstimate(
+            doa=doa,
+            std=np.full(n, np.nan) if std is None else np.asarray(std, np.float64),
+            existence=np.full(n, np.nan)
+            if existence is None
+            else np.asarray(existence, np.float64),
+            amplitude=np.full(n, complex(np.nan, np.nan))
+            if amplitude is None
+            else np.asarray(amplitude, np.complex128),
+            label=np.full(n, -1) if label is None else np.asarray(label, np.int64),
+            converged=converged,
+            iterations=iterations,
+            noise=noise,
+        )
         self.x = padded(estimate.doa, self.n_slots, np.nan)
         variance = padded(estimate.std**2, self.n_slots, 0.0)
         self.P = np.diag(np.nan_to_num(variance, posinf=np.inf))
 
 
-class SideBySide(DirectionTracker):
-    """A direction tracker that solves a step of several sequences as one array program."""
+class BatchDirectionTracker(DirectionTracker):
+    """Base of direction trackers that process a step of several sequences in one array call."""
 
     @abstractmethod
-    def _together(self, trackers: Sequence[Self], step: Sequence[Any], dt: float) -> None:
-        """Predict and update copies of this tracker, each with its measurement."""
+    def step_batch(self, trackers: Sequence[Self], step: Sequence[Any], dt: float) -> None:
+        """Predict and update copies of this tracker, each with its own measurement."""
 
     def run_batch(
         self, measurements: Iterable[Iterable[ArrayLike | None]], dt: float = 1.0
     ) -> list[Run]:
         """Run independent sequences, the leading axis, each from the present state.
 
-        All are solved together, step by step, as one array program; the numbers are those of
-        single runs, up to rounding. The tracker itself stays as it is.
+        A step of all sequences is one array call. Results equal those of single runs up to
+        rounding. The tracker itself does not change.
         """
         positive("dt", dt)
         sequences = [list(sequence) for sequence in measurements]
         trackers = [copy.deepcopy(self) for _ in sequences]
-        recorders = [Recorder(type(self.estimate)) for _ in sequences]
+        recorders = [RunRecorder(type(self.estimate)) for _ in sequences]
         started = time.perf_counter()
-        for step in zip_longest(*sequences, fillvalue=OVER):
-            on = [n for n, z in enumerate(step) if z is not OVER]
-            self._together([trackers[n] for n in on], [step[n] for n in on], dt)
-            for n in on:
+        for step in zip_longest(*sequences, fillvalue=ENDED):
+            active = [n for n, z in enumerate(step) if z is not ENDED]
+            self.step_batch([trackers[n] for n in active], [step[n] for n in active], dt)
+            for n in active:
                 recorders[n].add(trackers[n].estimate, trackers[n].x)
         elapsed = (time.perf_counter() - started) / max(len(sequences), 1)
         return [recorder.run(dt=dt, elapsed=elapsed) for recorder in recorders]

@@ -78,12 +78,12 @@ class DirectionEstimate(Estimate):
     columns: ClassVar[tuple[str, ...]] = ("label", "doa_deg", "std_deg", "existence", "level_db")
 
     @classmethod
-    def nothing(cls, **others: Any) -> Self:
-        """Return the estimate in which no source was found.
+    def empty(cls, **others: Any) -> Self:
+        """Return the estimate of a step in which no source was detected.
 
         Examples
         --------
-        >>> DirectionEstimate.nothing().n_found
+        >>> DirectionEstimate.empty().n_found
         0
         """
         none = np.zeros(0)

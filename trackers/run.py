@@ -5,14 +5,13 @@ from __future__ import annotations
 import csv
 import os
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
-from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from arrivals.files import atomic_write
 from arrivals.trackers.estimates import Estimate
 from arrivals.typing import Float
 
@@ -95,7 +94,7 @@ class Run:
             Times to write in place of the run's own, s.
         """
         run = self if time is None else self.at(time)
-        with replacing(path) as file:
+        with atomic_write(path) as file:
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow(header(self.kind))
             writer.writerows(map(text, run.rows()))
@@ -125,34 +124,7 @@ def text(row: tuple[Any, ...]) -> list[str]:
             for value in row]  # fmt: skip
 
 
-@contextmanager
-def replacing(path: str | os.PathLike[str], *, binary: bool = False) -> Iterator[IO[Any]]:
-    """Open a text or binary file beside `path` that takes its name only if all goes well.
-
-    Examples
-    --------
-    >>> with replacing("/nowhere/tracks.csv"):
-    ...     pass
-    Traceback (most recent call last):
-    FileNotFoundError: [Errno 2] the folder /nowhere does not exist
-    """
-    target = Path(path)
-    if not target.parent.is_dir():
-        raise FileNotFoundError(2, f"the folder {target.parent} does not exist")
-    part = target.with_name(f".{target.name}.{os.getpid()}.part")
-    try:
-        text_mode: dict[str, Any] = {} if binary else {"newline": "", "encoding": "utf-8"}
-        with open(part, "wb" if binary else "w", **text_mode) as file:
-            yield file
-        os.replace(part, target)
-    except BaseException as error:
-        part.unlink(missing_ok=True)
-        if isinstance(error, OSError) and error.filename in (None, str(part)):
-            error.filename = str(target)
-        raise
-
-
-class Recorder:
+class RunRecorder:
     """Arrays over time that grow with the estimates added, and hold little beyond them."""
 
     def __init__(self, kind: type[Estimate]) -> None:

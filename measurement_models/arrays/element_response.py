@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.parameters import Model
+from arrivals.parameters import FrozenModel
 from arrivals.typing import Complex, Float
 
 
 @dataclass(frozen=True, eq=False)
-class ElementResponse(Model):
+class ElementResponse(FrozenModel):
     """Complex gains of directional, coupled or measured elements, as functions of the azimuth.
 
     Parameters

@@ -10,13 +10,13 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.arrays.element_response import ElementResponse
 from arrivals.measurement_models.arrays.sensor_array import SensorArray
-from arrivals.parameters import Model
+from arrivals.parameters import FrozenModel
 from arrivals.typing import Complex, Float, Int
 from arrivals.validation import positive
 
 
 @dataclass(frozen=True)
-class PlaneWaves(Model):
+class PlaneWaves(FrozenModel):
     """How an array answers to plane waves.
 
     Parameters

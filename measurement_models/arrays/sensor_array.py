@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.parameters import Model
+from arrivals.parameters import FrozenModel
 from arrivals.typing import Complex, Float, Int
 from arrivals.validation import count, positive, real
 
@@ -94,7 +94,7 @@ def grid_spacing(coordinates: ArrayLike, tolerance: float = 1e-3) -> float | Non
 
 
 @dataclass(frozen=True, eq=False)
-class SensorArray(Model):
+class SensorArray(FrozenModel):
     """Sensors at known places.
 
     Parameters

@@ -9,13 +9,13 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.arrays.sensor_array import SensorArray
 from arrivals.measurement_models.delays.source_correlation import SourceCorrelation
-from arrivals.parameters import Model
+from arrivals.parameters import FrozenModel
 from arrivals.typing import Float, Int
 from arrivals.validation import instance, number, positive
 
 
 @dataclass(frozen=True)
-class ArraySamples(Model):
+class ArraySamples(FrozenModel):
     """What a line array samples of one source: y_j(k) = s(k - jΔ) + v_j(k).
 
     This is the door between angles and delays. The method's papers count the sensors j in the

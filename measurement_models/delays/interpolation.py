@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.base import MeasurementModel
 from arrivals.measurement_models.delays.source_correlation import SourceCorrelation
-from arrivals.parameters import Model
+from arrivals.parameters import FrozenModel
 from arrivals.typing import Float
 from arrivals.validation import count, instance, not_negative, positive, real
 
@@ -28,7 +28,7 @@ def window(reach: float) -> tuple[int, ...]:
 
 
 @dataclass(frozen=True)
-class DelayInterpolator(Model):
+class DelayInterpolator(FrozenModel):
     """The linear least-squares estimate of s(k - τ) from s(k - o₁), ..., s(k - o_L).
 
     Parameters

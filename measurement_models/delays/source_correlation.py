@@ -9,14 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.parameters import Model
+from arrivals.parameters import FrozenModel
 from arrivals.typing import Float
 from arrivals.validation import number, positive, real
 
 N_GRID = 1024  # cells of the band, for spectra without a closed form
 
 
-class SourceCorrelation(Model, ABC):
+class SourceCorrelation(FrozenModel, ABC):
     """The normalised correlation ρ(τ) of a real waveform, at lags that need not be whole.
 
     Notes

@@ -81,7 +81,7 @@ class Manifold(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class GridLine:
+class UniformLineManifold:
     """A line of sensors on a uniform grid, with or without gaps, at one wavelength.
 
     The angle is the electrical one, θ = 2π d/λ sin β for a grid of spacing d: the phase step
@@ -101,7 +101,7 @@ class GridLine:
 
     Examples
     --------
-    >>> line = GridLine(np.arange(5), step=np.pi, origin=2.0)
+    >>> line = UniformLineManifold(np.arange(5), step=np.pi, origin=2.0)
     >>> line.harmonics
     array([-2, -1,  0,  1,  2])
     >>> np.rad2deg(line.to_doa([np.pi / 2])).round(6)
@@ -193,19 +193,19 @@ class GridLine:
         shift = self.origin - self.reference_place
         return np.asarray(np.asarray(w) * np.exp(1j * shift * np.asarray(theta)))
 
-    def without(self, sensors: Sequence[int] | Int) -> GridLine:
+    def without(self, sensors: Sequence[int] | Int) -> UniformLineManifold:
         """Return the manifold of the line less some sensors."""
         if len(sensors) == 0:
             return self
         return _line_without(self, tuple(map(int, sensors)))
 
-    def only(self, bins: Sequence[int] | Int) -> GridLine:
+    def only(self, bins: Sequence[int] | Int) -> UniformLineManifold:
         """Return the same: there is one bin."""
         return self
 
 
 @lru_cache(maxsize=256)
-def _line_without(line: GridLine, sensors: tuple[int, ...]) -> GridLine:
+def _line_without(line: UniformLineManifold, sensors: tuple[int, ...]) -> UniformLineManifold:
     """Return a line less some sensors: the same one when asked again, as what is made of it."""
     places = np.delete(line.places, sensors)
-    return GridLine(places, line.step, line.origin, line.reference)
+    return UniformLineManifold(places, line.step, line.origin, line.reference)

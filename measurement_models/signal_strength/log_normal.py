@@ -17,7 +17,7 @@ from arrivals.measurement_models.signal_strength.arguments import (
 )
 from arrivals.measurement_models.signal_strength.decibels import neper_to_db
 from arrivals.measurement_models.signal_strength.envelope import sample_log_envelope
-from arrivals.measurement_models.signal_strength.path_loss import Field, Levels, slopes
+from arrivals.measurement_models.signal_strength.path_loss import Levels, PropagationModel, slopes
 from arrivals.typing import Float
 from arrivals.validation import constant, count, number, positive, real
 
@@ -165,10 +165,10 @@ class LogNormalRSS(MeasurementModel):
         return np.diag(self._variance)
 
     @property
-    def field(self) -> Field:
+    def field(self) -> PropagationModel:
         """Sensors, exponent, noise, floor and gains, for kernels."""
         gain = 0.0 if self.log_gain is None else self.log_gain
-        return Field(self.sensors, self.alpha, self._noise, self.r_min, gain)
+        return PropagationModel(self.sensors, self.alpha, self._noise, self.r_min, gain)
 
     def levels(self, u: ArrayLike, theta: ArrayLike) -> Levels:
         """Return log σ_y and shares of sources (..., n_sources), (..., n_sources, 2)."""

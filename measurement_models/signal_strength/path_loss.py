@@ -141,7 +141,7 @@ def levels(
     return Levels(log_sigma, shares, seen)
 
 
-class Field(NamedTuple):
+class PropagationModel(NamedTuple):
     """Sensors and what is known of the way to them, for `levels`.
 
     Parameters
@@ -168,7 +168,7 @@ class Field(NamedTuple):
         """Return what positions (..., n_sources, 2) look like from the sensors."""
         return offsets(theta, self.sensors, self.r_min)
 
-    def take(self, rows: Any) -> Field:
+    def take(self, rows: Any) -> PropagationModel:
         """Return the field of some of a batch."""
         noise = np.asarray(self.log_noise)
         return self._replace(

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models import LogNormalRSS
-from arrivals.trackers.rss.inference.joint_posterior import Prior, Problem, marginals
+from arrivals.trackers.rss.inference.joint_posterior import JointPosterior, Prior, marginals
 from arrivals.typing import Float
 from arrivals.validation import real
 
@@ -84,7 +84,7 @@ def rss_bound(
     P = np.zeros((2, 2)) if P0 is None else np.linalg.inv(real("P0", P0))
     prior = Prior(u, w, theta, np.broadcast_to(P, (*u.shape, 2, 2)))
     W = np.broadcast_to(1 / measurement.variance, (*u.shape[:-1], measurement.dim_z))
-    problem = Problem(measurement.field, W, W, prior)
+    problem = JointPosterior(measurement.field, W, W, prior)
     J = problem.information(measurement.levels(u, theta))
     try:
         return Bound(*marginals(J))

@@ -16,7 +16,7 @@ from arrivals.typing import Complex, Float
 
 
 @dataclass(frozen=True, eq=False)
-class Demonstration:
+class MethodComparison:
     """A recording, and what is to be drawn of it.
 
     Parameters

@@ -13,7 +13,7 @@ from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.motion_models import BernoulliVonMises
 from arrivals.recordings.framing import looks
 from arrivals.recordings.readers import read
-from arrivals.scenarios.demos.comparison import Demonstration
+from arrivals.scenarios.demos.comparison import MethodComparison
 from arrivals.trackers import CBF, SVALSE, VALSE, Tracker
 from arrivals.typing import Complex, Float
 
@@ -93,6 +93,6 @@ def infrasound(
     """
     measurement, steps, time = brp2012()
     axes = {"ylabel": "azimuth from north, degrees"}
-    scene = Demonstration("brp2012", measurement, steps, time, axes, prefix="brp2012-")
+    scene = MethodComparison("brp2012", measurement, steps, time, axes, prefix="brp2012-")
     methods = {name: (title, tracker(name, measurement)) for name, title in METHODS.items()}
     scene.show(out, methods, bar, n_steps)

@@ -11,7 +11,7 @@ import numpy as np
 
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.recordings.readers import read
-from arrivals.scenarios.demos.comparison import Demonstration
+from arrivals.scenarios.demos.comparison import MethodComparison
 from arrivals.trackers import create
 from arrivals.typing import Complex, Float
 
@@ -73,5 +73,5 @@ def demo(
     methods = {
         name: (title, create(name, measurement=measurement)) for name, title in METHODS.items()
     }
-    scene = Demonstration("swellex96", measurement, snapshots, time, axes)
+    scene = MethodComparison("swellex96", measurement, snapshots, time, axes)
     scene.show(out, methods, bar, n_steps)

@@ -30,7 +30,7 @@ class Row(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Block:
+class RunBatch:
     """Runs of one scenario.
 
     Parameters

@@ -10,7 +10,7 @@ from typing import Any
 import arrivals
 from arrivals.parameters import _plain
 from arrivals.scenarios.base import Scenario, create
-from arrivals.scenarios.experiments.batch import ERROR, Block, Row
+from arrivals.scenarios.experiments.batch import ERROR, Row, RunBatch
 from arrivals.scenarios.experiments.methods import Method, methods
 from arrivals.scenarios.experiments.results_file import Results, code_mark
 from arrivals.scenarios.experiments.study import Study
@@ -102,7 +102,7 @@ def monte_carlo(
         finished = _finished(results, len(compared))
         results.keep(lambda row: (row.case, row.run) in finished)
         todo = list(_todo(cases, runs, count("batch", batch), finished))
-        blocks = (Block(name, cases[name], compared, scored, seed, left) for name, left in todo)
+        blocks = (RunBatch(name, cases[name], compared, scored, seed, left) for name, left in todo)
         total = runs * len(cases)
         with _bar(progress, total, total - sum(len(left) for _, left in todo)) as bar:
             for rows in _computed(blocks, n_jobs, results):
@@ -150,7 +150,9 @@ def _finished(results: Results, n_methods: int) -> set[tuple[str, int]]:
     return {key for key, n in last.items() if n == n_methods}
 
 
-def _computed(blocks: Iterable[Block], n_jobs: int | None, results: Results) -> Iterator[list[Row]]:
+def _computed(
+    blocks: Iterable[RunBatch], n_jobs: int | None, results: Results
+) -> Iterator[list[Row]]:
     """Give the rows of the blocks as they come, whoever computes them."""
     from joblib import Parallel, delayed
 
@@ -160,7 +162,7 @@ def _computed(blocks: Iterable[Block], n_jobs: int | None, results: Results) -> 
     if results.path is not None:
         kept = f"finished runs are kept in {results.path}: call again to go on"
     with deaths_told(kept):
-        yield from parallel(delayed(Block.rows)(block) for block in blocks)
+        yield from parallel(delayed(RunBatch.rows)(block) for block in blocks)
 
 
 def _bar(progress: bool, total: int, done: int) -> Any:

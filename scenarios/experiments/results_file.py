@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from arrivals import measurement_models, motion_models, trackers
+from arrivals.files import atomic_write
 from arrivals.scenarios.experiments.batch import Row
-from arrivals.trackers.run import replacing
 
 MARK = "# arrivals study "
 
@@ -106,7 +106,7 @@ class Results:
             return
         if _is_whole(self.path) and all(wanted(row) for row in self.rows()):
             return
-        with replacing(self.path) as file:
+        with atomic_write(self.path) as file:
             file.write(self._head())
             rows = (row for row in self.rows() if wanted(row))
             csv.writer(file, lineterminator="\n").writerows(rows)

@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from arrivals.files import atomic_write
 from arrivals.scenarios.experiments.batch import ERROR, Row
 from arrivals.scenarios.experiments.results_file import Results, read_config
-from arrivals.trackers.run import replacing
 from arrivals.typing import Float
 
 
@@ -210,7 +210,7 @@ class Study:
         """Write the tidy rows, in order; the file appears only when it is complete."""
         import csv
 
-        with replacing(path) as file:
+        with atomic_write(path) as file:
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow(Row._fields)
             writer.writerows(self.rows())

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.parameters import Model
+from arrivals.parameters import FrozenModel
 from arrivals.typing import Float
 from arrivals.validation import instance, not_negative, positive, real
 
@@ -16,7 +16,7 @@ NEPER_DB = 20 / np.log(10)
 
 
 @dataclass(frozen=True)
-class BottomLayer(Model):
+class BottomLayer(FrozenModel):
     """A fluid layer of the sea floor, its speed linear in depth.
 
     Parameters
@@ -47,7 +47,7 @@ class BottomLayer(Model):
 
 
 @dataclass(frozen=True, eq=False)
-class Waveguide(Model):
+class Waveguide(FrozenModel):
     """Water whose sound speed changes with depth, a free surface, and layers of sea floor.
 
     Parameters

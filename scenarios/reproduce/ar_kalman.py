@@ -41,7 +41,7 @@ PLAIN = {"correction": False}
 FEW = 8  # trials of the subspace methods, which go snapshot by snapshot
 
 
-class Case(NamedTuple):
+class Experiment(NamedTuple):
     """One picture or part of one: a scene, the tracker's parameters, and what the report says."""
 
     figure: int
@@ -52,34 +52,40 @@ class Case(NamedTuple):
     claim: str
 
 
-def cases() -> list[Case]:
+def cases() -> list[Experiment]:
     """Return the report's figures, part by part."""
     still, fast = {"forgetting": 0.95}, {"forgetting": 0.9, "interval": 3}
     quiet = {"forgetting": 0.99}
     doubled = (0.5, 0.5)
     drawn = "converges"
     both = [
-        Case(1, "AR coefficients, 30 dB", AutoregressiveField(), still, 10, drawn),
-        Case(2, "directions, 30 dB", AutoregressiveField(), still, 10, drawn),
-        Case(3, "moving, N = 3, d = .5, .5", FastSource(distances=doubled), fast, 5, "follows"),
-        Case(3, "moving, N = 3, d = .5, 1", FastSource(), fast, 5, "(the paper's spacing)"),
-        Case(4, "moving, N = 30, d = .5, .5", MovingSource(distances=doubled), still, 5, "follows"),
-        Case(4, "moving, N = 30, d = .5, 1", MovingSource(), still, 5, "(the paper's spacing)"),
+        Experiment(1, "AR coefficients, 30 dB", AutoregressiveField(), still, 10, drawn),
+        Experiment(2, "directions, 30 dB", AutoregressiveField(), still, 10, drawn),
+        Experiment(
+            3, "moving, N = 3, d = .5, .5", FastSource(distances=doubled), fast, 5, "follows"
+        ),
+        Experiment(3, "moving, N = 3, d = .5, 1", FastSource(), fast, 5, "(the paper's spacing)"),
+        Experiment(
+            4, "moving, N = 30, d = .5, .5", MovingSource(distances=doubled), still, 5, "follows"
+        ),
+        Experiment(
+            4, "moving, N = 30, d = .5, 1", MovingSource(), still, 5, "(the paper's spacing)"
+        ),
     ]
     for snr_db in (10.0, 5.0, 1.0):
         noisy = NoisySources(snr_db=snr_db)
         claim = "directions biased, AR coefficients not"
-        both.append(Case(5, f"{snr_db:g} dB", noisy, quiet, 10, claim))
+        both.append(Experiment(5, f"{snr_db:g} dB", noisy, quiet, 10, claim))
     for m in (2, 3, 4):
         scene = MoreSensors(distances=tuple(0.25 * n for n in range(1, m + 1)))
         claim = "less biased, lower variance"
-        both.append(Case(6, f"M = {m}", scene, {"forgetting": 0.97}, 10, claim))
-    both.append(Case(7, "order 3", ThirdOrder(), still, 10, "no significant effect"))
+        both.append(Experiment(6, f"M = {m}", scene, {"forgetting": 0.97}, 10, claim))
+    both.append(Experiment(7, "order 3", ThirdOrder(), still, 10, "no significant effect"))
     for snr_db in (30.0, 10.0, 5.0):
         spoken = SpeechField(snr_db=snr_db)
-        both.append(Case(8, f"speech, {snr_db:g} dB", spoken, SPEECH, 5, "follows, order 1"))
+        both.append(Experiment(8, f"speech, {snr_db:g} dB", spoken, SPEECH, 5, "follows, order 1"))
     wrong = SpeechOfOrderTwo(snr_db=30.0)
-    both.append(Case(9, "speech, order 2, 30 dB", wrong, SPEECH, 5, "fails most of the time"))
+    both.append(Experiment(9, "speech, order 2, 30 dB", wrong, SPEECH, 5, "fails most of the time"))
     return both
 
 
@@ -160,7 +166,7 @@ def _claims(rows: Sequence[tuple[Any, ...]]) -> list[str]:
     return lines
 
 
-def _worked(case: Case, runs: int, seed: int) -> tuple[tuple[Any, ...], Float]:
+def _worked(case: Experiment, runs: int, seed: int) -> tuple[tuple[Any, ...], Float]:
     """Return a case's row of the table, and what is drawn: of one trial, (n_intervals, ...)."""
     children = np.random.SeedSequence(seed).spawn(runs)
     trials = [case.scene.sample(np.random.default_rng(child)) for child in children]
@@ -183,7 +189,7 @@ def _worked(case: Case, runs: int, seed: int) -> tuple[tuple[Any, ...], Float]:
     return row, np.stack([line[:n] for line in lines])
 
 
-def tracked(trials: list[Trial], case: Case) -> list[Run]:
+def tracked(trials: list[Trial], case: Experiment) -> list[Run]:
     """Run the tracker over trials of one scene, each source off by `offset_deg`, alternately."""
     truth = trials[0].truth[0]
     order = np.argsort(np.argsort(truth))
@@ -216,7 +222,7 @@ def _ar_error(trials: list[Trial], runs: list[Run]) -> float:
     return float(np.sqrt(np.mean([(r.coefficients[-1] - motion.padded) ** 2 for r in runs])))
 
 
-def _unlabelled(trials: list[Trial], name: str, case: Case, scored: slice) -> float:
+def _unlabelled(trials: list[Trial], name: str, case: Experiment, scored: slice) -> float:
     """Return the median RMSE, degrees, of a subspace method; NaN where the line is not uniform."""
     d = case.scene.distances
     if not np.allclose(d, d[0] * np.arange(1, len(d) + 1)):
@@ -250,7 +256,7 @@ def held(doa: Float) -> Float:
 COLOURS = ("#1f77b4", "#d62728", "#2ca02c")
 
 
-def _draw(number: int, parts: list[tuple[Case, Float]]) -> Figure:
+def _draw(number: int, parts: list[tuple[Experiment, Float]]) -> Figure:
     """Draw a figure of the report: directions over intervals, and AR coefficients below."""
     from matplotlib.figure import Figure
 
@@ -281,7 +287,7 @@ def _draw_directions(ax: Axes, lines: Float) -> None:
     ax.set_ylim(truth.min() - 25, truth.max() + 25)
 
 
-def _draw_coefficients(ax: Axes, lines: Float, case: Case) -> None:
+def _draw_coefficients(ax: Axes, lines: Float, case: Experiment) -> None:
     for k, colour in zip(range(lines.shape[2]), COLOURS, strict=False):
         for a in lines[3:]:
             ax.plot(a[:, k], color=colour, linewidth=1.0)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import arrivals
-from arrivals.trackers.run import replacing
+from arrivals.files import atomic_write
 
 MARK = "<!-- arrivals "
 HOLD, FAIL = ("Holds", "Reproduced"), ("Does not hold", "Not reproduced", "Not confirmed")
@@ -77,7 +77,7 @@ def write_page(path: Path, names: Sequence[str], folder: Path, command: str) -> 
         "pictures and CSV lie beside its own page."
         f"{' What is finished is not run again.' if len(names) > 1 else ''}\n"
     )
-    with replacing(path) as file:
+    with atomic_write(path) as file:
         file.write("\n".join([head.rstrip(), *contents, "", *sections]).rstrip() + "\n")
 
 

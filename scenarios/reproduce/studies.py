@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import arrivals
+from arrivals.files import atomic_write
 from arrivals.scenarios.experiments.results_file import code_mark
 from arrivals.scenarios.reproduce.results_page import stamp_of, stamped, write_page
-from arrivals.trackers.run import replacing, text
+from arrivals.trackers.run import text
 from arrivals.validation import count, one_of
 
 if TYPE_CHECKING:
@@ -81,7 +82,7 @@ class Report:
 
     def to_csv(self, path: Path) -> None:
         """Write the table as CSV."""
-        with replacing(path) as file:
+        with atomic_write(path) as file:
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow(self.columns)
             writer.writerows(text(row) for row in self.rows)
@@ -236,9 +237,9 @@ def _write(name: str, report: Report, folder: Path, stamp: Mapping[str, Any]) ->
     for picture, figure in zip(pictures, report.figures.values(), strict=True):
         told = f"{report.title} · {origin}"
         figure.supxlabel(told, x=0.995, ha="right", fontsize=6, color="0.4")
-        with replacing(folder / picture, binary=True) as file:
+        with atomic_write(folder / picture, binary=True) as file:
             figure.savefig(file, format="png", dpi=130)
-    with replacing(folder / f"{name}.md") as file:
+    with atomic_write(folder / f"{name}.md") as file:
         file.write(stamped(report.markdown(pictures), stamp))
 
 

@@ -60,7 +60,7 @@ class Configurable:
                 params[name] = value
         for name, inner in nested.items():
             part = params[name]
-            if isinstance(part, Model):
+            if isinstance(part, FrozenModel):
                 params[name] = part.replace(**inner)
             elif isinstance(part, Configurable):
                 params[name] = type(part)(**part._changed(inner))
@@ -111,7 +111,7 @@ class Configurable:
         return kind(**params)
 
 
-class Model(Configurable):
+class FrozenModel(Configurable):
     """A part that never changes: two with the same numbers are interchangeable."""
 
     def replace(self, **changes: Any) -> Self:

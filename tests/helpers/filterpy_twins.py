@@ -12,7 +12,7 @@ from arrivals.motion_models import (
     ConstantVelocity,
     LinearMotion,
 )
-from arrivals.trackers import Kalman, KalmanType
+from arrivals.trackers import GaussianFilter, Kalman
 from arrivals.typing import Float
 
 PLACES = [[0.0, 0.0], [20.0, 0.0], [5.0, 15.0]]
@@ -48,7 +48,7 @@ def assert_twins(ours: Any, theirs: Any, tolerance: float = 1e-12, names: str = 
         np.testing.assert_allclose(a, b, rtol=tolerance, atol=tolerance, err_msg=name)
 
 
-def plain(q: float = 0.05, kind: type[KalmanType] = Kalman) -> KalmanType:
+def plain(q: float = 0.05, kind: type[GaussianFilter] = Kalman) -> GaussianFilter:
     return kind(ConstantVelocity(q), SEEN, X, P)
 
 

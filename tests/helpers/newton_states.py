@@ -10,11 +10,11 @@ from arrivals.trackers.svalse.newton.elbo import (
     ODDS,
     PRIOR_KAPPA,
     PRIOR_MU,
+    Evaluation,
     S,
-    State,
     evaluate,
 )
-from arrivals.trackers.svalse.newton.expected_response import Response
+from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
 from arrivals.typing import Complex, Float
 
 MODEL = ArraySnapshot(SensorArray.ula(15, spacing=0.5), wavelength=1.0)
@@ -24,7 +24,7 @@ def unit(y: Complex) -> Complex:
     return np.asarray(y / np.sqrt((np.abs(y) ** 2).mean(axis=-1, keepdims=True)))
 
 
-def scene(seed: int, model: ArraySnapshot = MODEL, K: int = 5) -> State:
+def scene(seed: int, model: ArraySnapshot = MODEL, K: int = 5) -> Evaluation:
     """Five sources at 20 dB, components beside them, half of which have a prior."""
     rng = np.random.default_rng(seed)
     doa = np.linspace(-1.1, 1.0, K) + rng.uniform(-0.1, 0.1, K)
@@ -36,11 +36,11 @@ def scene(seed: int, model: ArraySnapshot = MODEL, K: int = 5) -> State:
     facts[0, PRIOR_KAPPA] = np.where(np.arange(K) % 2, 120.0, 0.0)
     facts[0, KL_CONSTANT] = np.log(2 * np.pi * np.i0(facts[0, PRIOR_KAPPA]))
     facts[0, ODDS] = np.where(np.arange(K) % 2, np.log(3.0), -2.2)
-    return with_facts(Response(model.manifold()), unit(y)[None, None, :, None], facts)
+    return with_facts(ExpectedResponse(model.manifold()), unit(y)[None, None, :, None], facts)
 
 
 def with_facts(
-    response: Response, y: Complex, facts: Float, nu: float = 0.01, tau: float = 0.2
-) -> State:
+    response: ExpectedResponse, y: Complex, facts: Float, nu: float = 0.01, tau: float = 0.2
+) -> Evaluation:
     K = np.array([facts.shape[2]])
     return evaluate(response, y, facts, K, np.array([[nu]]), np.array([[tau]]), np.zeros(1))

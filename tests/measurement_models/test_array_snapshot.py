@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 from scipy.stats import multivariate_normal
 
-from arrivals.measurement_models import ArraySnapshot, GridLine, SensorArray, composite
+from arrivals.measurement_models import ArraySnapshot, SensorArray, UniformLineManifold, composite
 from arrivals.measurement_models.manifolds.manifold import Reference
 from arrivals.typing import Complex, Float
 
@@ -213,7 +213,7 @@ def test_order_of_the_sensors_is_kept() -> None:
     """Sensors need not be listed from one end to the other."""
     array = SensorArray(np.array([1.0, -0.5, 0.5, 2.0]))
     manifold = ArraySnapshot(array, 1.0).manifold("middle")
-    assert isinstance(manifold, GridLine)
+    assert isinstance(manifold, UniformLineManifold)
     assert np.diff(manifold.harmonics).tolist() == [-3, 2, 3]
 
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from arrivals.measurement_models import Bearing, LinearMeasurement, MeasurementModel
-from arrivals.parameters import Model
+from arrivals.parameters import FrozenModel
 from arrivals.typing import Float
 
 PLACES = np.array([[0.0, 0.0], [10.0, -3.0], [-4.0, 7.0]])
@@ -60,7 +60,7 @@ def test_a_sensors_own_place_has_no_slope() -> None:
     assert not Bearing(PLACES[:1], 0.01, (0, 1)).H([0.0, 0.0]).any()
 
 
-MODELS: list[Model] = [
+MODELS: list[FrozenModel] = [
     LinearMeasurement([[1.0, 2.0]], [[3.0]]),
     Bearing(PLACES, 0.01),
     Bearing(PLACES, np.diag([0.1, 0.2, 0.3]), position=(0, 1)),
@@ -74,7 +74,7 @@ def test_models_with_the_same_numbers_are_interchangeable(model: Any) -> None:
     assert hash(twin) == hash(model)
     assert pickle.loads(pickle.dumps(model)) == model
     assert copy.deepcopy(model) is model
-    assert Model.from_dict(model.to_dict()) == model
+    assert FrozenModel.from_dict(model.to_dict()) == model
     assert model != "another"
     assert len({model, twin, *MODELS}) == 3
     model.R[0, 0] = 99.0

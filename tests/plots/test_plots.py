@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.plots.bearing_time import plot_array, plot_bearing_time, save
 from arrivals.trackers import CBF, DirectionEstimate, PositionEstimate, Run
-from arrivals.trackers.run import Recorder
+from arrivals.trackers.run import RunRecorder
 from arrivals.typing import Complex
 
 LINE = ArraySnapshot(SensorArray.ula(8, spacing=0.5), wavelength=1.0, noise=0.01)
@@ -20,7 +20,7 @@ CIRCLE = ArraySnapshot(SensorArray.uca(8, radius=0.4), wavelength=1.0, noise=0.0
 
 def found(steps: list[list[tuple[float, int, float]]]) -> Run:
     """Make a run from (degrees, label, existence) of each step."""
-    recorder = Recorder(DirectionEstimate)
+    recorder = RunRecorder(DirectionEstimate)
     for step in steps:
         degrees, label, existence = np.array(step, dtype=float).reshape(-1, 3).T
         none = np.full(len(step), np.nan)
@@ -145,7 +145,7 @@ def test_what_does_not_fit_the_run_is_refused() -> None:
     with pytest.raises(ValueError, match="dynamic_range_db"):
         plot_bearing_time(run, snapshots=np.ones((3, 8)), measurement=LINE, dynamic_range_db=-1.0)
     with pytest.raises(TypeError, match="PositionEstimate"):
-        plot_bearing_time(Recorder(PositionEstimate).run(1.0, 0.0))
+        plot_bearing_time(RunRecorder(PositionEstimate).run(1.0, 0.0))
 
 
 def test_a_picture_that_fails_leaves_nothing_behind(tmp_path: Path) -> None:

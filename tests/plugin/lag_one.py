@@ -5,7 +5,7 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models import ArraySnapshot
 from arrivals.trackers import DirectionEstimate, Tracker
-from arrivals.trackers.base import missed
+from arrivals.trackers.base import is_missing
 from arrivals.validation import instance, positive
 
 
@@ -32,7 +32,7 @@ class LagOne(Tracker):
 
     def update(self, z: ArrayLike | None) -> None:
         """Add the products of neighbours, those of which both are heard."""
-        if missed(z):
+        if is_missing(z):
             return
         z = self.measurement.snapshot(np.asarray(z))
         products = z[1:] * z[:-1].conj()

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models import ArraySnapshot, ElementResponse, SensorArray
 from arrivals.motion_models import BernoulliVonMises
-from arrivals.parameters import Model
+from arrivals.parameters import FrozenModel
 from arrivals.trackers import (
     CBF,
     SBL,
@@ -477,7 +477,7 @@ def test_one_measurement_is_not_enough() -> None:
         CHECKS[0](Smoother, NUMBERS[:1])
 
 
-class Part(Model):
+class Part(FrozenModel):
     def __init__(self, number: float) -> None:
         self.number = number
 

@@ -12,14 +12,15 @@ import pytest
 from numpy.typing import ArrayLike
 from recording_tracker import Hands, directions
 
+from arrivals.files import atomic_write
 from arrivals.trackers import (
     DirectionEstimate,
     Estimate,
     PositionEstimate,
     Run,
 )
-from arrivals.trackers.base import missed
-from arrivals.trackers.run import Recorder, replacing
+from arrivals.trackers.base import is_missing
+from arrivals.trackers.run import RunRecorder
 from arrivals.typing import Float
 
 # estimates and their rows
@@ -100,7 +101,7 @@ def test_every_estimate_comes_back_from_a_run(n_steps: int) -> None:
         directions(rng.normal(size=n), converged=bool(n % 2), iterations=int(n), noise=float(n))
         for n in rng.integers(0, 6, n_steps)
     ]
-    recorder = Recorder(DirectionEstimate)
+    recorder = RunRecorder(DirectionEstimate)
     for estimate in given:
         recorder.add(estimate, np.zeros(1))
     run = recorder.run(dt=1.0, elapsed=0.0)
@@ -115,7 +116,7 @@ def test_every_estimate_comes_back_from_a_run(n_steps: int) -> None:
 
 
 def test_run_of_positions() -> None:
-    recorder = Recorder(PositionEstimate)
+    recorder = RunRecorder(PositionEstimate)
     for n in (0, 2, 1):
         recorder.add(positions(n), np.zeros(4))
     run = recorder.run(dt=1.0, elapsed=0.0)
@@ -181,7 +182,7 @@ def test_tracks_file(tmp_path: Path) -> None:
 
 
 def test_tracks_file_of_positions(tmp_path: Path) -> None:
-    recorder = Recorder(PositionEstimate)
+    recorder = RunRecorder(PositionEstimate)
     recorder.add(positions(2), np.zeros(4))
     recorder.run(dt=1.0, elapsed=0.0).to_csv(str(tmp_path / "tracks.csv"))
     assert (tmp_path / "tracks.csv").read_text() == (
@@ -224,7 +225,7 @@ def test_error_half_way_leaves_the_old_file_and_nothing_else(
 
 def test_file_appears_only_when_complete(tmp_path: Path) -> None:
     path = tmp_path / "new.txt"
-    with replacing(path) as file:
+    with atomic_write(path) as file:
         file.write("half\n")
         file.flush()
         assert not path.exists()
@@ -250,9 +251,9 @@ def test_folder_in_place_of_the_file_is_left_alone(tmp_path: Path) -> None:
     "z", [None, np.nan, [np.nan, np.nan], np.full((2, 3), np.nan), complex(np.nan, 0.0)]
 )
 def test_nothing_but_nan_is_missed(z: ArrayLike | None) -> None:
-    assert missed(z)
+    assert is_missing(z)
 
 
 @pytest.mark.parametrize("z", [0.0, [np.nan, 1.0], np.inf, [], "nan", [True], 3, 1j])
 def test_anything_else_is_not(z: ArrayLike) -> None:
-    assert not missed(z)
+    assert not is_missing(z)

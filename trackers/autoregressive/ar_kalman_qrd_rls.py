@@ -15,8 +15,8 @@ from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.manifolds.symmetric_line import ArrayManifold
 from arrivals.motion_models.autoregressive import AutoregressiveSources
 from arrivals.trackers.autoregressive.belief import (
-    Options,
-    Sources,
+    Settings,
+    SourceBelief,
     covariance_outside,
     inside,
     measured,
@@ -24,7 +24,13 @@ from arrivals.trackers.autoregressive.belief import (
     repeated,
 )
 from arrivals.trackers.autoregressive.history import History, closes
-from arrivals.trackers.autoregressive.processing import NOTHING, Program, frame, frames, wanted
+from arrivals.trackers.autoregressive.processing import (
+    NOTHING,
+    BlockProcessor,
+    frame,
+    frames,
+    wanted,
+)
 from arrivals.trackers.base import Tracker
 from arrivals.trackers.estimates import SourceEstimate
 from arrivals.trackers.registry import register
@@ -198,7 +204,7 @@ class ARKalmanQRDRLS(Tracker):
         """Directions, AR models and the latest samples of the sources, as of the last interval."""
         s, n, p = self._sources, self.motion.n_sources, max(self.motion.orders)
         if s is None:
-            return SourceEstimate.nothing(coefficients=np.zeros((0, p)))
+            return SourceEstimate.empty(coefficients=np.zeros((0, p)))
         return SourceEstimate(
             doa=s.doa[0],
             std=np.full(n, np.nan),
@@ -318,7 +324,7 @@ class ARKalmanQRDRLS(Tracker):
         self.frames = np.concatenate([np.full((gone, z.shape[1]), NOTHING), z[done:]])
         return history
 
-    def _now(self) -> Sources | None:
+    def _now(self) -> SourceBelief | None:
         """Return the present belief, with `x` and `P` if they were assigned."""
         if self._sources is None or (self.x is self._known_x and self.P is self._known_P):
             return self._sources
@@ -332,14 +338,16 @@ class ARKalmanQRDRLS(Tracker):
         return _manifold(self.measurement)
 
     @property
-    def _program(self) -> Program:
+    def _program(self) -> BlockProcessor:
         doa = None if self.doa is None else real("doa", self.doa)
-        options = Options(
+        options = Settings(
             self.forgetting, self.ar_forgetting, self.ridge, self.ar_ridge, self.gate, self.inner,
             self.correction, self.adapt_drive, self.adapt_noise, self.r_start, self.tau,
             self.memory,
         )  # fmt: skip
-        return Program(self.motion, self.manifold, self.interval, doa, options, self.x, self.P)
+        return BlockProcessor(
+            self.motion, self.manifold, self.interval, doa, options, self.x, self.P
+        )
 
 
 @lru_cache(maxsize=64)

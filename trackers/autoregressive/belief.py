@@ -20,7 +20,7 @@ from arrivals.typing import Bool, Complex, Float, Int
 
 
 @dataclass(frozen=True, eq=False)
-class Options:
+class Settings:
     """The parameters of the tracker that an interval asks for; see there."""
 
     forgetting: float
@@ -38,7 +38,7 @@ class Options:
 
 
 @dataclass(frozen=True, eq=False)
-class Sources:
+class SourceBelief:
     """All that is believed between two intervals.
 
     Attributes
@@ -83,8 +83,8 @@ def beginning(
     P: Float,
     motion: AutoregressiveSources,
     manifold: ArrayManifold,
-    o: Options,
-) -> Sources:
+    o: Settings,
+) -> SourceBelief:
     """Return what is believed before anything is heard.
 
     Parameters
@@ -105,7 +105,7 @@ def beginning(
     target = np.delete(manifold.real_steering(doa), manifold.centre, axis=-1)
     ridge = np.broadcast_to(o.ar_ridge * power[..., None], a.shape)
     models = ridge_rows(ridge, a[..., None])
-    return Sources(
+    return SourceBelief(
         x=x,
         P=P,
         doa=doa,
@@ -173,6 +173,6 @@ def joined(X: Float, parts: int, n_sources: int) -> Complex:
     return np.asarray(rows[..., 0, :] + 1j * (rows[..., 1, :] if parts == 2 else 0.0))
 
 
-def repeated(s: Sources, n: int) -> Sources:
+def repeated(s: SourceBelief, n: int) -> SourceBelief:
     """Return a belief n times."""
-    return Sources(**{name: np.repeat(value, n, axis=0) for name, value in vars(s).items()})
+    return SourceBelief(**{name: np.repeat(value, n, axis=0) for name, value in vars(s).items()})

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arrivals.motion_models.autoregressive import AutoregressiveSources
-from arrivals.trackers.autoregressive.belief import Sources, outside
+from arrivals.trackers.autoregressive.belief import SourceBelief, outside
 from arrivals.trackers.estimates import SourceEstimate
 from arrivals.trackers.run import Run
 from arrivals.typing import Bool, Complex, Int
@@ -37,7 +37,7 @@ class History:
         self.shown_from: list[Int] = []
         self.signals: list[Complex] = []
 
-    def add(self, s: Sources | None, end: int) -> None:
+    def add(self, s: SourceBelief | None, end: int) -> None:
         """Note what is believed after the first `end` snapshots."""
         K, lead = self.motion.n_sources, (len(self.z),)
         belief = {

@@ -10,9 +10,9 @@ from dataclasses import replace
 import numpy as np
 
 from arrivals.measurement_models.manifolds.symmetric_line import ArrayManifold
-from arrivals.motion_models.companion_form import Blocks
-from arrivals.trackers.autoregressive.belief import Options, Sources
-from arrivals.trackers.autoregressive.interval_filter import Heard, filtered
+from arrivals.motion_models.companion_form import CompanionLayout
+from arrivals.trackers.autoregressive.belief import Settings, SourceBelief
+from arrivals.trackers.autoregressive.interval_filter import FilteredInterval, filtered
 from arrivals.trackers.autoregressive.regressions import TINY, autoregression, directions
 from arrivals.trackers.autoregressive.steady_state import transposed
 from arrivals.typing import Float
@@ -23,8 +23,8 @@ PRIOR = 20.0  # intervals that the powers at the start count for
 
 
 def interval(
-    s: Sources, y: Float, manifold: ArrayManifold, blocks: Blocks, o: Options
-) -> tuple[Sources, Float]:
+    s: SourceBelief, y: Float, manifold: ArrayManifold, blocks: CompanionLayout, o: Settings
+) -> tuple[SourceBelief, Float]:
     """Return the belief after an interval, and the states after each of its samples.
 
     Parameters
@@ -52,7 +52,9 @@ def interval(
     return settled(s, new, heard, o), heard.X
 
 
-def settled(s: Sources, new: Sources, heard: Heard, o: Options) -> Sources:
+def settled(
+    s: SourceBelief, new: SourceBelief, heard: FilteredInterval, o: Settings
+) -> SourceBelief:
     """Take over the state, hold those sources that are silent, and learn noise and powers."""
     loud = sounding(heard.X, s.doa.shape[-1], s.x.shape[-2])
     something = np.asarray(heard.kept < 1)[..., None]
@@ -80,7 +82,7 @@ def sounding(X: Float, n_sources: int, parts: int) -> Float:
     return np.asarray((signals * signals).sum(axis=-2) * (parts / X.shape[-2]))
 
 
-def learned_noise(s: Sources, heard: Heard, o: Options) -> Float:
+def learned_noise(s: SourceBelief, heard: FilteredInterval, o: Settings) -> Float:
     """Return r <- 0.9 r + 0.1 E|y - A s|², (4.5) of the report's notation."""
     if not o.adapt_noise:
         return s.r
@@ -88,7 +90,7 @@ def learned_noise(s: Sources, heard: Heard, o: Options) -> Float:
     return np.asarray(np.maximum(0.9 * s.r + 0.1 * new, LEAST_NOISE * s.power.max(axis=-1)))
 
 
-def learned_power(s: Sources, loud: Float, o: Options) -> Float:
+def learned_power(s: SourceBelief, loud: Float, o: Settings) -> Float:
     """Return each source's mean power over the last `memory` intervals, pauses included.
 
     What is known at the start counts as much as the first `PRIOR` intervals.

@@ -9,15 +9,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from arrivals.motion_models.companion_form import Blocks
-from arrivals.trackers.autoregressive.belief import Options, Sources
+from arrivals.motion_models.companion_form import CompanionLayout
+from arrivals.trackers.autoregressive.belief import Settings, SourceBelief
 from arrivals.trackers.autoregressive.qrd_rls import ages
 from arrivals.trackers.autoregressive.steady_state import exact_filter, steady_filter, transposed
 from arrivals.typing import Bool, Float
 
 
 @dataclass(frozen=True, eq=False)
-class Heard:
+class FilteredInterval:
     """What the Kalman filter makes of an interval.
 
     Attributes
@@ -53,7 +53,9 @@ class Heard:
     noise: Float
 
 
-def filtered(s: Sources, now: Sources, y: Float, A: Float, blocks: Blocks, o: Options) -> Heard:
+def filtered(
+    s: SourceBelief, now: SourceBelief, y: Float, A: Float, blocks: CompanionLayout, o: Settings
+) -> FilteredInterval:
     """Filter an interval from the state s, with the models that are believed now."""
     F, Q = blocks.transition(now.a), blocks.drive(now.q)
     whole: Bool = np.asarray(np.isfinite(y).all(axis=(-2, -1)))
@@ -69,22 +71,24 @@ def filtered(s: Sources, now: Sources, y: Float, A: Float, blocks: Blocks, o: Op
     return merged(whole, one, other)
 
 
-def only(s: Sources, some: Bool) -> Sources:
+def only(s: SourceBelief, some: Bool) -> SourceBelief:
     """Return the belief of some members of a batch."""
-    return Sources(**{name: value[some] for name, value in vars(s).items()})
+    return SourceBelief(**{name: value[some] for name, value in vars(s).items()})
 
 
-def merged(first: Bool, one: Heard, other: Heard) -> Heard:
+def merged(first: Bool, one: FilteredInterval, other: FilteredInterval) -> FilteredInterval:
     """Return the results of two parts of a batch as those of the whole."""
     fields = {}
     for name, value in vars(one).items():
         both = np.empty((len(first), *value.shape[1:]))
         both[first], both[~first] = value, getattr(other, name)
         fields[name] = both
-    return Heard(**fields)
+    return FilteredInterval(**fields)
 
 
-def without_gaps(s: Sources, y: Float, F: Float, Q: Float, A: Float, r: Float, o: Options) -> Heard:
+def without_gaps(
+    s: SourceBelief, y: Float, F: Float, Q: Float, A: Float, r: Float, o: Settings
+) -> FilteredInterval:
     """Filter at the steady gain."""
     X, P = steady_filter(s.x, s.P, y, F, Q, A, r)
     parts, k = s.x.shape[-2], A.shape[-1]
@@ -94,7 +98,7 @@ def without_gaps(s: Sources, y: Float, F: Float, Q: Float, A: Float, r: Float, o
     errors = y - X[..., :k] @ transposed(A)
     spread = (A @ P[..., :k, :k] * A).sum(axis=(-2, -1)) / A.shape[-2]
     noise = parts * (errors * errors).mean(axis=(-2, -1)) + spread
-    return Heard(
+    return FilteredInterval(
         X, P, y, w, kept, v, ar_kept,
         (w * w).sum(axis=-1)[..., None, None] * P,
         (v * v).sum(axis=-1)[..., None, None] * P,
@@ -103,7 +107,9 @@ def without_gaps(s: Sources, y: Float, F: Float, Q: Float, A: Float, r: Float, o
     )  # fmt: skip
 
 
-def with_gaps(s: Sources, y: Float, F: Float, Q: Float, A: Float, r: Float, o: Options) -> Heard:
+def with_gaps(
+    s: SourceBelief, y: Float, F: Float, Q: Float, A: Float, r: Float, o: Settings
+) -> FilteredInterval:
     """Filter sample by sample, with what was measured of each."""
     X, Ps = exact_filter(s.x, s.P, y, F, Q, A, r)
     parts, k = s.x.shape[-2], A.shape[-1]
@@ -121,7 +127,7 @@ def with_gaps(s: Sources, y: Float, F: Float, Q: Float, A: Float, r: Float, o: O
     noise = ((errors + spread) * there).sum(axis=(-2, -1)) / np.where(n > 0, n, np.nan)
     missing = (w * w)[..., None] * ~there
     unheard = np.einsum("...jm,...jkl,...ml->...km", missing, Pss, A)
-    return Heard(
+    return FilteredInterval(
         X, Ps[..., -1, :, :], y, w, kept, v, ar_kept,
         np.einsum("...j,...jkl->...kl", w * w, Ps),
         np.einsum("...j,...jkl->...kl", v * v, Ps),
@@ -130,7 +136,7 @@ def with_gaps(s: Sources, y: Float, F: Float, Q: Float, A: Float, r: Float, o: O
     )  # fmt: skip
 
 
-def noise_now(s: Sources, o: Options) -> Float:
+def noise_now(s: SourceBelief, o: Settings) -> Float:
     """Return the noise that the filter assumes, (..., 1, 1): inflated during acquisition."""
     r = s.r
     if o.r_start > 0:

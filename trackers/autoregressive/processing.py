@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.manifolds.symmetric_line import ArrayManifold
 from arrivals.motion_models.autoregressive import AutoregressiveSources
-from arrivals.motion_models.companion_form import Blocks, blocks
+from arrivals.motion_models.companion_form import CompanionLayout, blocks
 from arrivals.trackers.autoregressive.belief import (
-    Options,
-    Sources,
+    Settings,
+    SourceBelief,
     beginning,
     inside,
     joined,
@@ -30,7 +30,7 @@ ACQUISITION = 60  # snapshots that the first directions are looked for in
 NOTHING = complex(np.nan, np.nan)
 
 
-def wanted(s: Sources | None, interval: int) -> int:
+def wanted(s: SourceBelief | None, interval: int) -> int:
     """Return the snapshots that are worked off next: an interval, or all that acquisition takes.
 
     Examples
@@ -71,7 +71,7 @@ def frames(measurements: Iterable[ArrayLike | None], n: int) -> Complex:
 
 
 @dataclass(frozen=True, eq=False)
-class Program:
+class BlockProcessor:
     """The tracker's parameters, and what it does with snapshots.
 
     Attributes
@@ -89,13 +89,13 @@ class Program:
     manifold: ArrayManifold
     interval: int
     doa: Float | None
-    options: Options
+    options: Settings
     x: Float
     P: Float
 
     def history(
-        self, s: Sources | None, z: Complex, pending: int, open_end: bool = False
-    ) -> tuple[Sources | None, int, History]:
+        self, s: SourceBelief | None, z: Complex, pending: int, open_end: bool = False
+    ) -> tuple[SourceBelief | None, int, History]:
         """Work off snapshots, (n_sequences, n_snapshots, n_sensors).
 
         Parameters
@@ -124,7 +124,9 @@ class Program:
             s, done = self._heard(s, z[:, done:end], end, history), end
         return s, done, history
 
-    def _heard(self, s: Sources | None, z: Complex, end: int, history: History) -> Sources | None:
+    def _heard(
+        self, s: SourceBelief | None, z: Complex, end: int, history: History
+    ) -> SourceBelief | None:
         """Work off the intervals that snapshots consist of, the first once they tell where."""
         y = measured(z, self.manifold, self.motion.n_parts)
         s = self.begun(y) if s is None else s
@@ -137,7 +139,7 @@ class Program:
             history.signals.append(joined(X, self.motion.n_parts, self.motion.n_sources))
         return s
 
-    def provisional(self, s: Sources | None, z: Complex) -> Complex:
+    def provisional(self, s: SourceBelief | None, z: Complex) -> Complex:
         """Return the signals in snapshots that are no interval yet."""
         if s is None or z.shape[1] == 0:
             return self._nothing(z)
@@ -146,7 +148,7 @@ class Program:
         X = filtered(s, s, y, A, self.places, self.options).X
         return joined(X, self.motion.n_parts, self.motion.n_sources)
 
-    def begun(self, y: Float) -> Sources | None:
+    def begun(self, y: Float) -> SourceBelief | None:
         """Return the belief to start from: where `doa` says, or where measurements do."""
         n = len(y)
         doa = None if self.doa is None else np.tile(self.doa, (n, 1))
@@ -171,7 +173,7 @@ class Program:
         return None
 
     @property
-    def places(self) -> Blocks:
+    def places(self) -> CompanionLayout:
         """Where the lags stand in a state."""
         return blocks(self.motion.orders, lag_by_lag=True)
 

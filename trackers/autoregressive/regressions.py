@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 
 from arrivals.measurement_models.manifolds.symmetric_line import ArrayManifold
-from arrivals.motion_models.companion_form import Blocks, stabilised
-from arrivals.trackers.autoregressive.belief import Options, Sources
-from arrivals.trackers.autoregressive.interval_filter import Heard
+from arrivals.motion_models.companion_form import CompanionLayout, stabilised
+from arrivals.trackers.autoregressive.belief import Settings, SourceBelief
+from arrivals.trackers.autoregressive.interval_filter import FilteredInterval
 from arrivals.trackers.autoregressive.qrd_rls import folded, ridge_rows, solution
 from arrivals.trackers.autoregressive.steady_state import transposed
 from arrivals.typing import Float
@@ -20,7 +20,7 @@ TINY = np.finfo(np.float64).tiny
 
 
 def directions(
-    s: Sources, heard: Heard, A: Float, manifold: ArrayManifold, o: Options
+    s: SourceBelief, heard: FilteredInterval, A: Float, manifold: ArrayManifold, o: Settings
 ) -> tuple[Float, Float]:
     """Return the factor of the manifold's rows, and the directions that they tell."""
     k, parts, centre = A.shape[-1], s.x.shape[-2], manifold.centre
@@ -49,7 +49,7 @@ def cautious(before: Float, after: Float, widest: float) -> Float:
     return np.asarray(np.arcsin(np.clip(np.sin(after), u - most, u + most)))
 
 
-def covariance_rows(heard: Heard, k: int, centre: int) -> Float:
+def covariance_rows(heard: FilteredInterval, k: int, centre: int) -> Float:
     """Return the rows [Lᵀ | 0], L Lᵀ the samples' summed error covariance.
 
     They make the true directions a fixed point: the estimated samples are regressors with errors.
@@ -67,7 +67,11 @@ def root(C: Float) -> Float:
 
 
 def autoregression(
-    s: Sources, now: Sources, heard: Heard, blocks: Blocks, o: Options
+    s: SourceBelief,
+    now: SourceBelief,
+    heard: FilteredInterval,
+    blocks: CompanionLayout,
+    o: Settings,
 ) -> tuple[Float, Float, Float, Float]:
     """Return factors and weight of the AR regressions, coefficients, and driving variances."""
     p = blocks.used.shape[-1]
@@ -91,7 +95,7 @@ def autoregression(
     return models, weight, a, np.maximum(q, FLOOR * s.power)
 
 
-def lagged(s: Sources, X: Float, blocks: Blocks, same: bool) -> Float:
+def lagged(s: SourceBelief, X: Float, blocks: CompanionLayout, same: bool) -> Float:
     """Return [s(j-1) ... s(j-p) | s(j)] of all sources, (..., rows, n_sources, p + 1).
 
     All as believed after sample j; or, without the correction, the lags as before it.
@@ -103,7 +107,7 @@ def lagged(s: Sources, X: Float, blocks: Blocks, same: bool) -> Float:
     return np.concatenate([lags, now], axis=-1)
 
 
-def lag_covariance(P: Float, blocks: Blocks) -> Float:
+def lag_covariance(P: Float, blocks: CompanionLayout) -> Float:
     """Return the covariances of the columns of `lagged`, (..., n_sources, p + 1, p + 1).
 
     A lag that a source does not have is 1 by itself.
@@ -116,6 +120,6 @@ def lag_covariance(P: Float, blocks: Blocks) -> Float:
     return np.asarray(C * both + np.eye(there.shape[-1]) * (1 - both))
 
 
-def present(blocks: Blocks) -> Float:
+def present(blocks: CompanionLayout) -> Float:
     """Return 1 for the columns of `lagged` that a source has, 0 for others."""
     return np.concatenate([blocks.used, np.ones((len(blocks.used), 1))], axis=-1)

@@ -9,9 +9,8 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.arrays.sensor_array import SensorArray
-from arrivals.trackers.base import missed
+from arrivals.trackers.base import is_missing
 from arrivals.trackers.direction_tracker import DirectionTracker
-from arrivals.trackers.estimates import DirectionEstimate
 from arrivals.trackers.registry import register
 from arrivals.typing import Complex, Float, Int
 from arrivals.validation import count, instance, not_negative, positive
@@ -218,11 +217,11 @@ class CBF(DirectionTracker):
         """Forget: nothing is carried from snapshot to snapshot."""
         not_negative("dt", dt)
         self.power = np.full(self.n_directions, np.nan)
-        self._show(DirectionEstimate.nothing())
+        self.report([])
 
     def update(self, z: ArrayLike | None) -> None:
         """Scan one measurement; sensors that are NaN or infinite are left out."""
-        if missed(z):
+        if is_missing(z):
             return
         z = self.measurement.snapshot(np.asarray(z))
         array = self.measurement.array
@@ -231,14 +230,12 @@ class CBF(DirectionTracker):
         top = peaks(self.power, circular=array.dim > 1)
         high = self.power[top] > self.power.max() * 10 ** (-self.threshold_db / 10)
         doa = refined(self.doa_grid, self.power, top[high][: self.n_slots])
-        self._show(
-            DirectionEstimate(
-                doa=doa,
-                std=np.full(len(doa), np.nan),
-                existence=np.full(len(doa), np.nan),
-                amplitude=self._amplitude(doa, z),
-                label=np.full(len(doa), -1),
-            )
+        self.report(
+            doa=doa,
+            std=np.full(len(doa), np.nan),
+            existence=np.full(len(doa), np.nan),
+            amplitude=self._amplitude(doa, z),
+            label=np.full(len(doa), -1),
         )
 
     def _scan(self, z: Complex) -> Float:

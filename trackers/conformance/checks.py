@@ -23,7 +23,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from arrivals.parameters import Configurable, Model
+from arrivals.parameters import Configurable, FrozenModel
 from arrivals.trackers.base import Tracker
 from arrivals.trackers.estimates import Estimate
 
@@ -460,7 +460,7 @@ def bad_measurement_leaves_everything(make: MakeTracker, measurements: Measureme
 def parts_are_immutable(make: MakeTracker, measurements: Measurements) -> None:
     """Check that the models of a tracker are what they were after it has moved."""
     tracker = make()
-    parts = {k: v for k, v in tracker.get_params(deep=False).items() if isinstance(v, Model)}
+    parts = {k: v for k, v in tracker.get_params(deep=False).items() if isinstance(v, FrozenModel)}
     numbers = copy.deepcopy({name: part.to_dict() for name, part in parts.items()})
     _steps(tracker, measurements)
     for name, part in parts.items():

@@ -27,13 +27,13 @@ from arrivals.trackers.gaussian.equations import (
     predict_gaussian,
     update_gaussian,
 )
-from arrivals.trackers.gaussian.filterpy_attributes import FilterpyNames
-from arrivals.trackers.gaussian.linearization import Linear
+from arrivals.trackers.gaussian.filterpy_attributes import FilterpyAttributes
+from arrivals.trackers.gaussian.linearization import Linearization
 from arrivals.typing import Bool, Float
 from arrivals.validation import covariance, real
 
 
-class KalmanSteps(FilterpyNames):
+class FilterBase(FilterpyAttributes):
     """The two steps of a `KalmanType`, which see there."""
 
     def __init__(
@@ -62,11 +62,11 @@ class KalmanSteps(FilterpyNames):
     # What a method of this type defines
 
     @abstractmethod
-    def linear_motion(self, x: Float, P: Float, dt: float) -> Linear:
+    def linear_motion(self, x: Float, P: Float, dt: float) -> Linearization:
         """Return the motion as it looks near beliefs x (..., n), P (..., n, n), without Q."""
 
     @abstractmethod
-    def linear_measurement(self, x: Float, P: Float) -> Linear:
+    def linear_measurement(self, x: Float, P: Float) -> Linearization:
         """Return the measurement as it looks near beliefs x (..., n), P (..., n, n), without R."""
 
     # The two steps
@@ -139,18 +139,18 @@ class KalmanSteps(FilterpyNames):
         noise = self.state_motion.Q(dt) if Q is None else self._process_noise(Q)
         return near.mean, predict_gaussian(P, near.matrix, near.noise(noise))
 
-    def _near(self, x: Float, P: Float, dt: float, F: ArrayLike | None) -> Linear:
+    def _near(self, x: Float, P: Float, dt: float, F: ArrayLike | None) -> Linearization:
         if F is None:
             return self.linear_motion(x, P, dt)
         F = matrix_of("F", F, self.dim_x)
         check_shape("F", F, P.shape[-2:])
-        return Linear(apply(F, x), F)
+        return Linearization(apply(F, x), F)
 
     def _corrected(
         self, x: Float, P: Float, z: Float, missing: Bool | None, R: Float, H: Float | None = None
     ) -> Correction:
         """Return beliefs (..., n) corrected by measurements (..., m), NaN where missing."""
-        near = self.linear_measurement(x, P) if H is None else Linear(apply(H, x), H)
+        near = self.linear_measurement(x, P) if H is None else Linearization(apply(H, x), H)
         if missing is not None:
             z = np.where(missing, near.mean, z)
         y = self.measurement.residual(z, near.mean) if H is None else z - near.mean

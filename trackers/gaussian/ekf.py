@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from arrivals.trackers.gaussian.linearization import Linear, at_each
-from arrivals.trackers.gaussian.smoothing import KalmanType
+from arrivals.trackers.gaussian.linearization import Linearization, at_each
+from arrivals.trackers.gaussian.smoothing import GaussianFilter
 from arrivals.trackers.registry import register
 from arrivals.typing import Float
 
 
 @register("ekf")
-class EKF(KalmanType):
+class EKF(GaussianFilter):
     """The extended Kalman filter: the models' tangents at the mean.
 
     Parameters
@@ -23,7 +23,7 @@ class EKF(KalmanType):
 
     Notes
     -----
-    Everything else is that of `KalmanType`.
+    Everything else is that of `GaussianFilter`.
 
     References
     ----------
@@ -41,10 +41,10 @@ class EKF(KalmanType):
     array([5., 5.])
     """
 
-    def linear_motion(self, x: Float, P: Float, dt: float) -> Linear:
+    def linear_motion(self, x: Float, P: Float, dt: float) -> Linearization:
         """Return f(x) and its Jacobian."""
-        return Linear(self.motion.f(x, dt), at_each(self.motion.F, x, dt))
+        return Linearization(self.motion.f(x, dt), at_each(self.motion.F, x, dt))
 
-    def linear_measurement(self, x: Float, P: Float) -> Linear:
+    def linear_measurement(self, x: Float, P: Float) -> Linearization:
         """Return h(x) and its Jacobian."""
-        return Linear(self.measurement.h(x), at_each(self.measurement.H, x))
+        return Linearization(self.measurement.h(x), at_each(self.measurement.H, x))

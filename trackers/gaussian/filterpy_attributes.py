@@ -12,7 +12,7 @@ from arrivals.trackers.gaussian.equations import likelihood
 from arrivals.typing import Float
 
 
-class FilterpyNames(Tracker):
+class FilterpyAttributes(Tracker):
     """A tracker with two models, whose matrices it shows as they are now."""
 
     motion: MotionModel

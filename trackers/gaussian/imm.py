@@ -11,11 +11,11 @@ from typing import Any, Protocol, Self, cast, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.trackers.base import Tracker, missed
+from arrivals.trackers.base import Tracker, is_missing
 from arrivals.trackers.estimates import StateEstimate
 from arrivals.trackers.gaussian.circular import Angles, add, difference, spread
 from arrivals.trackers.gaussian.equations import likelihood
-from arrivals.trackers.gaussian.smoothing import KalmanType
+from arrivals.trackers.gaussian.smoothing import GaussianFilter
 from arrivals.trackers.registry import register
 from arrivals.typing import Float
 from arrivals.validation import shaped
@@ -147,7 +147,7 @@ class IMM(Tracker):
 
     def update(self, z: ArrayLike | None) -> None:
         """Correct each member, and weigh it by how well it foretold the measurement."""
-        gap = missed(z)
+        gap = is_missing(z)
         before = [dict(vars(member)) for member in self.filters]
         try:
             for member in self.filters:
@@ -261,7 +261,7 @@ def _probabilities(name: str, values: Float) -> Float:
 
 
 def _hold(member: Filter, x: Float, P: Float) -> None:
-    if isinstance(member, KalmanType):
+    if isinstance(member, GaussianFilter):
         member.hold(x, P)  # without the checks of a belief that a user assigned
     else:
         member.x, member.P = x.reshape(np.shape(member.x)), P

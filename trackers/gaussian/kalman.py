@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from arrivals.measurement_models.base import MeasurementModel
 from arrivals.motion_models.base import MotionModel
 from arrivals.trackers.gaussian.equations import apply
-from arrivals.trackers.gaussian.linearization import Linear
-from arrivals.trackers.gaussian.smoothing import KalmanType
+from arrivals.trackers.gaussian.linearization import Linearization
+from arrivals.trackers.gaussian.smoothing import GaussianFilter
 from arrivals.trackers.registry import register
 from arrivals.typing import Float
 
@@ -20,7 +20,7 @@ Slope = Callable[[Float], Float]
 
 
 @register("kalman")
-class Kalman(KalmanType):
+class Kalman(GaussianFilter):
     """The Kalman filter, for models that are matrices.
 
     Parameters
@@ -41,7 +41,8 @@ class Kalman(KalmanType):
 
     Notes
     -----
-    Everything else is that of `KalmanType`. Numbers are those of `filterpy.kalman.KalmanFilter`.
+    Everything else is that of `GaussianFilter`. Results equal those of
+    `filterpy.kalman.KalmanFilter`.
 
     References
     ----------
@@ -64,15 +65,15 @@ class Kalman(KalmanType):
         super().__init__(motion, measurement, x, P)
         check_linear(motion, measurement)
 
-    def linear_motion(self, x: Float, P: Float, dt: float) -> Linear:
+    def linear_motion(self, x: Float, P: Float, dt: float) -> Linearization:
         """Return F x and F."""
         F = self.motion.F(_first(x), dt)
-        return Linear(apply(F, x), F)
+        return Linearization(apply(F, x), F)
 
-    def linear_measurement(self, x: Float, P: Float) -> Linear:
+    def linear_measurement(self, x: Float, P: Float) -> Linearization:
         """Return H x and H."""
         H = self.measurement.H(_first(x))
-        return Linear(apply(H, x), H)
+        return Linearization(apply(H, x), H)
 
 
 def check_linear(motion: MotionModel, measurement: MeasurementModel, dt: float = 1.0) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from arrivals.typing import Float
 
 
-class Linear(NamedTuple):
+class Linearization(NamedTuple):
     """A function near a belief: f(x + d) ≈ mean + matrix d + e, with e ~ (0, excess)."""
 
     mean: Float

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.base import MeasurementModel
 from arrivals.motion_models.base import MotionModel, gaussian
-from arrivals.trackers.base import Tracker, missed
+from arrivals.trackers.base import Tracker, is_missing
 from arrivals.trackers.estimates import StateEstimate
 from arrivals.trackers.gaussian.arguments import as_measurement, models
 from arrivals.trackers.gaussian.circular import circular_mean, difference, spread, wrapped
@@ -147,7 +147,7 @@ class Particle(Tracker):
 
     def update(self, z: ArrayLike | None) -> None:
         """Weigh the particles by a measurement, (m,) or a complex snapshot; NaN is left out."""
-        if missed(z):
+        if is_missing(z):
             self.log_likelihood = 0.0
             return
         before = self._generator.bit_generator.state

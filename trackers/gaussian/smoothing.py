@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from arrivals.trackers.estimates import StateEstimate
 from arrivals.trackers.gaussian.arguments import PerStep, as_measurement, each_step, gaps
-from arrivals.trackers.gaussian.base import KalmanSteps
+from arrivals.trackers.gaussian.base import FilterBase
 from arrivals.trackers.gaussian.circular import add, difference
 from arrivals.trackers.gaussian.equations import Inverse, cholesky, predict_gaussian, symmetric
 from arrivals.trackers.run import Run
@@ -21,7 +21,7 @@ from arrivals.validation import positive, real
 Smoothed = tuple[Float, Float, Float, Float]
 
 
-class KalmanType(KalmanSteps):
+class GaussianFilter(FilterBase):
     """A Gaussian belief, moved and corrected by what its two models look like near it.
 
     A method of this type says how it makes the models linear: `linear_motion`,

@@ -11,8 +11,8 @@ from arrivals.measurement_models.base import MeasurementModel
 from arrivals.motion_models.base import MotionModel
 from arrivals.trackers.gaussian.circular import difference, spread, wrapped
 from arrivals.trackers.gaussian.equations import apply, cholesky
-from arrivals.trackers.gaussian.linearization import Linear
-from arrivals.trackers.gaussian.smoothing import KalmanType
+from arrivals.trackers.gaussian.linearization import Linearization
+from arrivals.trackers.gaussian.smoothing import GaussianFilter
 from arrivals.trackers.registry import register
 from arrivals.typing import Float
 from arrivals.validation import number, positive
@@ -36,7 +36,7 @@ def merwe_weights(n: int, alpha: float, beta: float, kappa: float) -> tuple[Floa
 
 
 @register("ukf")
-class UKF(KalmanType):
+class UKF(GaussianFilter):
     """The unscented Kalman filter: the models' regressions over Merwe's sigma points.
 
     Parameters
@@ -57,12 +57,12 @@ class UKF(KalmanType):
     Raises
     ------
     ValueError
-        If `alpha` is not positive or `kappa` not above -n; else as in `KalmanType`.
+        If `alpha` is not positive or `kappa` not above -n; else as in `GaussianFilter`.
 
     Notes
     -----
-    Everything else is that of `KalmanType`. Every `update` draws sigma points from the belief of
-    that moment, the second after a `predict` too. Means are taken in the tangent space at the
+    Everything else is that of `GaussianFilter`. Every `update` draws sigma points from the belief
+    of that moment, the second after a `predict` too. Means are taken in the tangent space at the
     middle sigma point, where angles are differences. A sigma-point step is a Kalman step with the
     regression of the function on the state for a matrix, and its residue for more noise.
 
@@ -100,7 +100,7 @@ class UKF(KalmanType):
         if not kappa > -self.dim_x:
             raise ValueError(f"kappa must be above -{self.dim_x}; got {kappa}")
 
-    def linear_motion(self, x: Float, P: Float, dt: float) -> Linear:
+    def linear_motion(self, x: Float, P: Float, dt: float) -> Linearization:
         """Return the regression of f over the sigma points."""
         angles = self.motion.angles
         near = self._regression(
@@ -111,7 +111,7 @@ class UKF(KalmanType):
         )
         return near._replace(mean=wrapped(near.mean, angles))
 
-    def linear_measurement(self, x: Float, P: Float) -> Linear:
+    def linear_measurement(self, x: Float, P: Float) -> Linearization:
         """Return the regression of h over the sigma points."""
         return self._regression(x, P, self.measurement.h, self.measurement.residual)
 
@@ -121,7 +121,7 @@ class UKF(KalmanType):
         P: Float,
         function: Callable[[Float], Float],
         subtract: Callable[[Float, Float], Float],
-    ) -> Linear:
+    ) -> Linearization:
         mean, covariance, scale = merwe_weights(self.dim_x, self.alpha, self.beta, self.kappa)
         P, L, jittered = cholesky(P)
         steps = self._steps(np.sqrt(scale) * L)
@@ -133,7 +133,7 @@ class UKF(KalmanType):
         cross = (covariance[:, None] * steps).swapaxes(-1, -2) @ rest
         matrix = np.asarray(np.linalg.solve(P, cross), np.float64).swapaxes(-1, -2)
         excess = spread(rest, covariance) - matrix @ cross
-        return Linear(middle[..., 0, :] + shift, matrix, excess, jittered)
+        return Linearization(middle[..., 0, :] + shift, matrix, excess, jittered)
 
     @staticmethod
     def _steps(L: Float) -> Float:

@@ -14,20 +14,20 @@ from numpy.typing import ArrayLike, NDArray
 from arrivals.measurement_models.delays.array_samples import ArraySamples
 from arrivals.motion_models.base import MotionModel
 from arrivals.motion_models.delay import DelayWalk
-from arrivals.trackers.base import missed
+from arrivals.trackers.base import is_missing
 from arrivals.trackers.estimates import DirectionEstimate
 from arrivals.trackers.gaussian.arguments import noise_matrix
 from arrivals.trackers.gaussian.equations import Correction, apply, symmetric, update_gaussian
-from arrivals.trackers.gaussian.linearization import Linear
-from arrivals.trackers.gaussian.smoothing import KalmanType
-from arrivals.trackers.interpolation.sample_buffer import Heard
-from arrivals.trackers.interpolation.updates import Seen, move
+from arrivals.trackers.gaussian.linearization import Linearization
+from arrivals.trackers.gaussian.smoothing import GaussianFilter
+from arrivals.trackers.interpolation.sample_buffer import SampleBuffer
+from arrivals.trackers.interpolation.updates import DelayObservation, move
 from arrivals.trackers.interpolation.variants import (
     LOBE,
     VARIANTS,
-    Parts,
-    Recipe,
+    FilterAssembly,
     Variant,
+    VariantName,
     assembled,
 )
 from arrivals.trackers.registry import register
@@ -37,7 +37,7 @@ from arrivals.validation import count, instance, number, one_of, positive
 
 
 @register("interpolation_ekf")
-class InterpolationEKF(KalmanType):
+class InterpolationEKF(GaussianFilter):
     """Direction of one source from the delay at which neighbours interpolate each other.
 
     Parameters
@@ -79,7 +79,8 @@ class InterpolationEKF(KalmanType):
         The delay between neighbours, samples, then what else the motion carries; then, in "E",
         the source's waveform at the array's centre.
     y, H, R, K, S : ndarray
-        As in every `KalmanType`, one row a sensor. `y` is what a sensor's samples say of the delay
+        As in every `GaussianFilter`, one row a sensor. `y` is what a sensor's samples say of the
+        delay
         beyond the mean, all that is foretold of it from its neighbours taken together; 0 where
         nothing is. With one baseline in one direction, and in "E", it is the plain residual of the
         snapshot `latency` steps ago. The samples are scaled to a source of power 1.
@@ -135,7 +136,7 @@ class InterpolationEKF(KalmanType):
         measurement: ArraySamples,
         motion: MotionModel = DelayWalk(),  # noqa: B008  (models are immutable)
         *,
-        variant: Variant = "C",
+        variant: VariantName = "C",
         doa: float = 0.0,
         std: float | None = None,
         rate_std: float = np.deg2rad(0.2),
@@ -152,7 +153,7 @@ class InterpolationEKF(KalmanType):
     ) -> None:
         self.measurement = instance("measurement", measurement, ArraySamples)
         self.motion = instance("motion", motion, MotionModel)  # type: ignore[type-abstract]  # any
-        self.variant: Variant = one_of("variant", variant, tuple(VARIANTS))  # type: ignore[arg-type]  # its keys
+        self.variant: VariantName = one_of("variant", variant, tuple(VARIANTS))  # type: ignore[arg-type]  # its keys
         self.doa, self.std, self.rate_std = number("doa", doa), std, positive("rate_std", rate_std)
         self.offsets, self.loading = offsets, loading
         self.baselines, self.both_ways = baselines, both_ways
@@ -172,7 +173,7 @@ class InterpolationEKF(KalmanType):
         delay = float(self.measurement.delay(self.doa))
         self.x, self.P = parts.start(delay, self._delay_std() ** 2, self.rate_std)
         self._start()
-        self.heard = Heard.nothing(parts.span, parts.n_places)
+        self.heard = SampleBuffer.nothing(parts.span, parts.n_places)
 
     def update(
         self, z: ArrayLike | None, R: ArrayLike | None = None, H: ArrayLike | None = None
@@ -202,7 +203,7 @@ class InterpolationEKF(KalmanType):
             found = found._replace(x=x, P=P)
         self.hold(found.x, found.P)
         self.heard = heard
-        if missed(snapshot):
+        if is_missing(snapshot):
             self._note_missed()
         else:
             self._note(snapshot, found)
@@ -310,7 +311,7 @@ class InterpolationEKF(KalmanType):
     # -- what the parameters amount to ---------------------------------------------------------
 
     @property
-    def recipe(self) -> Recipe:
+    def recipe(self) -> Variant:
         """What the variant is made of, with the parameters given in its place."""
         own = VARIANTS[self.variant]
         return replace(
@@ -323,7 +324,7 @@ class InterpolationEKF(KalmanType):
         )
 
     @property
-    def _parts(self) -> Parts:
+    def _parts(self) -> FilterAssembly:
         """The models that do the work; the same ones as long as no parameter changes."""
         return assembled(
             self.measurement, self.motion, self.recipe, self.aligned,
@@ -354,34 +355,34 @@ class InterpolationEKF(KalmanType):
         x, P = super()._moved(x, P, dt, F, Q)
         return x, symmetric(P)
 
-    def linear_motion(self, x: Float, P: Float, dt: float) -> Linear:
+    def linear_motion(self, x: Float, P: Float, dt: float) -> Linearization:
         """Return F x and F."""
         F = self.state_motion.F(np.zeros(self.dim_x), dt)
-        return Linear(apply(F, x), F)
+        return Linearization(apply(F, x), F)
 
-    def linear_measurement(self, x: Float, P: Float) -> Linear:
+    def linear_measurement(self, x: Float, P: Float) -> Linearization:
         """Return what is expected of `y`, nothing, and its slopes."""
-        return Linear(np.zeros(self.dim_z), self._seen(x, P, self.heard).H)
+        return Linearization(np.zeros(self.dim_z), self._seen(x, P, self.heard).H)
 
     def _snapshot(self, z: ArrayLike | None) -> NDArray[Any]:
         n = self.dim_z
-        snapshot = np.full(n, np.nan) if z is None or missed(z) else np.asarray(z)
+        snapshot = np.full(n, np.nan) if z is None or is_missing(z) else np.asarray(z)
         if snapshot.shape == (n, 1):
             return snapshot[:, 0]
         if snapshot.ndim != 1:
             raise ValueError(f"a snapshot must have shape ({n},) or ({n}, 1); got {snapshot.shape}")
         return snapshot
 
-    def _frames(self, heard: Heard) -> Float:
+    def _frames(self, heard: SampleBuffer) -> Float:
         return heard.scaled(self.measurement.power, self.measurement.noise_ratio)
 
-    def _seen(self, x: Float, P: Float, heard: Heard) -> Seen:
+    def _seen(self, x: Float, P: Float, heard: SampleBuffer) -> DelayObservation:
         """Return what the newest snapshot says near a belief, in the order of the sensors."""
         stage, places = self._parts.stage(max(heard.n_snapshots, 1)), self.measurement.places
         y, H, R = stage.linearise(x, P, self._frames(heard))
-        return Seen(y[places], H[places], R[places])
+        return DelayObservation(y[places], H[places], R[places])
 
-    def _by_sensors(self, x: Float, P: Float, heard: Heard, R: Float | None) -> Correction:
+    def _by_sensors(self, x: Float, P: Float, heard: SampleBuffer, R: Float | None) -> Correction:
         """Correct a belief by one vector update of what the sensors say."""
         y, H, own = self._seen(x, P, heard)
         silent = np.asarray(~H.any(axis=-1))

@@ -11,7 +11,7 @@ from arrivals.typing import Float
 
 
 @dataclass(frozen=True, eq=False)
-class Heard:
+class SampleBuffer:
     """The newest snapshots of independent recordings, and the energy of all of them.
 
     Parameters
@@ -24,7 +24,7 @@ class Heard:
 
     Examples
     --------
-    >>> heard = Heard.nothing(span=2, n_places=3).then(np.array([2.0, np.nan, -2.0]))
+    >>> heard = SampleBuffer.nothing(span=2, n_places=3).then(np.array([2.0, np.nan, -2.0]))
     >>> heard.n_snapshots, heard.scaled(power=None, noise_ratio=0.0)[-1]
     (1, array([ 1., nan, -1.]))
     """
@@ -35,19 +35,19 @@ class Heard:
     n_snapshots: int = 0
 
     @classmethod
-    def nothing(cls, span: int, n_places: int) -> Heard:
+    def nothing(cls, span: int, n_places: int) -> SampleBuffer:
         """Return what is known before the first snapshot."""
         return cls(np.full((span, n_places), np.nan), np.zeros(()), np.zeros(()))
 
-    def copies(self, shape: tuple[int, ...]) -> Heard:
+    def copies(self, shape: tuple[int, ...]) -> SampleBuffer:
         """Return the same for recordings of leading axes `shape`."""
         frames = np.broadcast_to(self.frames, shape + self.frames.shape)
         energy, n_samples = (np.broadcast_to(a, shape) for a in (self.energy, self.n_samples))
-        return Heard(frames, energy, n_samples, self.n_snapshots)
+        return SampleBuffer(frames, energy, n_samples, self.n_snapshots)
 
-    def then(self, frame: Float) -> Heard:
+    def then(self, frame: Float) -> SampleBuffer:
         """Return what is known after another snapshot, (..., n_places)."""
-        return Heard(
+        return SampleBuffer(
             np.concatenate([self.frames[..., 1:, :], frame[..., None, :]], axis=-2),
             self.energy + np.nansum(frame * frame, axis=-1),
             self.n_samples + np.isfinite(frame).sum(axis=-1),

@@ -61,7 +61,7 @@ def kept(e: Float, variance: Float, gate: float | None) -> Bool:
     return inside if gate is None else inside & (e * e <= gate**2 * variance)
 
 
-class Seen(NamedTuple):
+class DelayObservation(NamedTuple):
     """What a snapshot says of a state, to first order: one residual y = H d + v for each sensor."""
 
     y: Float  # (..., n_sensors), 0 where a sensor says nothing
@@ -70,7 +70,7 @@ class Seen(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Neighbours:
+class PairwiseUpdate:
     """Corrections along the array: each sensor is foretold from one `baseline` away.
 
     Parameters
@@ -121,7 +121,7 @@ class Neighbours:
                 x[..., 0] = np.clip(x[..., 0], -self.kappa, self.kappa)
         return x, P
 
-    def linearise(self, x: Float, P: Float, frames: Float) -> Seen:
+    def linearise(self, x: Float, P: Float, frames: Float) -> DelayObservation:
         """Return what the newest of `frames` says near beliefs, all looks of a sensor as one.
 
         The looks l of a sensor have residuals e, slopes h and variances r. Of the delay they say
@@ -143,7 +143,7 @@ class Neighbours:
         y = np.where(heard, gradient * R / np.where(heard, slope, 1.0), 0.0)
         H = np.zeros((*slope.shape, x.shape[-1]))
         H[..., 0] = slope
-        return Seen(y, H, R + np.zeros_like(y))
+        return DelayObservation(y, H, R + np.zeros_like(y))
 
     def _residuals(
         self, x: Float, P: Float, look: InterpolationDelay, z: Float, X: Float
@@ -165,14 +165,14 @@ class Neighbours:
 
 
 @dataclass(frozen=True)
-class AllSensors:
+class JointUpdate:
     """One vector correction by all sensors, the source's waveform being part of the state.
 
     Parameters
     ----------
     line : SourceAtCentre
     kappa, gate
-        As in `Neighbours`.
+        As in `PairwiseUpdate`.
     """
 
     line: SourceAtCentre
@@ -194,9 +194,9 @@ class AllSensors:
         x[..., 0] = np.clip(x[..., 0], -self.kappa, self.kappa)
         return x, symmetric(P)
 
-    def linearise(self, x: Float, P: Float, frames: Float) -> Seen:
+    def linearise(self, x: Float, P: Float, frames: Float) -> DelayObservation:
         """Return what the newest of `frames` says near beliefs."""
         h, H, R = self.line.linearise(x)
         e = frames[..., -1, :] - h
         used = kept(e, ((H @ P) * H).sum(axis=-1) + R, self.gate)
-        return Seen(np.where(used, e, 0.0), np.where(used[..., None], H, 0.0), R)
+        return DelayObservation(np.where(used, e, 0.0), np.where(used[..., None], H, 0.0), R)

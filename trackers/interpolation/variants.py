@@ -17,18 +17,18 @@ from arrivals.measurement_models.delays.interpolation import (
 )
 from arrivals.measurement_models.delays.source_correlation import SourceCorrelation, Tones
 from arrivals.motion_models.base import MotionModel
-from arrivals.motion_models.combined import Stacked
+from arrivals.motion_models.combined import CombinedMotion
 from arrivals.motion_models.linear import LinearMotion
-from arrivals.trackers.interpolation.updates import AllSensors, Neighbours, move
+from arrivals.trackers.interpolation.updates import JointUpdate, PairwiseUpdate, move
 from arrivals.typing import Float
 from arrivals.validation import not_negative
 
-Variant: TypeAlias = Literal["B", "Bw", "C", "D", "E", "E2", "phasor"]
+VariantName: TypeAlias = Literal["B", "Bw", "C", "D", "E", "E2", "phasor"]
 LOBE = 0.12  # of κ: the largest standard deviation of a delay that the joint filters start from
 
 
 @dataclass(frozen=True)
-class Recipe:
+class Variant:
     """What a variant is made of; None leaves the choice to the source and the array."""
 
     offsets: tuple[int, ...] | None = None
@@ -40,24 +40,24 @@ class Recipe:
     each_sensor: bool = False
 
 
-VARIANTS: dict[str, Recipe] = {
-    "B": Recipe(offsets=(0, 1), loading=0.0, each_sensor=True),
-    "Bw": Recipe(offsets=(0, 1), each_sensor=True),
-    "C": Recipe(both_ways=True),
-    "D": Recipe(baselines=(1, 2, 4, 7), each_sensor=True),
-    "E": Recipe(joint="delay_line"),
-    "E2": Recipe(both_ways=True, joint="delay_line", acquire=True),
-    "phasor": Recipe(joint="phasor"),
+VARIANTS: dict[str, Variant] = {
+    "B": Variant(offsets=(0, 1), loading=0.0, each_sensor=True),
+    "Bw": Variant(offsets=(0, 1), each_sensor=True),
+    "C": Variant(both_ways=True),
+    "D": Variant(baselines=(1, 2, 4, 7), each_sensor=True),
+    "E": Variant(joint="delay_line"),
+    "E2": Variant(both_ways=True, joint="delay_line", acquire=True),
+    "phasor": Variant(joint="phasor"),
 }
 
 
 @dataclass(frozen=True)
-class Parts:
+class FilterAssembly:
     """The models that a recipe makes of a source, an array and a motion, and what they do."""
 
     motion: MotionModel
-    acquire: Neighbours | None
-    last: Neighbours | AllSensors
+    acquire: PairwiseUpdate | None
+    last: PairwiseUpdate | JointUpdate
     kappa: float
     n_places: int
     acquisition: int
@@ -65,7 +65,7 @@ class Parts:
     @property
     def joint(self) -> SourceAtCentre | None:
         """The model of all sensors, None for variants that go from neighbour to neighbour."""
-        return self.last.line if isinstance(self.last, AllSensors) else None
+        return self.last.line if isinstance(self.last, JointUpdate) else None
 
     @property
     def n_delay(self) -> int:
@@ -77,7 +77,7 @@ class Parts:
         """Snapshots that must be kept."""
         return self.last.span if self.acquire is None else max(self.acquire.span, self.acquisition)
 
-    def stage(self, n: int) -> Neighbours | AllSensors:
+    def stage(self, n: int) -> PairwiseUpdate | JointUpdate:
         """Return what treats the n-th snapshot."""
         return self.acquire if self.acquire is not None and n <= self.acquisition else self.last
 
@@ -115,26 +115,26 @@ class Parts:
 def assembled(
     measurement: ArraySamples,
     motion: MotionModel,
-    recipe: Recipe,
+    recipe: Variant,
     aligned: bool,
     drive: float | None,
     acquisition: int,
     gate: float | None,
     extrapolate: bool,
-) -> Parts:
+) -> FilterAssembly:
     """Build the parts of a recipe; the same ones as long as nothing in it changes."""
     kappa, n_places = measurement.kappa, measurement.n_places
     line = _line(measurement, recipe, drive)
     looks, highest = _looks(measurement, recipe, extrapolate), measurement.correlation.highest
-    neighbours = Neighbours(looks, kappa, highest, recipe.each_sensor, aligned, gate)
+    neighbours = PairwiseUpdate(looks, kappa, highest, recipe.each_sensor, aligned, gate)
     if line is None:
-        return Parts(motion, None, neighbours, kappa, n_places, acquisition)
-    both = Stacked(motion, LinearMotion(line.transition, line.innovation))
+        return FilterAssembly(motion, None, neighbours, kappa, n_places, acquisition)
+    both = CombinedMotion(motion, LinearMotion(line.transition, line.innovation))
     first = neighbours if recipe.acquire else None
-    return Parts(both, first, AllSensors(line, kappa, gate), kappa, n_places, acquisition)
+    return FilterAssembly(both, first, JointUpdate(line, kappa, gate), kappa, n_places, acquisition)
 
 
-def _line(measurement: ArraySamples, recipe: Recipe, drive: float | None) -> SourceAtCentre | None:
+def _line(measurement: ArraySamples, recipe: Variant, drive: float | None) -> SourceAtCentre | None:
     n, ratio, source = measurement.n_places, measurement.noise_ratio, measurement.correlation
     if recipe.joint is None:
         return None
@@ -146,7 +146,7 @@ def _line(measurement: ArraySamples, recipe: Recipe, drive: float | None) -> Sou
 
 
 def _looks(
-    measurement: ArraySamples, recipe: Recipe, extrapolate: bool
+    measurement: ArraySamples, recipe: Variant, extrapolate: bool
 ) -> tuple[InterpolationDelay, ...]:
     """Return the models of all baselines, forwards and, if wanted, backwards."""
     source, kappa, ratio = measurement.correlation, measurement.kappa, measurement.noise_ratio

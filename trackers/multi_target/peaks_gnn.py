@@ -12,10 +12,10 @@ from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.motion_models.base import MotionModel
 from arrivals.motion_models.linear import ConstantVelocity
 from arrivals.motion_models.von_mises import wrap
-from arrivals.trackers.base import Tracker, missed
+from arrivals.trackers.base import Tracker, is_missing
 from arrivals.trackers.direction_tracker import DirectionTracker
 from arrivals.trackers.estimates import DirectionEstimate
-from arrivals.trackers.multi_target.track_bank import Bank, nearest
+from arrivals.trackers.multi_target.track_bank import TrackBank, nearest
 from arrivals.trackers.registry import find, register
 from arrivals.typing import Bool, Complex, Float
 from arrivals.validation import count, instance, not_negative, positive
@@ -97,7 +97,7 @@ class PeaksGNN(DirectionTracker):
         if max_sources is not None:
             count("max_sources", max_sources)
         self.scan = self._fresh_scan()
-        self.bank = Bank.empty(self.n_slots, walk.dim_x)
+        self.bank = TrackBank.empty(self.n_slots, walk.dim_x)
         self._report(np.full(self.n_slots, complex(np.nan, np.nan)))
 
     @property
@@ -116,7 +116,7 @@ class PeaksGNN(DirectionTracker):
 
     def update(self, z: ArrayLike | None) -> None:
         """Find peaks, give each to the nearest track, start tracks with what is left."""
-        if missed(z):
+        if is_missing(z):
             return
         self._settle()
         self.scan.update(z)
@@ -141,7 +141,7 @@ class PeaksGNN(DirectionTracker):
         if self._made_for != (self.detector, self.measurement):
             self.scan = self._fresh_scan()
         if self.bank.mean.shape != (self.n_slots, self.walk.dim_x):
-            self.bank = Bank.empty(self.n_slots, self.walk.dim_x)
+            self.bank = TrackBank.empty(self.n_slots, self.walk.dim_x)
 
     def _fresh_scan(self) -> Tracker:
         self._made_for = (self.detector, self.measurement)
@@ -174,12 +174,10 @@ class PeaksGNN(DirectionTracker):
         bank = self.bank
         on = bank.used & (bank.hits >= self.confirm)
         doa = bank.mean[on, 0]
-        self._show(
-            DirectionEstimate(
-                doa=wrap(doa) if self.measurement.array.dim > 1 else doa,
-                std=np.sqrt(bank.covariance[on, 0, 0]),
-                existence=np.full(on.sum(), np.nan),
-                amplitude=amplitude[on],
-                label=bank.label[on],
-            )
+        self.report(
+            doa=wrap(doa) if self.measurement.array.dim > 1 else doa,
+            std=np.sqrt(bank.covariance[on, 0, 0]),
+            existence=np.full(on.sum(), np.nan),
+            amplitude=amplitude[on],
+            label=bank.label[on],
         )

@@ -13,7 +13,7 @@ from arrivals.typing import Bool, Float, Int
 
 
 @dataclass(frozen=True, eq=False)
-class Bank:
+class TrackBank:
     """Tracks in places of which some are free.
 
     Parameters
@@ -37,7 +37,7 @@ class Bank:
     n_labels: int = 0
 
     @classmethod
-    def empty(cls, n_places: int, n: int) -> Bank:
+    def empty(cls, n_places: int, n: int) -> TrackBank:
         """Return a bank without tracks."""
         none, zero = np.full(n_places, -1), np.zeros(n_places, dtype=np.int64)
         return cls(np.full((n_places, n), np.nan), np.zeros((n_places, n, n)), none, zero, zero)
@@ -47,13 +47,13 @@ class Bank:
         """Which places hold a track."""
         return np.asarray(self.label >= 0)
 
-    def predicted(self, motion: MotionModel, dt: float) -> Bank:
+    def predicted(self, motion: MotionModel, dt: float) -> TrackBank:
         """Return the bank after a step of the motion, which is linear."""
         F, on = motion.F(np.zeros(motion.dim_x), dt), self.used
         P = predict_gaussian(self.covariance[on], F, motion.Q(dt))
         return self._with(on, mean=self.mean[on] @ F.T, covariance=P)
 
-    def corrected(self, place: Int, residual: Float, variance: float) -> Bank:
+    def corrected(self, place: Int, residual: Float, variance: float) -> TrackBank:
         """Return the bank in which some tracks had a measurement, and the others had none."""
         H, R = np.eye(1, self.mean.shape[1]), np.full((1, 1), variance)
         found = update_gaussian(self.mean[place], self.covariance[place], residual[:, None], H, R)
@@ -62,7 +62,7 @@ class Bank:
             place, mean=found.x, covariance=found.P, hits=self.hits[place] + 1, misses=0
         )
 
-    def with_births(self, z: Float, covariance: Float) -> Bank:
+    def with_births(self, z: Float, covariance: Float) -> TrackBank:
         """Return the bank with a new track for each measurement, as long as there are places."""
         free = np.flatnonzero(~self.used)[: len(z)]
         mean = np.zeros((len(free), self.mean.shape[1]))
@@ -71,11 +71,11 @@ class Bank:
         born = self._with(free, mean=mean, covariance=covariance, label=label, hits=1, misses=0)
         return replace(born, n_labels=self.n_labels + len(free))
 
-    def without(self, gone: Bool) -> Bank:
+    def without(self, gone: Bool) -> TrackBank:
         """Return the bank less some tracks."""
         return self._with(gone, mean=np.nan, covariance=0.0, label=-1, hits=0, misses=0)
 
-    def _with(self, place: Int | Bool, **changes: Any) -> Bank:
+    def _with(self, place: Int | Bool, **changes: Any) -> TrackBank:
         arrays = {name: getattr(self, name).copy() for name in changes}
         for name, values in changes.items():
             arrays[name][place] = values

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.trackers.rss.belief import Entries, Sources, empty
+from arrivals.trackers.rss.belief import Entries, SourceBeliefs, empty
 from arrivals.typing import Float
 from arrivals.validation import covariance, positive, real
 
 
 def known_sources(
     x0: ArrayLike | None, P0: ArrayLike | None, mu0: ArrayLike, v0: ArrayLike, n: int, xy: Entries
-) -> Sources:
+) -> SourceBeliefs:
     """Return the sources that a constructor was told of.
 
     Parameters
@@ -51,7 +51,7 @@ def known_sources(
     u, v = _of_each("mu0", mu0, K), _of_each("v0", v0, K)
     if not (v > 0).all():
         raise ValueError(f"v0 must be positive; got {v.tolist()}")
-    return Sources(x.copy(), _covariances(P0, K, n, xy), u, v)
+    return SourceBeliefs(x.copy(), _covariances(P0, K, n, xy), u, v)
 
 
 def rest(P0: ArrayLike | None, n: int, xy: Entries) -> Float:

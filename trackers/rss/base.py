@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.signal_strength.log_normal import LogNormalRSS
 from arrivals.motion_models.base import MotionModel
-from arrivals.trackers.base import Tracker, missed
+from arrivals.trackers.base import Tracker, is_missing
 from arrivals.trackers.direction_tracker import padded
 from arrivals.trackers.estimates import PositionEstimate
 from arrivals.trackers.gaussian.arguments import as_measurement
@@ -23,13 +23,19 @@ from arrivals.trackers.rss.arguments import (
     warn_of_too_many,
 )
 from arrivals.trackers.rss.batch import run_in_chunks
-from arrivals.trackers.rss.belief import Sources, unflat, where_finite
+from arrivals.trackers.rss.belief import SourceBeliefs, unflat, where_finite
 from arrivals.trackers.rss.inference.goodness_of_fit import Quality, quality
-from arrivals.trackers.rss.inference.joint_posterior import Problem
-from arrivals.trackers.rss.inference.solution import Found, Status, Told, found_of, in_batch
-from arrivals.trackers.rss.model_order.birth_death import Census, counted
-from arrivals.trackers.rss.model_order.grid_search import Newcomers
-from arrivals.trackers.rss.model_order.model_selection import Fit, best, grown, refined
+from arrivals.trackers.rss.inference.joint_posterior import JointPosterior
+from arrivals.trackers.rss.inference.solution import (
+    Solution,
+    Status,
+    WeightedReadings,
+    found_of,
+    in_batch,
+)
+from arrivals.trackers.rss.model_order.birth_death import TrackTable, counted
+from arrivals.trackers.rss.model_order.grid_search import NewSourcePrior
+from arrivals.trackers.rss.model_order.model_selection import Candidate, best, grown, refined
 from arrivals.trackers.run import Run
 from arrivals.typing import Bool, Float
 from arrivals.validation import count, instance, not_negative, positive, real
@@ -110,7 +116,7 @@ class RSSTracker(Tracker):
             raise ValueError(f"n_sources is {self.n_sources}, but x0 has {K} sources")
         if self.births and max(K, self.n_sources or 0) > self.max_sources:
             raise ValueError(f"there are more sources at first than max_sources={self.max_sources}")
-        self.census = Census.known(K)
+        self.census = TrackTable.known(K)
         self.elapsed = np.inf
         self._hold(sources)
         self._note_missed()
@@ -120,7 +126,7 @@ class RSSTracker(Tracker):
     # What a method defines
 
     @abstractmethod
-    def solve(self, problem: Problem, u: Float, theta: Float) -> Found:
+    def solve(self, problem: JointPosterior, u: Float, theta: Float) -> Solution:
         """Find amplitudes and positions for a batch of problems, from starting points."""
 
     # The belief, flat outside and by source inside
@@ -137,14 +143,14 @@ class RSSTracker(Tracker):
             return self.max_sources
         return len(np.atleast_2d(self.x0)) if self.x0 is not None else int(self.n_sources or 0)
 
-    def by_source(self) -> Sources:
+    def by_source(self) -> SourceBeliefs:
         """Return the belief by source, those not yet confirmed included."""
         return unflat(real("x", self.x), real("P", self.P), self.motion.dim_x)
 
-    def _hold(self, sources: Sources) -> None:
+    def _hold(self, sources: SourceBeliefs) -> None:
         K = len(sources.u)
         if len(self.census.label) != K:  # another x was assigned
-            self.census = Census.known(K)
+            self.census = TrackTable.known(K)
         n_slots = max(self.n_slots, K)
         self.x, self.P = sources.flat(n_slots)
         self.label = padded(self.census.label, n_slots, -1).astype(np.int64)
@@ -174,7 +180,7 @@ class RSSTracker(Tracker):
 
     def update(self, z: ArrayLike | None) -> None:
         """Correct the belief by readings, Np, (n_sensors,); NaN where a sensor is missing."""
-        if z is None or missed(z):
+        if z is None or is_missing(z):
             self._note_missed()
             return
         xi = self.measurement.readings(as_measurement(z, self.measurement.dim_z))[None]
@@ -193,18 +199,20 @@ class RSSTracker(Tracker):
         self.elapsed = 0.0
         self._hold(sources)
 
-    def told(self, xi: Float, elapsed: Float) -> Told:
+    def told(self, xi: Float, elapsed: Float) -> WeightedReadings:
         """Return a batch of readings with their weights 1/r, times min(1, Δt/τ)."""
         heard = ~np.isnan(xi)
         full = heard / self.measurement.variance
         share = np.ones(len(xi))
         if self.correlation_time is not None:
             share = np.minimum(1.0, elapsed / self.correlation_time)
-        return Told(np.where(heard, xi, 0.0), share[:, None] * full, full)
+        return WeightedReadings(np.where(heard, xi, 0.0), share[:, None] * full, full)
 
-    def correct(self, sources: Sources, told: Told) -> tuple[Sources, Found, Quality]:
+    def correct(
+        self, sources: SourceBeliefs, told: WeightedReadings
+    ) -> tuple[SourceBeliefs, Solution, Quality]:
         """Return a batch of beliefs corrected; those whose solution is not finite stay."""
-        problem = Problem(self.measurement.field, told.xi, told.W, sources.prior(self.xy))
+        problem = JointPosterior(self.measurement.field, told.xi, told.W, sources.prior(self.xy))
         found = self.solve(problem, problem.prior.mu, problem.prior.theta)
         moved = sources.corrected(
             found.u, found.theta, found.marginals, self.xy, self.motion.angles
@@ -212,7 +220,7 @@ class RSSTracker(Tracker):
         judged = self._judged(problem._replace(W=told.full), found)
         return where_finite(moved, sources), found, judged
 
-    def _judged(self, problem: Problem, found: Found) -> Quality:
+    def _judged(self, problem: JointPosterior, found: Solution) -> Quality:
         with np.errstate(over="ignore", invalid="ignore"):
             q = problem.misfit(problem.field.levels(found.u, found.theta))
         n_heard = (problem.W > 0).sum(axis=-1)
@@ -220,22 +228,24 @@ class RSSTracker(Tracker):
 
     # Sources that nobody told of
 
-    def newcomers(self, heard: Bool) -> Newcomers:
+    def newcomers(self, heard: Bool) -> NewSourcePrior:
         """Return what is known of sources not seen yet, by the sensors that are heard."""
         mu, v = float(np.mean(np.asarray(self.mu0))), float(np.mean(np.asarray(self.v0)))
         sensors = self.measurement.sensors[heard]
-        return Newcomers.among(sensors, mu, v, self.area_std, self.grid_step)
+        return NewSourcePrior.among(sensors, mu, v, self.area_std, self.grid_step)
 
-    def fresh(self, fit: Fit) -> Sources:
+    def fresh(self, fit: Candidate) -> SourceBeliefs:
         """Return the beliefs that a fit starts: at rest, as uncertain in speed as P0 says."""
         K, n = len(fit.u), self.motion.dim_x
         found, xy = found_of(fit).marginals, np.array(self.xy)
         x, P = np.zeros((K, n)), np.tile(rest(self.P0, n, self.xy), (K, 1, 1))
         x[:, xy] = fit.theta
         P[:, xy[:, None], xy] = found.Sigma[0]
-        return Sources(x, P, fit.u, found.v[0])
+        return SourceBeliefs(x, P, fit.u, found.v[0])
 
-    def _started(self, told: Told) -> tuple[Sources, Census, Found, Quality]:
+    def _started(
+        self, told: WeightedReadings
+    ) -> tuple[SourceBeliefs, TrackTable, Solution, Quality]:
         """Return the sources found in a first set of readings, as many as wanted."""
         K, xi, W = self.n_sources, told.xi[0], told.W[0]
         new, field = self.newcomers(W > 0), self.measurement.field
@@ -248,9 +258,11 @@ class RSSTracker(Tracker):
             fit = refined(fits[K], new)
         found = found_of(fit)
         judged = self._judged(in_batch(fit.problem), found)
-        return self.fresh(fit), Census.known(len(fit.u)), found, judged
+        return self.fresh(fit), TrackTable.known(len(fit.u)), found, judged
 
-    def _counted(self, sources: Sources, told: Told) -> tuple[Sources, Census, Found, Quality]:
+    def _counted(
+        self, sources: SourceBeliefs, told: WeightedReadings
+    ) -> tuple[SourceBeliefs, TrackTable, Solution, Quality]:
         """Return the sources after births and deaths."""
         now = counted(self, sources, self.census, told.xi[0], told.W[0])
         problem = in_batch(now.fit.problem)._replace(W=told.full)
@@ -263,7 +275,7 @@ class RSSTracker(Tracker):
         """The confirmed sources."""
         sources, census, xy = self.by_source(), self.census, self.xy
         if len(census.label) != len(sources.u):
-            census = Census.known(len(sources.u))
+            census = TrackTable.known(len(sources.u))
         shown = census.confirmed
         return PositionEstimate(
             sources.x[shown][:, xy],

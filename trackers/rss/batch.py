@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from arrivals.trackers.estimates import PositionEstimate
-from arrivals.trackers.rss.belief import Sources
+from arrivals.trackers.rss.belief import SourceBeliefs
 from arrivals.trackers.rss.inference.goodness_of_fit import Quality
-from arrivals.trackers.rss.inference.solution import Found, Status
-from arrivals.trackers.rss.model_order.birth_death import Census
+from arrivals.trackers.rss.inference.solution import Solution, Status
+from arrivals.trackers.rss.model_order.birth_death import TrackTable
 from arrivals.trackers.run import Run
 from arrivals.typing import Float, Int
 
@@ -32,7 +32,7 @@ def run_together(tracker: RSSTracker, xi: Float, dt: float) -> list[Run]:
     """Run sequences of readings (n_sequences, n_steps, n_sensors) side by side."""
     started = time.perf_counter()
     B, T, _ = xi.shape
-    sources = Sources(*(np.repeat(part[None], B, axis=0) for part in tracker.by_source()))
+    sources = SourceBeliefs(*(np.repeat(part[None], B, axis=0) for part in tracker.by_source()))
     elapsed = np.full(B, tracker.elapsed)
     recorded = _Recorded(tracker, B, T, len(sources.u[0]))
     for t in range(T):
@@ -59,7 +59,7 @@ class _Recorded:
         shape = (n_batch, n_steps, n_sources)
         self.xy = tracker.xy
         self.n_slots = max(tracker.n_slots, n_sources)
-        self.sources = Sources(
+        self.sources = SourceBeliefs(
             np.empty((*shape, n)), np.empty((*shape, n, n)), np.empty(shape), np.empty(shape)
         )
         default = Status()
@@ -68,18 +68,18 @@ class _Recorded:
             for name, value in zip(Status._fields, default, strict=True)
         }
 
-    def note(self, t: int, rows: Int, found: Found, judged: Quality) -> None:
+    def note(self, t: int, rows: Int, found: Solution, judged: Quality) -> None:
         """Enter what a step says of its own making."""
         values = (found.converged, found.iterations, judged.fit, judged.poor_fit, judged.diverged)
         for name, value in zip(Status._fields, values, strict=True):
             self.status[name][rows, t] = value
 
-    def add(self, t: int, sources: Sources) -> None:
+    def add(self, t: int, sources: SourceBeliefs) -> None:
         """Enter the beliefs after a step."""
         for mine, part in zip(self.sources, sources, strict=True):
             mine[:, t] = part
 
-    def runs(self, census: Census, times: Float, elapsed: float) -> list[Run]:
+    def runs(self, census: TrackTable, times: Float, elapsed: float) -> list[Run]:
         """Return one run a sequence."""
         n_steps, K = self.sources.u.shape[1:]
         everywhere = (n_steps, K)

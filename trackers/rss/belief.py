@@ -16,7 +16,7 @@ from arrivals.typing import Float
 Entries = tuple[int, int]
 
 
-class Sources(NamedTuple):
+class SourceBeliefs(NamedTuple):
     """Independent Gaussian beliefs of sources, any leading axes.
 
     Parameters
@@ -34,19 +34,19 @@ class Sources(NamedTuple):
     u: Float
     v: Float
 
-    def take(self, rows: Any) -> Sources:
+    def take(self, rows: Any) -> SourceBeliefs:
         """Return some along the first axis."""
-        return Sources(*(part[rows] for part in self))
+        return SourceBeliefs(*(part[rows] for part in self))
 
-    def joined(self, others: Sources) -> Sources:
+    def joined(self, others: SourceBeliefs) -> SourceBeliefs:
         """Return these and others, along the first axis."""
-        return Sources(*(np.concatenate(parts) for parts in zip(self, others, strict=True)))
+        return SourceBeliefs(*(np.concatenate(parts) for parts in zip(self, others, strict=True)))
 
-    def predicted(self, motion: MotionModel, dt: float, q_u: float) -> Sources:
+    def predicted(self, motion: MotionModel, dt: float, q_u: float) -> SourceBeliefs:
         """Return the beliefs after `dt`: x = F x, P = F P Fᵀ + Q, v = v + q_u dt."""
         F = transitions(motion, self.x, dt)
         P = F @ self.P @ np.swapaxes(F, -1, -2) + motion.Q(dt)
-        return Sources(motion.f(self.x, dt), P, self.u, self.v + q_u * dt)
+        return SourceBeliefs(motion.f(self.x, dt), P, self.u, self.v + q_u * dt)
 
     def prior(self, position: Entries) -> Prior:
         """Return what a variational update takes for its prior."""
@@ -55,7 +55,7 @@ class Sources(NamedTuple):
 
     def corrected(
         self, u: Float, theta: Float, found: Marginals, position: Entries, angles: tuple[int, ...]
-    ) -> Sources:
+    ) -> SourceBeliefs:
         """Return the beliefs once positions and log amplitudes are known better.
 
         A reading depends on the position alone, so the rest of a state follows exactly:
@@ -67,7 +67,7 @@ class Sources(NamedTuple):
         A position known exactly tells half of the correlated rest:
 
         >>> P = np.array([[[1.0, 0.0, 0.5], [0.0, 1.0, 0.0], [0.5, 0.0, 1.0]]])
-        >>> before = Sources(np.zeros((1, 3)), P, np.zeros(1), np.ones(1))
+        >>> before = SourceBeliefs(np.zeros((1, 3)), P, np.zeros(1), np.ones(1))
         >>> exactly = Marginals(np.ones(1), np.zeros((1, 2, 2)))
         >>> before.corrected(np.zeros(1), np.array([[2.0, 0.0]]), exactly, (0, 1), ()).x
         array([[2., 0., 1.]])
@@ -77,7 +77,7 @@ class Sources(NamedTuple):
         G = P_theta @ inverse_2x2(P_theta_theta)
         x = self.x + (G @ (theta - self.x[..., position])[..., None])[..., 0]
         P = self.P - G @ (P_theta_theta - found.Sigma) @ np.swapaxes(G, -1, -2)
-        return Sources(wrapped(x, angles), 0.5 * (P + np.swapaxes(P, -1, -2)), u, found.v)
+        return SourceBeliefs(wrapped(x, angles), 0.5 * (P + np.swapaxes(P, -1, -2)), u, found.v)
 
     def flat(self, n_slots: int) -> tuple[Float, Float]:
         """Return one mean and one covariance: state, then u, source by source.
@@ -95,12 +95,12 @@ class Sources(NamedTuple):
         return x.ravel(), P.reshape(size, size)
 
 
-def unflat(x: Float, P: Float, n: int) -> Sources:
+def unflat(x: Float, P: Float, n: int) -> SourceBeliefs:
     """Return the sources of a flat belief: those whose state is finite.
 
     Examples
     --------
-    >>> one = Sources(np.ones((1, 2)), np.eye(2)[None], np.ones(1), np.ones(1))
+    >>> one = SourceBeliefs(np.ones((1, 2)), np.eye(2)[None], np.ones(1), np.ones(1))
     >>> x, P = one.flat(2)
     >>> x, unflat(x, P, 2).u
     (array([ 1.,  1.,  1., nan, nan, nan]), array([1.]))
@@ -108,7 +108,7 @@ def unflat(x: Float, P: Float, n: int) -> Sources:
     x = x.reshape(-1, n + 1)
     each = np.flatnonzero(np.isfinite(x).all(axis=1))
     blocks = P.reshape(len(x), n + 1, len(x), n + 1)[each, :, each]
-    return Sources(x[each, :n], blocks[:, :n, :n], x[each, n], blocks[:, n, n])
+    return SourceBeliefs(x[each, :n], blocks[:, :n, :n], x[each, n], blocks[:, n, n])
 
 
 def transitions(motion: MotionModel, x: Float, dt: float) -> Float:
@@ -126,19 +126,19 @@ def transitions(motion: MotionModel, x: Float, dt: float) -> Float:
     return at_each(motion.F, x, dt)
 
 
-def empty(n: int) -> Sources:
+def empty(n: int) -> SourceBeliefs:
     """Return no source, of states of n entries."""
-    return Sources(np.zeros((0, n)), np.zeros((0, n, n)), np.zeros(0), np.zeros(0))
+    return SourceBeliefs(np.zeros((0, n)), np.zeros((0, n, n)), np.zeros(0), np.zeros(0))
 
 
-def where_finite(moved: Sources, before: Sources) -> Sources:
+def where_finite(moved: SourceBeliefs, before: SourceBeliefs) -> SourceBeliefs:
     """Return a batch of beliefs after a step, and before it where something is not finite."""
     sound = np.ones(len(moved.u), dtype=np.bool_)
     for part in moved:
         sound &= np.isfinite(part).reshape(len(part), -1).all(axis=1)
     if sound.all():
         return moved
-    return Sources(*(
+    return SourceBeliefs(*(
         np.where(sound.reshape(-1, *[1] * (new.ndim - 1)), new, old)
         for new, old in zip(moved, before, strict=True)
     ))  # fmt: skip

@@ -10,9 +10,9 @@ from arrivals.measurement_models.signal_strength.log_normal import LogNormalRSS
 from arrivals.motion_models.base import MotionModel
 from arrivals.trackers.registry import register
 from arrivals.trackers.rss.base import RSSTracker
-from arrivals.trackers.rss.inference.joint_posterior import Problem, marginals
+from arrivals.trackers.rss.inference.joint_posterior import JointPosterior, marginals
 from arrivals.trackers.rss.inference.map_search import Maximum, Method, maximum
-from arrivals.trackers.rss.inference.solution import Found, laplace
+from arrivals.trackers.rss.inference.solution import Solution, laplace
 from arrivals.typing import Float
 from arrivals.validation import one_of, positive
 
@@ -92,7 +92,7 @@ class RSSML(RSSTracker):
             grid_step=grid_step, correlation_time=correlation_time,
         )  # fmt: skip
 
-    def solve(self, problem: Problem, u: Float, theta: Float) -> Found:
+    def solve(self, problem: JointPosterior, u: Float, theta: Float) -> Solution:
         """Search the maxima one by one; then the marginals."""
         start = problem.log_posterior(u, theta)
         each = [self._maximum(problem, u, theta, b) for b in range(len(u))]
@@ -100,7 +100,7 @@ class RSSML(RSSTracker):
         J, log_likelihood = laplace(problem, u, theta)
         if not self.prior:  # what the prior says is no more than what keeps J regular
             J = J - (1 - 1e-9) * problem.prior_precision()
-        return Found(
+        return Solution(
             u,
             theta,
             marginals(J),
@@ -111,7 +111,7 @@ class RSSML(RSSTracker):
             np.array([one.converged for one in each]),
         )
 
-    def _maximum(self, problem: Problem, u: Float, theta: Float, b: int) -> Maximum:
+    def _maximum(self, problem: JointPosterior, u: Float, theta: Float, b: int) -> Maximum:
         field = problem.field.take(b)
-        one = Problem(field, problem.xi[b], problem.W[b], problem.prior.take(b))
+        one = JointPosterior(field, problem.xi[b], problem.W[b], problem.prior.take(b))
         return maximum(one, u[b], theta[b], self.method, self.prior, self.tolerance)

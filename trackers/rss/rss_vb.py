@@ -12,13 +12,19 @@ from arrivals.motion_models.base import MotionModel
 from arrivals.trackers.registry import register
 from arrivals.trackers.rss.base import RSSTracker
 from arrivals.trackers.rss.inference.joint_posterior import (
+    JointPosterior,
     Marginals,
-    Problem,
     inverse_2x2,
     marginals,
 )
-from arrivals.trackers.rss.inference.solution import Found, laplace
-from arrivals.trackers.rss.inference.variational import Cycling, Refresh, Solution, Sweep, solve
+from arrivals.trackers.rss.inference.solution import Solution, laplace
+from arrivals.trackers.rss.inference.variational import (
+    Refresh,
+    Sweep,
+    VariationalIterate,
+    VariationalSettings,
+    solve,
+)
 from arrivals.typing import Float
 from arrivals.validation import count, not_negative, number, one_of
 
@@ -156,22 +162,22 @@ class RSSVB(RSSTracker):
             grid_step=grid_step, correlation_time=correlation_time,
         )  # fmt: skip
 
-    def cycling(self, n_sources: int) -> Cycling:
+    def cycling(self, n_sources: int) -> VariationalSettings:
         """Return how to cycle with that many sources."""
         damping = self.damping
         if damping is None:
             damping = 1.0 if self.sweep == "gauss-seidel" else 0.5 if n_sources < 20 else 0.25
-        return Cycling(
+        return VariationalSettings(
             self.sweep, damping, self.refresh, self.guard, self.max_cycles, self.tol_u,
             self.tol_theta, self.newton_steps,
         )  # fmt: skip
 
-    def solve(self, problem: Problem, u: Float, theta: Float) -> Found:
+    def solve(self, problem: JointPosterior, u: Float, theta: Float) -> Solution:
         """Cycle through the factors from a starting point; then the marginals."""
         solution = solve(problem, u, theta, self.cycling(u.shape[-1]))
         J, log_likelihood = laplace(problem._replace(prior=solution.prior),
                                     solution.u, solution.theta)  # fmt: skip
-        return Found(
+        return Solution(
             solution.u,
             solution.theta,
             marginals(J) if self.covariance == "joint" else factored(solution),
@@ -183,6 +189,6 @@ class RSSVB(RSSTracker):
         )
 
 
-def factored(solution: Solution) -> Marginals:
+def factored(solution: VariationalIterate) -> Marginals:
     """Return the factors' own variances and covariances."""
     return Marginals(1 / solution.w, inverse_2x2(solution.P))

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
-from arrivals.trackers.base import missed
+from arrivals.trackers.base import is_missing
 from arrivals.trackers.beamforming.cbf import look_directions
-from arrivals.trackers.direction_tracker import SideBySide
-from arrivals.trackers.estimates import DirectionEstimate
+from arrivals.trackers.direction_tracker import BatchDirectionTracker
 from arrivals.trackers.registry import register
 from arrivals.trackers.sparse_bayes.fixed_point import Powers, SparseBayes, highest
 from arrivals.typing import Bool, Complex, Float
@@ -22,7 +21,7 @@ Heard = tuple[Complex, Bool]
 
 
 @register("sbl")
-class SBL(SideBySide):
+class SBL(BatchDirectionTracker):
     """Sparse Bayesian learning: the peaks of a sparse power spectrum, every step on its own.
 
     Parameters
@@ -117,7 +116,7 @@ class SBL(SideBySide):
         """Set where the powers start; report nothing until something is heard."""
         not_negative("dt", dt)
         self.start = self.next_start()
-        self._show(DirectionEstimate.nothing())
+        self.report([])
 
     def next_start(self) -> Float:
         """Return where the powers of the next update start: all alike."""
@@ -125,17 +124,17 @@ class SBL(SideBySide):
 
     def update(self, z: ArrayLike | None) -> None:
         """Fit one snapshot, (n_sensors,), or several that share their directions, one a row."""
-        heard = None if missed(z) else self._heard(np.asarray(z))
+        heard = None if is_missing(z) else self._heard(np.asarray(z))
         if heard is not None:
             Y, sensors = heard
             self._take(self._fit(Y[None], sensors, self._from()[None]), 0, heard)
 
-    def _together(self, trackers: Sequence[Self], step: Sequence[Any], dt: float) -> None:
+    def step_batch(self, trackers: Sequence[Self], step: Sequence[Any], dt: float) -> None:
         """Fit, as one batch each, the steps in which the same sensors gave as many snapshots."""
         groups: dict[tuple[int, bytes], list[tuple[Self, Heard]]] = {}
         for tracker, z in zip(trackers, step, strict=True):
             tracker.predict(dt=dt)
-            heard = None if missed(z) else tracker._heard(np.asarray(z))
+            heard = None if is_missing(z) else tracker._heard(np.asarray(z))
             if heard is not None:
                 key = heard[0].shape[1], heard[1].tobytes()
                 groups.setdefault(key, []).append((tracker, heard))
@@ -178,17 +177,15 @@ class SBL(SideBySide):
         top = top[there & (gamma[top] > self.threshold * gamma[top[0]])]
         nan = np.full(len(top), np.nan)
         self.doa_grid, self.gamma = grid, gamma
-        self._show(
-            DirectionEstimate(
-                doa=grid[top],
-                std=nan,
-                existence=nan,
-                amplitude=self._amplitudes(grid[top], *heard),
-                label=np.full(len(top), -1),
-                converged=bool(powers.converged[n]),
-                iterations=int(powers.iterations[n]),
-                noise=float(powers.noise[n]),
-            )
+        self.report(
+            doa=grid[top],
+            std=nan,
+            existence=nan,
+            amplitude=self._amplitudes(grid[top], *heard),
+            label=np.full(len(top), -1),
+            converged=bool(powers.converged[n]),
+            iterations=int(powers.iterations[n]),
+            noise=float(powers.noise[n]),
         )
 
     def _amplitudes(self, doa: Float, Y: Complex, sensors: Bool) -> Complex:

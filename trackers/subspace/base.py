@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.arrays.sensor_array import SensorArray
-from arrivals.measurement_models.manifolds.manifold import GridLine
-from arrivals.trackers.base import missed
+from arrivals.measurement_models.manifolds.manifold import UniformLineManifold
+from arrivals.trackers.base import is_missing
 from arrivals.trackers.beamforming.covariance import RunningCovariance, smoothed
 from arrivals.trackers.direction_tracker import DirectionTracker
 from arrivals.trackers.estimates import DirectionEstimate
@@ -44,7 +44,7 @@ class Finder(Protocol):
 F = TypeVar("F", bound=Finder)
 
 
-def on_grid(model: ArraySnapshot) -> GridLine:
+def on_grid(model: ArraySnapshot) -> UniformLineManifold:
     """Return the array as a line on a uniform grid.
 
     Raises
@@ -58,7 +58,7 @@ def on_grid(model: ArraySnapshot) -> GridLine:
             f"the wavelength, {model.wavelengths[0]:.6g} m, is below the array's alias limit of "
             f"two grid spacings, {limit:.6g} m: this method would be ambiguous"
         )
-    if not isinstance(line, GridLine):
+    if not isinstance(line, UniformLineManifold):
         raise ValueError(
             "this method needs a line of sensors on a uniform grid (gaps are allowed); "
             f"this array has {model.array.n_sensors} sensors in {model.array.dim} dimension(s)"
@@ -119,7 +119,7 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
             self.n_sources = count("n_sources", self.n_sources)
         self._check_limit()
         self.total, self.squares, self.n_heard = 0.0, 0.0, 0
-        self._show(DirectionEstimate.nothing())
+        self.report([])
 
     def _check_limit(self) -> None:
         limit, n = self._limit(), self.measurement.array.n_sensors
@@ -150,14 +150,14 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
 
     def update(self, z: ArrayLike | None) -> None:
         """Learn from one snapshot, (n_sensors,); each `interval`-th time, look for directions."""
-        if missed(z):
+        if is_missing(z):
             return
         z = self.measurement.snapshot(np.asarray(z))
         self._learn(z)
         self.total, self.squares = self.total + 1, self.squares + 1
         self.n_heard = self.n_heard + 1
         if self.n_heard % self.interval == 0:
-            self._show(self._described(self._directions(), z))
+            self.report(**vars(self._described(self._directions(), z)))
 
     @abstractmethod
     def _learn(self, z: Complex) -> None:

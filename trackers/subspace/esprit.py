@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
-from arrivals.measurement_models.manifolds.manifold import GridLine
+from arrivals.measurement_models.manifolds.manifold import UniformLineManifold
 from arrivals.trackers.registry import register
 from arrivals.trackers.subspace.base import CovarianceSubspace, Subspaces, on_grid
 from arrivals.trackers.subspace.root_music import ENDFIRE
@@ -64,7 +64,7 @@ class Shift:
     of equals.
     """
 
-    line: GridLine
+    line: UniformLineManifold
 
     @property
     def shift(self) -> int:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
-from arrivals.measurement_models.manifolds.manifold import GridLine
+from arrivals.measurement_models.manifolds.manifold import UniformLineManifold
 from arrivals.trackers.registry import register
 from arrivals.trackers.subspace.base import CovarianceSubspace, Subspaces, on_grid
 from arrivals.typing import Complex, Float
@@ -127,7 +127,7 @@ def polynomial_roots(c: Complex) -> Complex:
 class Roots:
     """Directions by root-MUSIC, of a line on a uniform grid."""
 
-    line: GridLine
+    line: UniformLineManifold
 
     @property
     def limit(self) -> int:

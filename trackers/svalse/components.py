@@ -11,7 +11,7 @@ from arrivals.typing import Bool, Complex, Float, Int
 
 
 @dataclass(frozen=True, eq=False)
-class Prediction:
+class ComponentPrior:
     """What is known of the components before the snapshot, (65).
 
     Parameters
@@ -46,7 +46,7 @@ class Prediction:
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class ComponentPosterior:
     """The components after the snapshot, those carried over first.
 
     Parameters
@@ -72,7 +72,7 @@ class Fit:
     snr_db : float, optional
         Where the noise of the next step may start.
     bin_noise, nuisance, moments : ndarray, optional
-        As in `Prediction`, of all components; None from engines for one look of a line.
+        As in `ComponentPrior`, of all components; None from engines for one look of a line.
     """
 
     theta: Float
@@ -92,16 +92,18 @@ class Fit:
     moments: Complex | None = None
 
 
-class Engine(Protocol):
+class Solver(Protocol):
     """Maximises the ELBO of one step."""
 
-    def fit(self, Y: Complex, manifold: Manifold, prediction: Prediction | None) -> Fit:
+    def fit(
+        self, Y: Complex, manifold: Manifold, prediction: ComponentPrior | None
+    ) -> ComponentPosterior:
         """Fit data (n_bins, n_sensors, n_snapshots), with what is known of the components."""
 
     def fit_batch(
         self,
         Ys: Sequence[Complex],
         manifold: Manifold,
-        predictions: Sequence[Prediction | None],
-    ) -> list[Fit]:
+        predictions: Sequence[ComponentPrior | None],
+    ) -> list[ComponentPosterior]:
         """Fit independent snapshots of one array."""

@@ -10,13 +10,13 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.manifolds.manifold import Manifold, Reference
-from arrivals.measurement_models.observed import Heard, updated
+from arrivals.measurement_models.observed import ObservedSnapshots, updated
 from arrivals.motion_models.bernoulli_von_mises import BernoulliVonMises
 from arrivals.motion_models.bessel import bessel_ratio, bessel_ratios
 from arrivals.trackers.direction_tracker import padded
 from arrivals.trackers.estimates import DirectionEstimate
 from arrivals.trackers.registry import register
-from arrivals.trackers.svalse.components import Engine, Fit, Prediction
+from arrivals.trackers.svalse.components import ComponentPosterior, ComponentPrior, Solver
 from arrivals.trackers.svalse.coordinate.solver import PosteriorName
 from arrivals.trackers.svalse.valse import VALSE, EngineName, circular_std, described, reported
 from arrivals.typing import Bool, Complex, Float, Int
@@ -157,7 +157,7 @@ class SVALSE(VALSE):
         self._carry_densities(None, none.astype(np.int64))
 
     @property
-    def solver(self) -> Engine:
+    def solver(self) -> Solver:
         """What maximises the ELBO, with this tracker's settings."""
         single = self.measurement.is_single
         snr_db = 20.0 if self.snr_db is None and single else self.snr_db
@@ -203,9 +203,11 @@ class SVALSE(VALSE):
             self.nuisance = drifted(self.nuisance)
 
     def _expect(self) -> None:
-        self._show(self._expected(self.measurement.manifold(self.reference)))
+        self.report(**vars(self._expected(self.measurement.manifold(self.reference))))
 
-    def _absorb(self, manifold: Manifold, fit: Fit, heard: Heard) -> None:
+    def _absorb(
+        self, manifold: Manifold, fit: ComponentPosterior, heard: ObservedSnapshots
+    ) -> None:
         """Take in a fit: report and label what is active, carry what is to be remembered."""
         label = np.full(len(fit.theta), -1)
         label[: self.carried.sum()] = self.label[self.carried][: len(label)]
@@ -213,7 +215,7 @@ class SVALSE(VALSE):
         fresh = found & (label < 0)
         label[fresh] = self.n_labels + np.arange(fresh.sum())
         self.n_labels += int(fresh.sum())
-        self._show(described(manifold, fit, found, label[found]))
+        self.report(**vars(described(manifold, fit, found, label[found])))
         order = np.concatenate([np.flatnonzero(fit.age == 0), np.flatnonzero(fit.age > 0)])
         self._carry(
             fit.theta[order], fit.kappa[order], fit.active[order], label[order], fit.age[order]
@@ -222,7 +224,7 @@ class SVALSE(VALSE):
         self.expected_snr_db = fit.snr_db
         self.bin_noise = updated(self.bin_noise, heard.bins, fit.bin_noise)
 
-    def _looks(self, z: ArrayLike | None) -> tuple[Complex, Heard] | None:
+    def _looks(self, z: ArrayLike | None) -> tuple[Complex, ObservedSnapshots] | None:
         """Return the data, or None also if fewer sensors gave a number than the tracks need."""
         looks = super()._looks(z)
         expected = (self.carried & (self.age == 0) & (self.existence >= 0.5)).sum()
@@ -233,9 +235,9 @@ class SVALSE(VALSE):
         """Which places hold a carried component, (L,)."""
         return ~np.isnan(self.mu)
 
-    def _prediction(self, heard: Heard | None = None) -> Prediction:
+    def _prediction(self, heard: ObservedSnapshots | None = None) -> ComponentPrior:
         on = self.carried
-        return Prediction(
+        return ComponentPrior(
             self.mu[on],
             self.kappa[on],
             self.existence[on],
@@ -257,7 +259,7 @@ class SVALSE(VALSE):
         self.label = padded(label, n, -1).astype(np.int64)
         self.age = padded(age, n, 0).astype(np.int64)
 
-    def _carry_densities(self, fit: Fit | None, order: Int) -> None:
+    def _carry_densities(self, fit: ComponentPosterior | None, order: Int) -> None:
         """Keep the whole densities of the carried components, and those of the second unknown."""
         weights = self.measurement.manifold(self.reference).nuisance_weights
         self.nuisance = np.tile(weights, (self.n_slots, 1))

@@ -10,14 +10,14 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.manifolds.manifold import Manifold, Reference
-from arrivals.measurement_models.observed import Heard, check_directions, updated
-from arrivals.trackers.base import missed
-from arrivals.trackers.direction_tracker import SideBySide
+from arrivals.measurement_models.observed import ObservedSnapshots, check_directions, updated
+from arrivals.trackers.base import is_missing
+from arrivals.trackers.direction_tracker import BatchDirectionTracker
 from arrivals.trackers.estimates import DirectionEstimate
 from arrivals.trackers.registry import register
-from arrivals.trackers.svalse.components import Engine, Fit, Prediction
-from arrivals.trackers.svalse.coordinate.solver import CoordinateAscent, PosteriorName
-from arrivals.trackers.svalse.newton.solver import JointNewton
+from arrivals.trackers.svalse.components import ComponentPosterior, ComponentPrior, Solver
+from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver, PosteriorName
+from arrivals.trackers.svalse.newton.solver import NewtonSolver
 from arrivals.typing import Bool, Complex, Float, Int
 from arrivals.validation import count, instance, not_negative, one_of, positive, probability
 
@@ -25,7 +25,7 @@ EngineName = Literal["fast", "coordinate"]
 
 
 @register("valse")
-class VALSE(SideBySide):
+class VALSE(BatchDirectionTracker):
     """Variational Bayesian line spectral estimation: every snapshot on its own.
 
     Parameters
@@ -133,14 +133,14 @@ class VALSE(SideBySide):
         self.merge = not_negative("merge", merge)
         check_directions(measurement, self.reference, mixture=self.posterior == "mixture")
         self.bin_noise = np.full(measurement.n_bins, np.nan)
-        self._nothing()
+        self.reset()
 
     @property
-    def solver(self) -> Engine:
+    def solver(self) -> Solver:
         """What maximises the ELBO, with this tracker's settings."""
         return self._solver(snr_db=None, descending=True)
 
-    def _solver(self, snr_db: float | None, *, descending: bool, n_moments: int = 0) -> Engine:
+    def _solver(self, snr_db: float | None, *, descending: bool, n_moments: int = 0) -> Solver:
         settings: dict[str, Any] = {
             "max_iterations": self.max_iterations,
             "merge": self.merge,
@@ -153,8 +153,8 @@ class VALSE(SideBySide):
         if self.tolerance is not None:
             settings["tolerance"] = self.tolerance
         if self.is_fast and n_moments == 0:
-            return JointNewton(kl=self.kl, **settings)
-        return CoordinateAscent(
+            return NewtonSolver(kl=self.kl, **settings)
+        return CoordinateSolver(
             self.posterior, descending=descending, n_moments=n_moments, **settings
         )
 
@@ -185,10 +185,10 @@ class VALSE(SideBySide):
             fit = self.solver.fit(Y, manifold, self._prediction(heard))
             self._absorb(manifold, fit, heard)
 
-    def _together(self, trackers: Sequence[Self], step: Sequence[Any], dt: float) -> None:
+    def step_batch(self, trackers: Sequence[Self], step: Sequence[Any], dt: float) -> None:
         """Predict and update copies of this tracker, those with the same sensors in one call."""
         self._move(trackers, dt)
-        groups: dict[bytes, list[tuple[Self, Complex, Heard]]] = {}
+        groups: dict[bytes, list[tuple[Self, Complex, ObservedSnapshots]]] = {}
         for tracker, z in zip(trackers, step, strict=True):
             looks = tracker._looks(z)
             if looks is None:
@@ -211,42 +211,43 @@ class VALSE(SideBySide):
 
     def _expect(self) -> None:
         """Show what is expected before a measurement: nothing."""
-        self._nothing()
+        self.reset()
 
-    def _looks(self, z: ArrayLike | None) -> tuple[Complex, Heard] | None:
+    def _looks(self, z: ArrayLike | None) -> tuple[Complex, ObservedSnapshots] | None:
         """Return the looks without gaps, and which these are; None for a missed measurement."""
-        if missed(z):
+        if is_missing(z):
             return None
         Y = self.measurement.looks(np.asarray(z))
-        heard = Heard.of(Y)
+        heard = ObservedSnapshots.of(Y)
         return heard.block(Y), heard
 
-    def _manifold(self, heard: Heard) -> Manifold:
+    def _manifold(self, heard: ObservedSnapshots) -> Manifold:
         """Return the manifold of the bins and sensors that gave a number."""
         manifold = self.measurement.manifold(self.reference).only(np.flatnonzero(heard.bins))
         return manifold.without(np.flatnonzero(~heard.sensors))
 
-    def _prediction(self, heard: Heard | None = None) -> Prediction | None:
+    def _prediction(self, heard: ObservedSnapshots | None = None) -> ComponentPrior | None:
         """Return what is known before the snapshot: nothing."""
         return None
 
-    def _absorb(self, manifold: Manifold, fit: Fit, heard: Heard) -> None:
+    def _absorb(
+        self, manifold: Manifold, fit: ComponentPosterior, heard: ObservedSnapshots
+    ) -> None:
         """Take in a fit."""
         self.bin_noise = updated(self.bin_noise, heard.bins, fit.bin_noise)
         found = reported(manifold, fit)
-        self._show(described(manifold, fit, found, np.full(found.sum(), -1)))
-
-    def _nothing(self) -> None:
-        self._show(DirectionEstimate.nothing())
+        self.report(**vars(described(manifold, fit, found, np.full(found.sum(), -1))))
 
 
-def reported(manifold: Manifold, fit: Fit) -> Bool:
+def reported(manifold: Manifold, fit: ComponentPosterior) -> Bool:
     """Tell which components are active and belong, within three std, to a real direction."""
     doa = manifold.to_doa(fit.theta, slack=3 * circular_std(fit.resultant))
     return np.asarray(fit.active & ~np.isnan(doa))
 
 
-def described(manifold: Manifold, fit: Fit, found: Bool, label: Int) -> DirectionEstimate:
+def described(
+    manifold: Manifold, fit: ComponentPosterior, found: Bool, label: Int
+) -> DirectionEstimate:
     """Return the found components of a fit as directions."""
     theta, std = fit.theta[found], circular_std(fit.resultant[found])
     return DirectionEstimate(

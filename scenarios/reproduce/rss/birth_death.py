@@ -9,7 +9,7 @@ import numpy as np
 from arrivals.scenarios.metrics.gospa import Gospa, mean_gospa
 from arrivals.scenarios.simulations.signal_strength import RSSTrial
 from arrivals.trackers import RSSVB
-from arrivals.trackers.rss.belief import Sources
+from arrivals.trackers.rss.belief import SourceBeliefs
 from arrivals.typing import Bool, Float
 
 CUT_OFF = 10.0  # m: what is farther away is missed, and false
@@ -67,8 +67,8 @@ def told_the_truth(trial: RSSTrial, start_std: float = 5.0, **params: Any) -> Fl
 
 
 def _told(
-    trial: RSSTrial, step: int, held: Sources | None, before: Bool, start_std: float
-) -> Sources:
+    trial: RSSTrial, step: int, held: SourceBeliefs | None, before: Bool, start_std: float
+) -> SourceBeliefs:
     """Return the beliefs in the sources that are on, in their order."""
     on = np.flatnonzero(np.isfinite(trial.truth[step, :, 0]))
     own = np.cumsum(before) - 1  # where each source of the last step stands in `held`
@@ -81,12 +81,12 @@ def _told(
             continue
         x = np.zeros(4)
         x[::2] = trial.truth[step, j]
-        beliefs.append(Sources(x, P0, np.float64(trial.mu0), np.float64(trial.v0)))  # type: ignore[arg-type]  # stacked below
+        beliefs.append(SourceBeliefs(x, P0, np.float64(trial.mu0), np.float64(trial.v0)))  # type: ignore[arg-type]  # stacked below
     if not beliefs:
-        return Sources(np.zeros((0, 4)), np.zeros((0, 4, 4)), np.zeros(0), np.zeros(0))
-    return Sources(*(np.stack(parts) for parts in zip(*beliefs, strict=True)))
+        return SourceBeliefs(np.zeros((0, 4)), np.zeros((0, 4, 4)), np.zeros(0), np.zeros(0))
+    return SourceBeliefs(*(np.stack(parts) for parts in zip(*beliefs, strict=True)))
 
 
-def _tracker(trial: RSSTrial, sources: Sources, params: dict[str, Any]) -> RSSVB:
+def _tracker(trial: RSSTrial, sources: SourceBeliefs, params: dict[str, Any]) -> RSSVB:
     told = {"x0": sources.x, "P0": sources.P, "mu0": sources.u, "v0": sources.v}
     return RSSVB(trial.motion, trial.measurement, **told | params)

@@ -12,9 +12,9 @@ from arrivals.motion_models import ConstantVelocity
 from arrivals.recordings.network_calibration import Calibration
 from arrivals.recordings.networks import Network
 from arrivals.trackers import RSSVB
-from arrivals.trackers.rss.inference.joint_posterior import Prior, Problem
+from arrivals.trackers.rss.inference.joint_posterior import JointPosterior, Prior
 from arrivals.trackers.rss.inference.map_search import maximum
-from arrivals.trackers.rss.inference.variational import Cycling, solve
+from arrivals.trackers.rss.inference.variational import VariationalSettings, solve
 from arrivals.typing import Float
 
 FLOOR_DB = -97.0  # on which quiet sensors of the shared data sit
@@ -22,7 +22,7 @@ GAP = 120.0  # s, after which a track begins anew
 POWER_STD = 3 * np.log(10) / 20  # Np
 
 
-class Seen(NamedTuple):
+class FramedReadings(NamedTuple):
     """One step of a network: the model with the sensors in place, the readings, and the time."""
 
     step: int
@@ -33,27 +33,29 @@ class Seen(NamedTuple):
 
 def steps_of(
     network: Network, calibration: Calibration, position: tuple[int, int] = (0, 2)
-) -> Iterator[Seen]:
+) -> Iterator[FramedReadings]:
     """Give the steps of a network as a tracker sees them."""
     model = calibration.model(
         np.zeros((len(network.name), 2)), floor_db=FLOOR_DB, position=position
     )
     for step in range(len(network)):
-        yield Seen(step, *network.heard(step, model), float(network.time[step]))
+        yield FramedReadings(step, *network.heard(step, model), float(network.time[step]))
 
 
-def strongest(seen: Seen) -> Float:
+def strongest(seen: FramedReadings) -> Float:
     """Return the place of the sensor that hears most, its offset taken off, (2,)."""
     level = np.where(np.isnan(seen.z), -np.inf, seen.z - seen.model.offsets)
     return np.asarray(seen.model.sensors[level.argmax()])
 
 
-def centre(seen: Seen) -> Float:
+def centre(seen: FramedReadings) -> Float:
     """Return the middle of the sensors that are heard, (2,)."""
     return np.asarray(seen.model.sensors[~np.isnan(seen.z)].mean(axis=0))
 
 
-def snapshot(seen: Seen, calibration: Calibration, theta: Float, method: str = "vb") -> Float:
+def snapshot(
+    seen: FramedReadings, calibration: Calibration, theta: Float, method: str = "vb"
+) -> Float:
     """Locate transmitters from one step's readings alone.
 
     Parameters
@@ -81,11 +83,11 @@ def snapshot(seen: Seen, calibration: Calibration, theta: Float, method: str = "
         np.tile(np.eye(2) / spread**2, (K, 1, 1)),
     )
     xi = np.where(heard, seen.model.readings(seen.z), 0.0)
-    problem = Problem(seen.model.field, xi, heard / seen.model.variance, prior)
+    problem = JointPosterior(seen.model.field, xi, heard / seen.model.variance, prior)
     if method == "lm":
         return maximum(problem, prior.mu, theta).theta
     batch = problem._replace(xi=xi[None], W=problem.W[None], prior=prior.take(None))
-    how = Cycling(max_cycles=60, tol_theta=1.0)
+    how = VariationalSettings(max_cycles=60, tol_theta=1.0)
     return np.asarray(solve(batch, prior.mu[None], theta[None], how).theta[0])
 
 
@@ -134,7 +136,7 @@ def track_transmitter(
 
 
 def _started(
-    seen: Seen, calibration: Calibration, q: float, tau: float, params: dict[str, Any]
+    seen: FramedReadings, calibration: Calibration, q: float, tau: float, params: dict[str, Any]
 ) -> RSSVB:
     """Return a tracker that starts near the strongest sensor, at rest."""
     x, y = strongest(seen) + seen.model.r_min

@@ -26,7 +26,7 @@ from arrivals.scenarios.reproduce.rss.trials import (
 from arrivals.scenarios.reproduce.studies import Report
 from arrivals.scenarios.simulations.signal_strength import FixedSources, Table1K3, Table1K7
 from arrivals.trackers.rss.inference.map_search import maximum
-from arrivals.trackers.rss.inference.variational import Cycling, solve
+from arrivals.trackers.rss.inference.variational import VariationalSettings, solve
 from arrivals.typing import Float
 
 if TYPE_CHECKING:
@@ -155,7 +155,7 @@ def _problem(K: int) -> Draws:
 def _cycle_ms(K: int) -> float:
     """Return the processor time of one VB cycle of K sources, ms."""
     problem = _problem(K).problem
-    how = Cycling(max_cycles=4, tol_u=0.0, tol_theta=1e-6)
+    how = VariationalSettings(max_cycles=4, tol_u=0.0, tol_theta=1e-6)
     return _least_ms(lambda: solve(problem, problem.prior.mu, problem.prior.theta, how)) / 4
 
 
@@ -178,7 +178,7 @@ def _least_ms(work: Any) -> float:
 
 def _early(trials: Draws) -> float:
     """Return the share of trials whose 10 cycles lead to where 60 do."""
-    how = Cycling(tol_u=0.0, tol_theta=1e-6)
+    how = VariationalSettings(tol_u=0.0, tol_theta=1e-6)
     problem = trials.problem
     few, many = (
         solve(problem, problem.prior.mu, problem.prior.theta, replace(how, max_cycles=n))

@@ -10,12 +10,21 @@ from typing import NamedTuple
 import numpy as np
 
 from arrivals.measurement_models.signal_strength.envelope import sample_log_envelope
-from arrivals.measurement_models.signal_strength.path_loss import Field
+from arrivals.measurement_models.signal_strength.path_loss import PropagationModel
 from arrivals.scenarios.simulations.signal_strength import FixedSources, in_disc
-from arrivals.trackers.rss.inference.joint_posterior import Marginals, Prior, Problem, marginals
+from arrivals.trackers.rss.inference.joint_posterior import (
+    JointPosterior,
+    Marginals,
+    Prior,
+    marginals,
+)
 from arrivals.trackers.rss.inference.map_search import Method, maximum
-from arrivals.trackers.rss.inference.variational import Cycling, Solution, solve
-from arrivals.trackers.rss.model_order.grid_search import Newcomers
+from arrivals.trackers.rss.inference.variational import (
+    VariationalIterate,
+    VariationalSettings,
+    solve,
+)
+from arrivals.trackers.rss.model_order.grid_search import NewSourcePrior
 from arrivals.trackers.rss.model_order.model_selection import grown, refined
 from arrivals.typing import Float
 from arrivals.validation import one_of
@@ -32,7 +41,7 @@ class Draws(NamedTuple):
         The truth.
     """
 
-    problem: Problem
+    problem: JointPosterior
     u: Float
     theta: Float
 
@@ -51,7 +60,7 @@ class Answers(NamedTuple):
     u: Float
     theta: Float
     seconds: float
-    solution: Solution | None = None
+    solution: VariationalIterate | None = None
 
 
 def draws(scenario: FixedSources, runs: int, seed: int) -> Draws:
@@ -69,7 +78,7 @@ def draws(scenario: FixedSources, runs: int, seed: int) -> Draws:
     u = scenario.mu0 + np.sqrt(scenario.v0) * rng.standard_normal((runs, K))
     theta = np.tile(scenario.positions(rng)[0], (runs, 1, 1))
     model = scenario.measurement(sensors[0])
-    field: Field = model.field._replace(sensors=sensors)
+    field: PropagationModel = model.field._replace(sensors=sensors)
     noise = sample_log_envelope(scenario.n_snapshots, (runs, M), rng)
     xi = field.levels(u, theta).log_sigma + noise
     prior = Prior(
@@ -78,19 +87,21 @@ def draws(scenario: FixedSources, runs: int, seed: int) -> Draws:
         scenario.starts(theta, rng),
         np.tile(np.eye(2) / scenario.prior_std**2, (runs, K, 1, 1)),
     )
-    return Draws(Problem(field, xi, np.tile(1 / model.variance, (runs, 1)), prior), u, theta)
+    return Draws(JointPosterior(field, xi, np.tile(1 / model.variance, (runs, 1)), prior), u, theta)
 
 
-def one_of_batch(problem: Problem, b: int) -> Problem:
+def one_of_batch(problem: JointPosterior, b: int) -> JointPosterior:
     """Return one of a batch of problems, without a batch axis."""
-    return Problem(problem.field.take(b), problem.xi[b], problem.W[b], problem.prior.take(b))
+    return JointPosterior(problem.field.take(b), problem.xi[b], problem.W[b], problem.prior.take(b))
 
 
-CYCLING: dict[str, Cycling] = {
-    "vb_literal": Cycling(sweep="jacobi", refresh="literal", tol_u=0.0, tol_theta=1e-6),
-    "vb_jacobi": Cycling(sweep="jacobi", damping=0.5, guard=False, tol_u=0.0, tol_theta=1e-6),
-    "vb_undamped": Cycling(sweep="jacobi", guard=False, tol_u=0.0, tol_theta=1e-6),
-    "vb": Cycling(),
+CYCLING: dict[str, VariationalSettings] = {
+    "vb_literal": VariationalSettings(sweep="jacobi", refresh="literal", tol_u=0.0, tol_theta=1e-6),
+    "vb_jacobi": VariationalSettings(
+        sweep="jacobi", damping=0.5, guard=False, tol_u=0.0, tol_theta=1e-6
+    ),
+    "vb_undamped": VariationalSettings(sweep="jacobi", guard=False, tol_u=0.0, tol_theta=1e-6),
+    "vb": VariationalSettings(),
 }
 
 
@@ -113,15 +124,15 @@ def answers(trials: Draws, method: str, cycles: int | None = None) -> Answers:
     return found._replace(seconds=(time.process_time() - started) / len(trials.u))
 
 
-def _cycled(name: str, problem: Problem, cycles: int | None) -> Answers:
+def _cycled(name: str, problem: JointPosterior, cycles: int | None) -> Answers:
     how = CYCLING[name]
     if cycles is not None:
-        how = Cycling(**vars(how) | {"max_cycles": cycles})
+        how = VariationalSettings(**vars(how) | {"max_cycles": cycles})
     found = solve(problem, problem.prior.mu, problem.prior.theta, how)
     return Answers(found.u, found.theta, 0.0, found)
 
 
-def _searched(name: Method, problem: Problem, cycles: int | None) -> Answers:
+def _searched(name: Method, problem: JointPosterior, cycles: int | None) -> Answers:
     each = []
     for b in range(len(problem.xi)):
         one = one_of_batch(problem, b)
@@ -129,18 +140,18 @@ def _searched(name: Method, problem: Problem, cycles: int | None) -> Answers:
     return Answers(np.array([m.u for m in each]), np.array([m.theta for m in each]), 0.0)
 
 
-def _started(problem: Problem, cycles: int | None) -> Answers:
+def _started(problem: JointPosterior, cycles: int | None) -> Answers:
     each = []
     for b in range(len(problem.xi)):
         one = one_of_batch(problem, b)
         mu, w = float(one.prior.mu[0]), float(one.prior.w[0])
-        new = Newcomers.among(one.field.sensors, mu, 1 / w)
+        new = NewSourcePrior.among(one.field.sensors, mu, 1 / w)
         K = len(one.prior.mu)
         each.append(refined(grown(one.field, one.xi, one.W, new, K)[K], new))
     return Answers(np.array([fit.u for fit in each]), np.array([fit.theta for fit in each]), 0.0)
 
 
-METHODS: dict[str, Callable[[Problem, int | None], Answers]] = {
+METHODS: dict[str, Callable[[JointPosterior, int | None], Answers]] = {
     **{name: partial(_cycled, name) for name in CYCLING},
     "lm": partial(_searched, "lm"),
     "bfgs": partial(_searched, "bfgs"),

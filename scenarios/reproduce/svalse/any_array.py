@@ -31,7 +31,7 @@ NAMES = {"svalse": "SVALSE", "valse": "VALSE", "cbf": "beamformer",
 
 
 @dataclass(frozen=True)
-class Case:
+class ArrayExperiment:
     """One row: a scene and its numbers, a tracker and its settings, the prototype's GOSPA."""
 
     scene: str
@@ -42,7 +42,7 @@ class Case:
     params: dict[str, Any] = field(default_factory=dict)
 
 
-def _of_circle() -> list[Case]:
+def _of_circle() -> list[ArrayExperiment]:
     figures = {
         ("1 snapshot", 20.0): ({}, 6.7, 12.6, 18.5),
         ("1 snapshot", 10.0): ({}, 14.0, 18.2, 19.4),
@@ -57,11 +57,15 @@ def _of_circle() -> list[Case]:
         figures_of_all = (*prototype, np.nan)
         for method, figure, params in zip(NAMES, figures_of_all, settings, strict=True):
             told = f"circle, {looks}, {snr_db:g} dB"
-            cases.append(Case("circle", told, {"snr_db": snr_db} | numbers, method, figure, params))
+            cases.append(
+                ArrayExperiment(
+                    "circle", told, {"snr_db": snr_db} | numbers, method, figure, params
+                )
+            )
     return cases
 
 
-def _of_sparse_line() -> list[Case]:
+def _of_sparse_line() -> list[ArrayExperiment]:
     hop = {"n_bins": 10, "hopping": True}
     figures: list[tuple[str, dict[str, Any], dict[str, Any], float, float]] = [
         ("1 bin", {}, {}, 8.32, 13.83),
@@ -75,9 +79,13 @@ def _of_sparse_line() -> list[Case]:
         for n in (1, 2):
             scene = f"sparse line, {n} source{'s' * (n > 1)}, {told}"
             of_scene = {"n_sources": n} | numbers
-            cases.append(Case("grating", scene, of_scene, "svalse", figure[n - 1], params))
+            cases.append(
+                ArrayExperiment("grating", scene, of_scene, "svalse", figure[n - 1], params)
+            )
             if not params:
-                cases.append(Case("grating", scene, of_scene, "peaks_gnn", np.nan, STRICT))
+                cases.append(
+                    ArrayExperiment("grating", scene, of_scene, "peaks_gnn", np.nan, STRICT)
+                )
     return cases
 
 
@@ -137,7 +145,7 @@ def _claims(gospa: Float) -> list[str]:
     return lines
 
 
-def _scored(case: Case, seed: int) -> tuple[float, float, float, float]:
+def _scored(case: ArrayExperiment, seed: int) -> tuple[float, float, float, float]:
     trial = create(case.scene, **case.numbers).sample(np.random.default_rng(seed))
     g = _gospa(trial, _run(trial, case.method, case.params))
     return g.total, g.distance, g.missed, g.false

@@ -15,7 +15,7 @@ from arrivals.measurement_models import LogNormalRSS, db_to_neper
 from arrivals.motion_models import ConstantVelocity
 from arrivals.recordings.networks import Network, read_network
 from arrivals.trackers import RSSML, RSSVB, PositionEstimate, find
-from arrivals.trackers.run import Recorder, Run, header, text
+from arrivals.trackers.run import Run, RunRecorder, header, text
 from arrivals.typing import Float
 from arrivals.validation import one_of
 
@@ -119,7 +119,7 @@ def _followed(
     tracker: RSSVB | RSSML, network: Network, model: LogNormalRSS, bar: Callable[..., Any]
 ) -> Run:
     """Return the run of a tracker over the steps of a network, whose sensors may move."""
-    recorder = Recorder(PositionEstimate)
+    recorder = RunRecorder(PositionEstimate)
     before = float(network.time[0])
     for step in bar(range(len(network)), desc="locate"):
         now = float(network.time[step])

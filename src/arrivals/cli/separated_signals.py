@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from arrivals.files import atomic_write
 from arrivals.measurement_models import ArraySnapshot
 from arrivals.motion_models import AutoregressiveSources, yule_walker
 from arrivals.trackers import ARKalmanQRDRLS, Run
-from arrivals.trackers.run import replacing
 from arrivals.typing import Complex
 from arrivals.validation import count, positive
 
@@ -201,7 +201,7 @@ def write_signals(
 
     values = np.asarray(signals)
     check_writable(os.fspath(path), values.dtype.kind != "c", rate)
-    with replacing(path, binary=True) as file:
+    with atomic_write(path, binary=True) as file:
         if Path(path).suffix.lower() == ".npy" or rate is None:
             np.save(file, values)
         else:

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any, TextIO, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
+from arrivals.files import atomic_write
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.trackers.beamforming.cbf import beam_power, look_directions, looks_power
-from arrivals.trackers.run import Run, replacing
+from arrivals.trackers.run import Run
 from arrivals.typing import Bool, Float, Int
 from arrivals.validation import one_of, positive, shaped
 
@@ -268,7 +269,7 @@ def save(ax: Axes, path: str | PathLike[str], *, dpi: float = 150.0) -> None:
     ValueError: the suffix of a picture must be one of '.png', '.pdf', '.svg', '.jpg'; got '.sketch'
     """
     kind = picture_format(path)
-    with replacing(path) as file:
+    with atomic_write(path) as file:
         cast("Figure", ax.figure).savefig(cast(TextIO, file).buffer, format=kind, dpi=dpi)
 
 

@@ -18,7 +18,7 @@ MOST_BINS = 16
 
 
 @dataclass(frozen=True, eq=False)
-class Looks:
+class Framing:
     """What was heard in each step.
 
     Parameters
@@ -41,7 +41,7 @@ def looks(
     hop: int | None = None,
     n_snapshots: int = 1,
     stride: int | None = None,
-) -> Looks:
+) -> Framing:
     """Return the snapshots of a recording at several frequencies, so many windows a step.
 
     Parameters
@@ -83,7 +83,7 @@ def looks(
         raise ValueError(f"the recording has {len(values)} snapshots; one step takes {n}")
     rows = every * np.arange(n_steps)[:, None] + np.arange(n)
     steps = np.swapaxes(values[rows], 1, 2)  # (n_steps, n_bins, n_snapshots, n_channels)
-    return Looks(_squeezed(steps), np.asarray(found[0].time[rows].mean(axis=1)))
+    return Framing(_squeezed(steps), np.asarray(found[0].time[rows].mean(axis=1)))
 
 
 def _in_band(frequencies: Sequence[float], rate: float) -> None:

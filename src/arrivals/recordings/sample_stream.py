@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models import ArraySamples, FlatBand, SensorArray
 from arrivals.trackers import Run, Tracker
-from arrivals.trackers.run import Recorder
+from arrivals.trackers.run import RunRecorder
 from arrivals.typing import Float
 from arrivals.validation import count, one_of, positive
 
@@ -73,7 +73,7 @@ def track_samples(
     >>> run.time
     array([0.38, 0.78, 1.18, 1.58, 1.98])
     """
-    recorder = Recorder(type(tracker.estimate))
+    recorder = RunRecorder(type(tracker.estimate))
     every = count("every", every)
     stream = iter(samples)
     while block := list(islice(stream, every)):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from arrivals.recordings.recording import default_window, narrowband
 from arrivals.trackers import Tracker
-from arrivals.trackers.base import missed
+from arrivals.trackers.base import is_missing
 from arrivals.trackers.run import header, text
 from arrivals.typing import Complex
 from arrivals.validation import count, one_of, positive
@@ -175,7 +175,7 @@ def track_live(
         if n_steps % every:
             continue
         estimate = tracker.estimate
-        rows: list[tuple[Any, ...]] = [] if begun or missed(z) else [header(type(estimate))]
+        rows: list[tuple[Any, ...]] = [] if begun or is_missing(z) else [header(type(estimate))]
         rows += [(n_steps // every - 1, time, *row) for row in estimate.rows()]
         if rows:
             begun = True

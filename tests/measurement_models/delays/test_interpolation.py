@@ -19,7 +19,13 @@ from arrivals.measurement_models import (
 )
 from arrivals.measurement_models.delays.delay_line import SourceAtCentre
 from arrivals.measurement_models.delays.interpolation import window
-from arrivals.motion_models import ConstantVelocity, DelayDrift, DelayWalk, LinearMotion, Stacked
+from arrivals.motion_models import (
+    CombinedMotion,
+    ConstantVelocity,
+    DelayDrift,
+    DelayWalk,
+    LinearMotion,
+)
 from arrivals.scenarios.bounds.delay import band_bound, exact_bound, tone_bound
 from arrivals.scenarios.reproduce.interpolation.figures import SOURCES
 
@@ -188,7 +194,7 @@ def test_delays_move_as_the_linear_models_they_are() -> None:
     x = np.array([1.0, 0.1])
     np.testing.assert_array_equal(DelayDrift(0.3).f(x), ConstantVelocity(0.3, 1).f(x))
     assert DelayWalk(0.3).dim_x == 1
-    both = Stacked(DelayDrift(0.3), LinearMotion([[0.5]], [[1.0]]))
+    both = CombinedMotion(DelayDrift(0.3), LinearMotion([[0.5]], [[1.0]]))
     np.testing.assert_allclose(both.f([1.0, 0.1, 4.0]), [1.1, 0.1, 2.0])
     np.testing.assert_allclose(both.F(np.zeros(3)) @ [1.0, 0.1, 4.0], both.f([1.0, 0.1, 4.0]))
 

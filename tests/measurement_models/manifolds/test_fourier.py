@@ -14,8 +14,8 @@ from arrivals.measurement_models import (
     ArraySnapshot,
     ElementResponse,
     FourierManifold,
-    GridLine,
     SensorArray,
+    UniformLineManifold,
 )
 from arrivals.measurement_models.arrays.plane_waves import PlaneWaves
 from arrivals.measurement_models.manifolds.fourier import fourier_manifold
@@ -145,7 +145,7 @@ def test_a_line_s_angle_folds_to_the_front() -> None:
 def test_only_a_grid_within_half_of_one_wavelength_has_an_electrical_angle(
     model: ArraySnapshot, fast: bool
 ) -> None:
-    assert isinstance(model.manifold(), GridLine) is fast
+    assert isinstance(model.manifold(), UniformLineManifold) is fast
 
 
 # the elements

@@ -59,7 +59,8 @@ def called(script: str, killed: Path | None, *arguments: str) -> subprocess.Comp
 
 
 COMMAND = (
-    "import sys; from arrivals.scenarios.reproduce import studies as reproduce; from arrivals.__main__ import main\n"
+    "import sys; from arrivals.__main__ import main\n"
+    "from arrivals.scenarios.reproduce import studies as reproduce\n"
     "reproduce.STUDIES['killed'] = 'test_workers:study'; sys.exit(main(sys.argv[1:]))"
 )
 

@@ -14,8 +14,8 @@ import pytest
 from arrivals.measurement_models import ArraySnapshot, Manifold, SensorArray
 from arrivals.motion_models import BernoulliVonMises
 from arrivals.trackers import SBL, SSBL, SVALSE
-from arrivals.trackers.svalse.components import Prediction
-from arrivals.trackers.svalse.coordinate.solver import Ascent, CoordinateAscent
+from arrivals.trackers.svalse.components import ComponentPrior
+from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver, SingleSnapshotAscent
 from arrivals.typing import Complex, Float, Int
 
 FOLDER = os.environ.get("ARRIVALS_DATA")
@@ -25,7 +25,7 @@ pytestmark = pytest.mark.skipif(FOLDER is None, reason="ARRIVALS_DATA does not n
 LINE = ArraySnapshot(SensorArray(-0.5 * np.arange(15.0)), wavelength=1.0)
 
 
-class PublishedAscent(Ascent):
+class PublishedAscent(SingleSnapshotAscent):
     """With the slip of the published program: columns of C by running number (section 10, 1)."""
 
     def covariances(self, on: Int) -> Complex:
@@ -35,15 +35,17 @@ class PublishedAscent(Ascent):
         return C
 
 
-class PublishedProgram(CoordinateAscent):
+class PublishedProgram(CoordinateSolver):
     """The published program: the paper's settings, and the slip."""
 
-    def step(self, y: Complex, manifold: Manifold, prediction: Prediction | None) -> Ascent:
+    def step(
+        self, y: Complex, manifold: Manifold, prediction: ComponentPrior | None
+    ) -> SingleSnapshotAscent:
         """Return the working state with the slip."""
         return PublishedAscent(self, y, manifold, prediction)
 
 
-def replayed(name: str, n_steps: int, engine: CoordinateAscent) -> tuple[Float, Int, Any]:
+def replayed(name: str, n_steps: int, engine: CoordinateSolver) -> tuple[Float, Int, Any]:
     """Largest deviation of each step, degrees, from its recorded carried components; iterations."""
     z = np.load(Path(FOLDER or "") / "svalse" / f"{name}.npz")
     manifold = LINE.manifold("first")
@@ -55,7 +57,7 @@ def replayed(name: str, n_steps: int, engine: CoordinateAscent) -> tuple[Float, 
             carried = ~np.isnan(mu)
             active = np.arange(carried.sum()) < z["svalse_K"][t - 1]
             widened = 1 / (1 / 148 + 1 / kappa[carried])  # (63), the large-κ limit
-            known = Prediction(-mu[carried], widened, np.where(active, 0.75, 0.1), 0.1)
+            known = ComponentPrior(-mu[carried], widened, np.where(active, 0.75, 0.1), 0.1)
         fit = engine.fit(z["y"].T[t][None, :, None], manifold, known)
         found = np.sort(np.rad2deg(manifold.to_doa(fit.theta[fit.active], slack=np.inf)))
         recorded = np.sort(z["svalse_doa_deg"][t][: z["svalse_K"][t]])
@@ -81,7 +83,7 @@ def test_heuristic_1_with_the_slip_follows_the_program(
     ("name", "n_steps", "shares"), [("fig4_001", 24, (0.70, 0.95)), ("fig6_001", 30, (0.83, 1.0))]
 )
 def test_heuristic_1_without_the_slip(name: str, n_steps: int, shares: tuple[float, float]) -> None:
-    engine = CoordinateAscent(posterior="mixture", tolerance=1e-6, max_iterations=5000)
+    engine = CoordinateSolver(posterior="mixture", tolerance=1e-6, max_iterations=5000)
     off, _, _ = replayed(name, n_steps, engine)
     assert (off < 0.01).mean() >= shares[0]
     assert (off < 0.5).mean() >= shares[1]
@@ -94,7 +96,7 @@ def test_heuristic_1_without_the_slip(name: str, n_steps: int, shares: tuple[flo
 def test_direct_quadrature(
     name: str, n_steps: int, shares: tuple[float, float], median: float
 ) -> None:
-    engine = CoordinateAscent(tolerance=1e-6, max_iterations=5000)
+    engine = CoordinateSolver(tolerance=1e-6, max_iterations=5000)
     off, _, _ = replayed(name, n_steps, engine)
     assert (off < 0.1).mean() >= shares[0]
     assert (off < 0.5).mean() >= shares[1]

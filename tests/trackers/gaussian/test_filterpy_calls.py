@@ -28,7 +28,7 @@ from arrivals.motion_models import (
     CoordinatedTurn,
     RandomWalk,
 )
-from arrivals.trackers import EKF, IMM, UKF, Kalman, KalmanType, Particle
+from arrivals.trackers import EKF, IMM, UKF, GaussianFilter, Kalman, Particle
 
 # D1
 
@@ -46,7 +46,7 @@ def test_d1_belief_may_be_assigned_between_any_two_calls(shape: tuple[int, ...])
 
 
 @pytest.mark.parametrize("kind", [Kalman, EKF, UKF])
-def test_d1_x_keeps_the_axes_it_is_given_later(kind: type[KalmanType]) -> None:
+def test_d1_x_keeps_the_axes_it_is_given_later(kind: type[GaussianFilter]) -> None:
     tracker = plain(kind=kind)
     tracker.x = X.reshape(4, 1)
     tracker.predict()
@@ -84,7 +84,7 @@ def test_d3_update_takes_every_shape_of_measurement() -> None:
 
 
 @pytest.mark.parametrize("kind", [Kalman, EKF, UKF])
-def test_d3_update_takes_r_and_h_for_once(kind: type[KalmanType]) -> None:
+def test_d3_update_takes_r_and_h_for_once(kind: type[GaussianFilter]) -> None:
     tracker, kf = plain(kind=kind), theirs()
     H = np.array([[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
     for R, once in ((2.0, None), (np.diag([1.0, 4.0]), None), (None, H), (0.5, H)):
@@ -147,7 +147,7 @@ NAMES = [
 @pytest.mark.parametrize("column", [False, True])
 @pytest.mark.parametrize("kind", [Kalman, EKF, UKF])
 def test_d5_attributes_have_their_final_shapes_from_the_start(
-    kind: type[KalmanType], column: bool
+    kind: type[GaussianFilter], column: bool
 ) -> None:
     tracker = kind(WALK, SEEN, X.reshape(4, 1) if column else X, P)
     shapes = {name: np.shape(getattr(tracker, name)) for name in NAMES}
@@ -178,7 +178,7 @@ def test_d5_nonlinear_filters_publish_the_present_jacobians() -> None:
 
 @pytest.mark.parametrize("column", [False, True])
 @pytest.mark.parametrize("kind", [Kalman, EKF, UKF])
-def test_d6_saver_makes_arrays(kind: type[KalmanType], column: bool) -> None:
+def test_d6_saver_makes_arrays(kind: type[GaussianFilter], column: bool) -> None:
     tracker = kind(WALK, SEEN, X.reshape(4, 1) if column else X, P)
     saver = Saver(tracker, save_current=True)
     for z in (*track(3), None, [1.0, np.nan]):
@@ -210,7 +210,7 @@ def test_d6_saver_takes_imm_and_particle() -> None:
 
 
 @pytest.mark.parametrize("kind", [Kalman, EKF, UKF])
-def test_d12_copies_and_pickles_go_on(kind: type[KalmanType]) -> None:
+def test_d12_copies_and_pickles_go_on(kind: type[GaussianFilter]) -> None:
     tracker = plain(kind=kind)
     tracker.run(track(3))
     three = (tracker, copy.deepcopy(tracker), pickle.loads(pickle.dumps(tracker)))

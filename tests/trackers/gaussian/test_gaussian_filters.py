@@ -18,12 +18,12 @@ from arrivals.motion_models import (
     RandomWalk,
     VonMisesWalk,
 )
-from arrivals.trackers import EKF, IMM, UKF, Kalman, KalmanType, as_filterpy, create
+from arrivals.trackers import EKF, IMM, UKF, GaussianFilter, Kalman, as_filterpy, create
 from arrivals.trackers.conformance import difference
 from arrivals.trackers.gaussian.equations import JITTER
 from arrivals.typing import Float
 
-KINDS: list[type[KalmanType]] = [Kalman, EKF, UKF]
+KINDS: list[type[GaussianFilter]] = [Kalman, EKF, UKF]
 every_kind = pytest.mark.parametrize("kind", KINDS)
 WALK = ConstantVelocity(q=0.3, n_dims=1)
 SEEN = LinearMeasurement([[1.0, 0.0], [1.0, 1.0]], [[0.5, 0.1], [0.1, 0.4]])
@@ -65,7 +65,7 @@ def joint(zs: Float, dts: Sequence[float]) -> tuple[Float, Float]:
 @every_kind
 @pytest.mark.parametrize("dts", [(1.0, 1.0, 1.0), (0.5, 2.0, 1.2)])
 def test_filter_and_smoother_are_the_joint_gaussian(
-    kind: type[KalmanType], dts: Sequence[float]
+    kind: type[GaussianFilter], dts: Sequence[float]
 ) -> None:
     tracker = kind(WALK, SEEN, X, P)
     xs, Ps, _, _ = tracker.batch_filter(ZS, dts=dts)
@@ -80,7 +80,7 @@ def test_filter_and_smoother_are_the_joint_gaussian(
 
 
 @every_kind
-def test_log_likelihoods_add_up_to_that_of_all_measurements(kind: type[KalmanType]) -> None:
+def test_log_likelihoods_add_up_to_that_of_all_measurements(kind: type[GaussianFilter]) -> None:
     tracker = kind(WALK, SEEN, X, P)
     total = 0.0
     for z in ZS:
@@ -102,7 +102,7 @@ def test_log_likelihoods_add_up_to_that_of_all_measurements(kind: type[KalmanTyp
 
 
 @every_kind
-def test_partly_missing_is_the_update_by_the_rest(kind: type[KalmanType]) -> None:
+def test_partly_missing_is_the_update_by_the_rest(kind: type[GaussianFilter]) -> None:
     tracker, other = kind(WALK, SEEN, X, P), kind(WALK, SEEN, X, P)
     tracker.update([np.nan, 0.3])
     other.update([0.3], R=SEEN.R[1:, 1:], H=SEEN.H()[1:])
@@ -115,7 +115,7 @@ def test_partly_missing_is_the_update_by_the_rest(kind: type[KalmanType]) -> Non
 
 
 @every_kind
-def test_two_looks_in_one_update_are_two_updates(kind: type[KalmanType]) -> None:
+def test_two_looks_in_one_update_are_two_updates(kind: type[GaussianFilter]) -> None:
     apart = LinearMeasurement(SEEN.H(), np.diag([0.5, 0.4]))
     both, each = kind(WALK, apart, X, P), kind(WALK, apart, X, P)
     both.update([0.1, 0.2])
@@ -146,7 +146,7 @@ def test_smoother_takes_the_control_into_account() -> None:
 
 @pytest.mark.parametrize("kind", [EKF, UKF])
 @given(turn=st.floats(-10, 10))
-def test_turning_all_angles_turns_the_answer(kind: type[KalmanType], turn: float) -> None:
+def test_turning_all_angles_turns_the_answer(kind: type[GaussianFilter], turn: float) -> None:
     def answer(turn: float) -> tuple[Float, Float, Float]:
         tracker = kind(VonMisesWalk(30.0), AngleSeen(), [0.3 + turn], [[0.2]])
         xs, Ps, _, _ = tracker.batch_filter(np.array([[0.5], [-0.2], [0.1]]) + turn)
@@ -378,7 +378,7 @@ BAD_CALLS: list[tuple[Any, type[Exception], str]] = [
 @every_kind
 @pytest.mark.parametrize(("call", "error", "message"), BAD_CALLS)
 def test_refused_calls_leave_everything(
-    kind: type[KalmanType], call: Any, error: type[Exception], message: str
+    kind: type[GaussianFilter], call: Any, error: type[Exception], message: str
 ) -> None:
     tracker = kind(WALK, SEEN, X, P)
     tracker.update([1.0, 1.0])
@@ -400,7 +400,7 @@ def test_refused_calls_leave_everything(
     ],
 )
 def test_bad_assigned_beliefs_are_refused_at_the_next_call(
-    kind: type[KalmanType], name: str, value: Any, message: str
+    kind: type[GaussianFilter], name: str, value: Any, message: str
 ) -> None:
     tracker = kind(WALK, SEEN, X, P)
     setattr(tracker, name, value)

@@ -15,10 +15,16 @@ from arrivals.scenarios.reproduce.rss.birth_death import (
 from arrivals.scenarios.simulations.moving_emitters import BirthsAndDeaths
 from arrivals.scenarios.simulations.signal_strength import in_disc
 from arrivals.trackers import RSSML, RSSVB
-from arrivals.trackers.rss.inference.joint_posterior import Prior, Problem
-from arrivals.trackers.rss.model_order.birth_death import SURE, Census
-from arrivals.trackers.rss.model_order.grid_search import Newcomers, scan
-from arrivals.trackers.rss.model_order.model_selection import Fit, best, grown, nothing, refined
+from arrivals.trackers.rss.inference.joint_posterior import JointPosterior, Prior
+from arrivals.trackers.rss.model_order.birth_death import SURE, TrackTable
+from arrivals.trackers.rss.model_order.grid_search import NewSourcePrior, scan
+from arrivals.trackers.rss.model_order.model_selection import (
+    Candidate,
+    best,
+    grown,
+    nothing,
+    refined,
+)
 from arrivals.typing import Float
 
 NOISE = float(db_to_neper(40.0))
@@ -37,10 +43,10 @@ U = db_to_neper([82.0, 79.0, 80.0])
 def test_evidence_is_the_integral() -> None:
     """One source, by quadrature over its three numbers."""
     heard = field(0, 6).replace(n_snapshots=400)
-    new = Newcomers(float(U[0]), V0, np.array([-45.0, 15.0]), 6.0, 2.0)
+    new = NewSourcePrior(float(U[0]), V0, np.array([-45.0, 15.0]), 6.0, 2.0)
     xi = heard.levels(U[:1], TRUTH[:1]).log_sigma
-    problem = Problem(heard.field, xi, 1 / heard.variance, new.prior(1))
-    fit = Fit(problem, U[:1], TRUTH[:1]).refitted()
+    problem = JointPosterior(heard.field, xi, 1 / heard.variance, new.prior(1))
+    fit = Candidate(problem, U[:1], TRUTH[:1]).refitted()
     J = problem.information(fit.levels)
     std = np.sqrt(np.diag(np.linalg.inv(J)))
     n, reach = 41, 6.0
@@ -55,7 +61,7 @@ def test_evidence_is_the_integral() -> None:
 
 def test_scan_finds_the_place_and_power_that_explain_most() -> None:
     heard = field(1)
-    new = Newcomers.among(heard.sensors, 9.2, V0)
+    new = NewSourcePrior.among(heard.sensors, 9.2, V0)
     xi = heard.levels(U[:1], TRUTH[:1]).log_sigma
     empty = nothing(heard.field, xi, 1 / heard.variance)
     u, place = scan(empty.problem, empty.levels.log_sigma, new)[0]
@@ -69,7 +75,7 @@ def test_missing_readings_do_not_count_in_a_scan() -> None:
     W = 1 / heard.variance.copy()
     W[::3] = 0.0
     spoilt = np.where(W > 0, xi, 0.0)
-    new = Newcomers.among(heard.sensors, 9.2, V0)
+    new = NewSourcePrior.among(heard.sensors, 9.2, V0)
     fit = grown(heard.field, spoilt, W, new, 1)[1]
     np.testing.assert_allclose(fit.theta, TRUTH[:1], atol=0.5)
 
@@ -80,7 +86,7 @@ def test_number_of_sources_is_found(K: int) -> None:
     for seed in range(6):
         heard = field(10 + seed)
         xi = heard.draw(U[:K], TRUTH[:K], np.random.default_rng(seed))
-        new = Newcomers.among(heard.sensors, 9.21, V0)
+        new = NewSourcePrior.among(heard.sensors, 9.21, V0)
         fit = best(grown(heard.field, xi, 1 / heard.variance, new, 5, patience=2), new)
         right += len(fit.u) == K
     assert right >= 5
@@ -89,11 +95,11 @@ def test_number_of_sources_is_found(K: int) -> None:
 def test_pruning_takes_a_needless_source_away() -> None:
     heard = field(3)
     xi = heard.levels(U, TRUTH).log_sigma
-    new = Newcomers.among(heard.sensors, 9.21, V0)
+    new = NewSourcePrior.among(heard.sensors, 9.21, V0)
     prior = Prior(*(np.concatenate([part, part[:1]]) for part in new.prior(3)))
     split = np.vstack([TRUTH, TRUTH[0] + 3.0])
     u = np.append(U, U[0]) - np.array([0.35, 0, 0, 0.35])
-    fit = Fit(Problem(heard.field, xi, 1 / heard.variance, prior), u, split).refitted()
+    fit = Candidate(JointPosterior(heard.field, xi, 1 / heard.variance, prior), u, split).refitted()
     found = best([fit], new)
     assert len(found.u) == 3
     assert refined(fit, new).theta.shape == (4, 2)
@@ -135,7 +141,7 @@ def test_a_state_with_speeds_wants_to_know_how_fast_new_sources_may_be() -> None
 
 def test_confirming_takes_as_many_steps_as_asked_either_way() -> None:
     for confirm in (1, 3, 5):
-        census = Census.known(0).with_newborn([100.0], confirm)
+        census = TrackTable.known(0).with_newborn([100.0], confirm)
         steps = 1
         while not census.confirmed.all():
             census = census.weighed(np.array([100.0]), confirm)

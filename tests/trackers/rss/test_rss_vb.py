@@ -7,41 +7,45 @@ import pytest
 from scipy.differentiate import hessian, jacobian
 
 from arrivals.measurement_models import LogNormalRSS, db_to_neper
-from arrivals.measurement_models.signal_strength.path_loss import Field
+from arrivals.measurement_models.signal_strength.path_loss import PropagationModel
 from arrivals.motion_models import ConstantVelocity, CoordinatedTurn, RandomWalk
 from arrivals.scenarios.metrics.position_errors import scores
 from arrivals.scenarios.reproduce.rss.trials import answers, bounds, draws
 from arrivals.scenarios.simulations.moving_emitters import CrossingSources
 from arrivals.scenarios.simulations.signal_strength import Table1K3, Table1K7
 from arrivals.trackers import RSSML, RSSVB
-from arrivals.trackers.rss.belief import Sources, unflat
+from arrivals.trackers.rss.belief import SourceBeliefs, unflat
 from arrivals.trackers.rss.inference.factors import bowl_of
 from arrivals.trackers.rss.inference.joint_posterior import (
+    JointPosterior,
     Marginals,
     Prior,
-    Problem,
     inverse_2x2,
     marginals,
 )
 from arrivals.trackers.rss.inference.map_search import maximum
-from arrivals.trackers.rss.inference.variational import Cycling, Solution, solve
+from arrivals.trackers.rss.inference.variational import (
+    VariationalIterate,
+    VariationalSettings,
+    solve,
+)
 from arrivals.typing import Float
 
 # section 12
 
 SENSORS = np.array([(0, 0), (60, 0), (60, 60), (0, 60), (30, -15), (75, 30), (30, 75), (-15, 30)])
-FIELD = Field(SENSORS.astype(float), 2.0, float(db_to_neper(40.0)), 1.0)
+FIELD = PropagationModel(SENSORS.astype(float), 2.0, float(db_to_neper(40.0)), 1.0)
 MU = np.full((1, 2), float(db_to_neper(80.0)))
 START = np.array([[[24.0, 18.0], [40.0, 42.0]]])
 PRIOR = Prior(MU, np.full((1, 2), 1 / float(db_to_neper(3.0)) ** 2), START,
               np.tile(np.eye(2) / 64, (1, 2, 1, 1)))  # fmt: skip
 XI = FIELD.levels(db_to_neper([[81.0, 78.0]]), np.array([[[18.0, 22.0], [44.0, 36.0]]])).log_sigma
-GOLDEN = Problem(FIELD, XI, np.full((1, 8), 200.0), PRIOR)
+GOLDEN = JointPosterior(FIELD, XI, np.full((1, 8), 200.0), PRIOR)
 EXACT: dict[str, Any] = {"tol_u": 0.0, "tol_theta": 0.0}
 
 
-def golden(**how: Any) -> Solution:
-    return solve(GOLDEN, MU, START, Cycling(**EXACT | how))
+def golden(**how: Any) -> VariationalIterate:
+    return solve(GOLDEN, MU, START, VariationalSettings(**EXACT | how))
 
 
 def same(value: Any, expected: Any) -> None:
@@ -93,7 +97,7 @@ def test_golden_literal_refresh() -> None:
 def test_fixed_point_is_the_joint_maximum() -> None:
     found = golden(max_cycles=400)
     assert np.abs(GOLDEN.gradient(found.u, found.theta)).max() < 1e-9
-    one = Problem(FIELD, XI[0], GOLDEN.W[0], PRIOR.take(0))
+    one = JointPosterior(FIELD, XI[0], GOLDEN.W[0], PRIOR.take(0))
     for method, tolerance in (("lm", 1e-6), ("bfgs", 1e-2)):
         best = maximum(one, found.u[0], found.theta[0], method, tolerance=1e-12)  # type: ignore[arg-type]
         np.testing.assert_allclose(best.theta, found.theta[0], atol=tolerance)
@@ -158,10 +162,14 @@ def test_literal_covariance_shrinks_with_the_cycles() -> None:
     field = FIELD._replace(sensors=sensors)
     theta, u = np.array([[[5.0, 5.0]]]), np.array([[9.2]])
     prior = Prior(u, np.full((1, 1), 1e-6), theta, 1e-6 * np.eye(2)[None, None])
-    problem = Problem(field, field.levels(u, theta).log_sigma, np.full((1, 60), 200.0), prior)
-    right = solve(problem, u, theta, Cycling(**EXACT))
+    problem = JointPosterior(
+        field, field.levels(u, theta).log_sigma, np.full((1, 60), 200.0), prior
+    )
+    right = solve(problem, u, theta, VariationalSettings(**EXACT))
     for cycles in (4, 16):
-        wrong = solve(problem, u, theta, Cycling(refresh="literal", max_cycles=cycles, **EXACT))
+        wrong = solve(
+            problem, u, theta, VariationalSettings(refresh="literal", max_cycles=cycles, **EXACT)
+        )
         ratio = np.sqrt(np.trace(right.P[0, 0]) / np.trace(wrong.P[0, 0]))
         assert ratio * np.sqrt(cycles) == pytest.approx(1, rel=0.05)
 
@@ -183,7 +191,7 @@ def test_guarded_cycles_never_end_below_their_start() -> None:
 
 def test_readings_without_weight_tell_nothing() -> None:
     silent = GOLDEN._replace(W=np.zeros((1, 8)))
-    found = solve(silent, MU + 1, START + 9.0, Cycling(max_cycles=60, **EXACT))
+    found = solve(silent, MU + 1, START + 9.0, VariationalSettings(max_cycles=60, **EXACT))
     np.testing.assert_allclose(found.theta, START, atol=1e-6)
     np.testing.assert_allclose(found.u, MU, atol=1e-9)
 
@@ -196,7 +204,7 @@ def test_correction_of_a_state_is_the_kalman_filters() -> None:
     H = np.eye(4)[::2]
     K = P @ H.T @ np.linalg.inv(H @ P @ H.T + R)
     x_post, P_post = x + K @ (z - H @ x), P - K @ H @ P
-    before = Sources(x[None], P[None], np.zeros(1), np.ones(1))
+    before = SourceBeliefs(x[None], P[None], np.zeros(1), np.ones(1))
     told = Marginals(np.ones(1), (H @ P_post @ H.T)[None])
     after = before.corrected(np.zeros(1), (H @ x_post)[None], told, (0, 2), ())
     np.testing.assert_allclose(after.x[0], x_post, atol=1e-10)
@@ -205,7 +213,7 @@ def test_correction_of_a_state_is_the_kalman_filters() -> None:
 
 def test_flat_belief_is_a_round_trip() -> None:
     rng = np.random.default_rng(0)
-    own = Sources(rng.normal(size=(2, 4)), np.array([np.eye(4), 2 * np.eye(4)]), np.ones(2),
+    own = SourceBeliefs(rng.normal(size=(2, 4)), np.array([np.eye(4), 2 * np.eye(4)]), np.ones(2),
                   np.full(2, 3.0))  # fmt: skip
     for mine, back in zip(own, unflat(*own.flat(5), 4), strict=True):
         np.testing.assert_array_equal(mine, back)

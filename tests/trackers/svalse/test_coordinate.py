@@ -6,14 +6,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from arrivals.measurement_models import ArraySnapshot, Manifold, SensorArray
-from arrivals.trackers.svalse.components import Prediction
-from arrivals.trackers.svalse.coordinate.solver import Ascent, CoordinateAscent
+from arrivals.trackers.svalse.components import ComponentPrior
+from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver, SingleSnapshotAscent
 from arrivals.trackers.svalse.noise_initialization import autocorrelation
 from arrivals.typing import Complex, Float
 
 ARRAY = SensorArray.ula(11, spacing=0.5)
 MODEL = ArraySnapshot(ARRAY, wavelength=1.0, noise=0.05)
-KNOWN = Prediction(np.array([0.5, -1.0]), np.array([100.0, 20.0]), np.array([0.75, 0.1]), 0.1)
+KNOWN = ComponentPrior(np.array([0.5, -1.0]), np.array([100.0, 20.0]), np.array([0.75, 0.1]), 0.1)
 
 
 def snapshot(seed: int, array: SensorArray = ARRAY) -> Complex:
@@ -23,11 +23,15 @@ def snapshot(seed: int, array: SensorArray = ARRAY) -> Complex:
     return model.simulate(rng.uniform(-1.2, 1.2, 4), amplitude, rng)
 
 
-class Watched(Ascent):
+class Watched(SingleSnapshotAscent):
     """An ascent that remembers the exponents of its angles' densities."""
 
     def __init__(
-        self, settings: CoordinateAscent, y: Complex, manifold: Manifold, known: Prediction | None
+        self,
+        settings: CoordinateSolver,
+        y: Complex,
+        manifold: Manifold,
+        known: ComponentPrior | None,
     ) -> None:
         super().__init__(settings, y, manifold, known)
         self.exponents: list[Complex] = []
@@ -70,7 +74,7 @@ def full_elbo(step: Watched, divergences: Float) -> float:
 @settings(deadline=None, max_examples=25)
 @given(st.integers(0, 10**6), st.booleans())
 def test_each_flip_changes_the_elbo_by_exactly_its_delta(seed: int, sequential: bool) -> None:
-    step = CoordinateAscent().step(snapshot(seed), MODEL.manifold(), KNOWN if sequential else None)
+    step = CoordinateSolver().step(snapshot(seed), MODEL.manifold(), KNOWN if sequential else None)
     step.start()
     step.choose_support()
     rng = np.random.default_rng(seed)
@@ -83,7 +87,7 @@ def test_each_flip_changes_the_elbo_by_exactly_its_delta(seed: int, sequential: 
 
 def test_the_search_ends_where_no_single_flip_gains_and_solves_the_normal_equations() -> None:
     for seed in range(20):
-        step = CoordinateAscent().step(snapshot(seed), MODEL.manifold(), None)
+        step = CoordinateSolver().step(snapshot(seed), MODEL.manifold(), None)
         step.start()
         step.choose_support()
         assert (step.deltas() <= 1e-9).all()
@@ -100,7 +104,7 @@ def test_with_the_support_held_the_elbo_never_falls(
 ) -> None:
     known = KNOWN if sequential else None
     manifold = MODEL.manifold("first" if reference == "first" else "middle")
-    step = Watched(CoordinateAscent(), snapshot(seed), manifold, known)
+    step = Watched(CoordinateSolver(), snapshot(seed), manifold, known)
     step.start()
     step.choose_support()
     on = np.flatnonzero(step.active)
@@ -120,7 +124,7 @@ def test_with_the_support_held_the_elbo_never_falls(
 
 
 def test_noise_and_power_are_stationary_points_of_the_elbo() -> None:
-    step = Watched(CoordinateAscent(), snapshot(3), MODEL.manifold(), KNOWN)
+    step = Watched(CoordinateSolver(), snapshot(3), MODEL.manifold(), KNOWN)
     step.start()
     step.choose_support()
     step.learn_variances()
@@ -148,5 +152,5 @@ def test_silent_start_of_the_noise_is_the_mean_of_the_small_eigenvalues() -> Non
     from scipy.linalg import toeplitz
 
     smallest = np.linalg.eigvalsh(toeplitz(lags))[:2]
-    step = CoordinateAscent(snr_db=None).step(y, MODEL.manifold(), None)
+    step = CoordinateSolver(snr_db=None).step(y, MODEL.manifold(), None)
     assert step.nu == pytest.approx(smallest.mean())

@@ -8,24 +8,24 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from arrivals.measurement_models import ArraySnapshot, ElementResponse, SensorArray
-from arrivals.measurement_models.observed import Heard
+from arrivals.measurement_models.observed import ObservedSnapshots
 from arrivals.scenarios import create
-from arrivals.trackers.svalse.components import Prediction
+from arrivals.trackers.svalse.components import ComponentPrior
 from arrivals.trackers.svalse.coordinate.circle_posterior import (
     CirclePrior,
     SeriesPrior,
     VonMisesPrior,
     grid_moments,
 )
-from arrivals.trackers.svalse.coordinate.multi_amplitudes import LooksAmplitudes
-from arrivals.trackers.svalse.coordinate.multi_snapshot import LooksAscent
-from arrivals.trackers.svalse.coordinate.solver import CoordinateAscent
+from arrivals.trackers.svalse.coordinate.multi_amplitudes import MultiSnapshotAmplitudes
+from arrivals.trackers.svalse.coordinate.multi_snapshot import MultiSnapshotAscent
+from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver
 from arrivals.typing import Complex, Float
 
 CIRCLE = SensorArray.uca(7, radius=0.55)
 MIXED = ElementResponse.first_order(2 * np.pi * np.arange(7) / 7, [0.5, 1, 0.5, 1, 0.7, 1, 0.5])
 MODEL = ArraySnapshot(CIRCLE, [1.0, 1.2, 1.5], n_snapshots=4, response=MIXED, noise=0.05)
-KNOWN = Prediction(np.array([0.5, -2.0]), np.array([100.0, 20.0]), np.array([0.75, 0.1]), 0.1)
+KNOWN = ComponentPrior(np.array([0.5, -2.0]), np.array([100.0, 20.0]), np.array([0.75, 0.1]), 0.1)
 
 
 def looks(seed: int, model: ArraySnapshot = MODEL) -> Complex:
@@ -34,10 +34,10 @@ def looks(seed: int, model: ArraySnapshot = MODEL) -> Complex:
     return model.looks(model.simulate(rng.uniform(-3, 3, 3), w, rng))
 
 
-def started(seed: int, sequential: bool = False, **changes: Any) -> LooksAscent:
+def started(seed: int, sequential: bool = False, **changes: Any) -> MultiSnapshotAscent:
     model = MODEL.replace(**changes)
     known = KNOWN if sequential else None
-    ascent = LooksAscent(CoordinateAscent(), looks(seed, model), model.manifold(), known)
+    ascent = MultiSnapshotAscent(CoordinateSolver(), looks(seed, model), model.manifold(), known)
     ascent.start()
     return ascent
 
@@ -80,7 +80,7 @@ def test_variances_are_where_the_elbo_is_highest() -> None:
     step = started(3)
     step.choose_support()
     W, C = step.W.copy(), step.C.copy()
-    LooksAmplitudes.learn_variances(step)
+    MultiSnapshotAmplitudes.learn_variances(step)
     on = np.flatnonzero(step.active)
     for f in range(3):
         A, w, c = step.A[f, on].T, W[f, on], C[f][np.ix_(on, on)]
@@ -96,11 +96,11 @@ def test_variances_are_where_the_elbo_is_highest() -> None:
 def test_without_a_component_all_is_noise_and_floors_hold() -> None:
     step = started(4)
     step.active[:] = False
-    LooksAmplitudes.learn_variances(step)
+    MultiSnapshotAmplitudes.learn_variances(step)
     np.testing.assert_allclose(step.nu, (np.abs(step.Y) ** 2).mean(axis=(1, 2)))
     step.choose_support()
     step.power_floor, step.noise_floor = 1e6, 0.5
-    LooksAmplitudes.learn_variances(step)
+    MultiSnapshotAmplitudes.learn_variances(step)
     np.testing.assert_allclose(step.tau, 1e6 * step.nu / step.mean_norm)
     assert (step.nu >= 0.5 * (np.abs(step.Y) ** 2).mean(axis=(1, 2)) - 1e-12).all()
 
@@ -108,7 +108,7 @@ def test_without_a_component_all_is_noise_and_floors_hold() -> None:
 # angles
 
 
-def dense(step: LooksAscent, k: int, n: int = 4096) -> tuple[Float, Float]:
+def dense(step: MultiSnapshotAscent, k: int, n: int = 4096) -> tuple[Float, Float]:
     """ln q(θ) of section 3 by steering vectors on a dense grid, and the grid."""
     theta = 2 * np.pi * np.arange(n) / n
     a = step.manifold.steering(theta)[0]  # (F, M, n)
@@ -161,20 +161,20 @@ def test_a_fresh_component_starts_from_the_exact_marginal_of_the_looks() -> None
 def test_on_a_line_it_is_the_ascent_of_the_paper(reference: Any) -> None:
     """Specification, section 11: equal K and iterations, angles to 1e-14; tolerance 100 times."""
     trial = create("svalse_fig4", n_steps=6).sample(np.random.default_rng(1))
-    settings = CoordinateAscent()
+    settings = CoordinateSolver()
     manifold = trial.measurement.manifold(reference)  # type: ignore[union-attr]
     known = None
     for z in trial.measurements:
         Y = trial.measurement.looks(z)  # type: ignore[union-attr]
         short = settings.fit(Y, manifold, known)
-        fit = settings.iterate(LooksAscent(settings, Y, manifold, known))
+        fit = settings.iterate(MultiSnapshotAscent(settings, Y, manifold, known))
         assert fit.iterations == short.iterations
         assert fit.active.tolist() == short.active.tolist()
         on = fit.active
         np.testing.assert_allclose(fit.theta[on], short.theta[on], atol=1e-10)
         np.testing.assert_allclose(fit.amplitude, short.amplitude, atol=1e-9)
         assert fit.noise == pytest.approx(short.noise, rel=1e-9)
-        known = Prediction(fit.theta[on], 0.5 * fit.kappa[on], 0.75 * np.ones(on.sum()), 0.1)
+        known = ComponentPrior(fit.theta[on], 0.5 * fit.kappa[on], 0.75 * np.ones(on.sum()), 0.1)
 
 
 # posteriors on the circle
@@ -245,16 +245,16 @@ def test_gaps_leave_out_bins_then_snapshots_then_sensors() -> None:
     Y[:, :, 2] = np.nan
     Y[1, 3, 0] = np.nan
     Y[2] *= 0
-    heard = Heard.of(Y)
+    heard = ObservedSnapshots.of(Y)
     assert heard.bins.tolist() == [False, True, False]  # the last one is silent
     assert heard.sensors.tolist() == [True, True, True, False]
     assert heard.snapshots.tolist() == [True, True, False, True, True]
     assert heard.block(Y).shape == (1, 3, 4)
-    assert Heard.of(np.zeros((2, 3, 1), dtype=complex)).bins.all()
+    assert ObservedSnapshots.of(np.zeros((2, 3, 1), dtype=complex)).bins.all()
 
 
 def test_sensors_that_take_turns_in_being_silent_are_refused() -> None:
     Y = np.ones((1, 3, 3), dtype=complex)
     Y[0, [0, 1, 2], [0, 1, 2]] = np.nan
     with pytest.raises(ValueError, match="best look 2 of 3 did, but each has a NaN in some other"):
-        Heard.of(Y)
+        ObservedSnapshots.of(Y)

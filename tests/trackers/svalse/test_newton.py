@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from newton_states import MODEL, scene, with_facts
 
 from arrivals.measurement_models import ArraySnapshot, SensorArray
-from arrivals.measurement_models.manifolds.manifold import GridLine
-from arrivals.trackers.svalse.components import Prediction
+from arrivals.measurement_models.manifolds.manifold import UniformLineManifold
+from arrivals.trackers.svalse.components import ComponentPrior
 from arrivals.trackers.svalse.newton.candidates import (
     Grid,
     births,
@@ -26,12 +26,12 @@ from arrivals.trackers.svalse.newton.elbo import (
     PLACE,
     PRIOR_KAPPA,
     PRIOR_MU,
+    Evaluation,
     S,
-    State,
     evaluate,
 )
-from arrivals.trackers.svalse.newton.expected_response import Response
-from arrivals.trackers.svalse.newton.solver import JointNewton
+from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
+from arrivals.trackers.svalse.newton.solver import NewtonSolver
 from arrivals.trackers.svalse.newton.step import (
     ascend,
     learned,
@@ -45,13 +45,15 @@ GAPS = ArraySnapshot(SensorArray.ula(14, spacing=0.4, missing=[2, 9]), wavelengt
 NONE = np.zeros(1, dtype=np.bool_)
 
 
-def shifted(state: State, row: int, k: int, by: float, response: Response) -> State:
+def shifted(
+    state: Evaluation, row: int, k: int, by: float, response: ExpectedResponse
+) -> Evaluation:
     facts = state.facts.copy()
     facts[0, row, k] += by
     return with_facts(response, state.Y, facts, state.nu[0, 0], state.tau[0, 0])
 
 
-def slope_of(state: State, row: int, k: int, h: float, response: Response) -> float:
+def slope_of(state: Evaluation, row: int, k: int, h: float, response: ExpectedResponse) -> float:
     """∂F by differences of the fourth order."""
     at = {n: shifted(state, row, k, n * h, response).F[0] for n in (-2, -1, 1, 2)}
     return float((at[-2] - 8 * at[-1] + 8 * at[1] - at[2]) / (12 * h))
@@ -63,7 +65,7 @@ def slope_of(state: State, row: int, k: int, h: float, response: Response) -> fl
 @pytest.mark.parametrize("model", [MODEL, GAPS])
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_gradients_are_slopes(seed: int, model: ArraySnapshot) -> None:
-    state, response = scene(seed, model), Response(model.manifold())
+    state, response = scene(seed, model), ExpectedResponse(model.manifold())
     g, curvature = slopes(response, state, *weights(state))
     of_s = 0.5 / state.facts[0, S] - 0.5 * curvature[0]
     for k in range(5):
@@ -79,7 +81,7 @@ def test_gradients_are_slopes(seed: int, model: ArraySnapshot) -> None:
 @pytest.mark.parametrize("model", [MODEL, GAPS])
 def test_hessian_is_the_slope_of_the_gradient_to_a_hundredth(model: ArraySnapshot) -> None:
     """At 20 dB; the term left out is a thousandth."""
-    state, response = scene(0, model), Response(model.manifold())
+    state, response = scene(0, model), ExpectedResponse(model.manifold())
     for _ in range(5):
         state = ascend(response, state, NONE)
     v, P = weights(state)
@@ -94,7 +96,7 @@ def test_hessian_is_the_slope_of_the_gradient_to_a_hundredth(model: ArraySnapsho
 # -- the objective ----------------------------------------------------------------------------
 
 
-def written_out(state: State, w: Complex, C: Complex) -> float:
+def written_out(state: Evaluation, w: Complex, C: Complex) -> float:
     """The bound for any means and covariance of the amplitudes, from the model."""
     A, M, K = state.A[0, 0], state.Y.shape[2], state.A.shape[2]
     J = A.conj() @ A.T
@@ -134,7 +136,7 @@ def test_divergence_is_that_of_a_normal_from_a_von_mises_density() -> None:
 @settings(deadline=None, max_examples=20)
 @given(st.integers(0, 10**6), st.booleans(), st.sampled_from([0.003, 0.01, 0.1, 0.5]))
 def test_the_objective_never_falls_in_a_newton_step(seed: int, learn: bool, nu: float) -> None:
-    rng, response = np.random.default_rng(seed), Response(MODEL.manifold())
+    rng, response = np.random.default_rng(seed), ExpectedResponse(MODEL.manifold())
     state = scene(seed)
     facts = state.facts.copy()
     facts[0, MU] += 0.3 * rng.standard_normal(5)  # far from the top
@@ -148,7 +150,7 @@ def test_the_objective_never_falls_in_a_newton_step(seed: int, learn: bool, nu: 
 
 
 def test_noise_and_power_end_at_the_fixed_points_of_em() -> None:
-    state, response = scene(4), Response(MODEL.manifold())
+    state, response = scene(4), ExpectedResponse(MODEL.manifold())
     for _ in range(40):
         state = ascend(response, state, np.ones(1, dtype=np.bool_))
     A, w, M = state.A[0, 0], state.W[0, 0, :, 0], 15
@@ -167,8 +169,8 @@ def test_noise_and_power_end_at_the_fixed_points_of_em() -> None:
 @settings(deadline=None, max_examples=15)
 @given(st.integers(0, 10**6), st.floats(0, 1))
 def test_a_removal_changes_the_criterion_by_exactly_its_gain(seed: int, kl: float) -> None:
-    state, response = scene(seed), Response(MODEL.manifold())
-    gains = removal_gains(Response(MODEL.manifold()), state, kl)[0]
+    state, response = scene(seed), ExpectedResponse(MODEL.manifold())
+    gains = removal_gains(ExpectedResponse(MODEL.manifold()), state, kl)[0]
     for k in range(5):
         facts = without(state.facts, np.array([k]))[:, :, :4]
         rest = with_facts(response, state.Y, facts, state.nu[0, 0], state.tau[0, 0])
@@ -177,7 +179,7 @@ def test_a_removal_changes_the_criterion_by_exactly_its_gain(seed: int, kl: floa
 
 
 def test_an_addition_changes_the_evidence_by_exactly_its_gain() -> None:
-    state, response = scene(0), Response(MODEL.manifold())
+    state, response = scene(0), ExpectedResponse(MODEL.manifold())
     grid = Grid(response, 8, merge=0.0)
     gain = evidence(grid, state)[0][0]
     for g in (3, 40, 77):
@@ -189,7 +191,7 @@ def test_an_addition_changes_the_evidence_by_exactly_its_gain() -> None:
 
 
 def test_nothing_is_born_near_what_is_there_and_what_was_removed_comes_back() -> None:
-    state, response = scene(0), Response(MODEL.manifold())
+    state, response = scene(0), ExpectedResponse(MODEL.manifold())
     for _ in range(5):
         state = ascend(response, state, NONE)
     facts = without(state.facts, np.array([3]))[:, :, :4]
@@ -220,7 +222,7 @@ def test_unused_places_and_other_problems_make_no_difference() -> None:
     facts = np.zeros((3, N_FACTS, 6))
     for i, state in enumerate(states):
         facts[i, :, : state.facts.shape[2]] = state.facts[0]
-    response, K = Response(MODEL.manifold()), np.array([5, 3, 4])
+    response, K = ExpectedResponse(MODEL.manifold()), np.array([5, 3, 4])
     y = np.concatenate([state.Y for state in states])
     nu, tau = np.full((3, 1), 0.01), np.full((3, 1), 0.2)
     batch = evaluate(response, y, facts, K, nu, tau, np.zeros(3))
@@ -235,7 +237,7 @@ def test_unused_places_and_other_problems_make_no_difference() -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class Explicit(GridLine):
+class Explicit(UniformLineManifold):
     """The line with its identity written out."""
 
     @property
@@ -245,10 +247,10 @@ class Explicit(GridLine):
 
 def test_a_response_with_coefficients_takes_the_same_steps() -> None:
     line = GAPS.manifold()
-    assert isinstance(line, GridLine)
+    assert isinstance(line, UniformLineManifold)
     explicit = Explicit(line.places, line.step, line.origin, line.reference)
     state = scene(0, GAPS)
-    one, other = Response(line), Response(explicit)
+    one, other = ExpectedResponse(line), ExpectedResponse(explicit)
     assert other.extent == pytest.approx(one.extent)
     state2 = with_facts(other, state.Y, state.facts)
     for _ in range(4):
@@ -263,7 +265,7 @@ def test_extent_of_a_filled_line_is_its_number_of_sensors() -> None:
             line = ArraySnapshot(SensorArray.ula(n, 0.5), wavelength=1.0).manifold(
                 "first" if reference == "first" else "middle"
             )
-            assert Response(line).extent == pytest.approx(n)
+            assert ExpectedResponse(line).extent == pytest.approx(n)
 
 
 def test_snapshots_fitted_together_are_those_fitted_alone() -> None:
@@ -276,9 +278,9 @@ def test_snapshots_fitted_together_are_those_fitted_alone() -> None:
         mu = MODEL.manifold().from_doa(doa[: n % 3]) + 0.02
         kappa, rho = np.full(len(mu), 100.0), np.full(len(mu), 0.75)
         age = np.arange(len(mu)) % 2
-        known.append(Prediction(mu, kappa, rho, 0.1, age, 15.0 + n) if n % 4 else None)
+        known.append(ComponentPrior(mu, kappa, rho, 0.1, age, 15.0 + n) if n % 4 else None)
     Ys[5] = np.zeros((1, 15, 1), dtype=np.complex128)
-    engine, manifold = JointNewton(), MODEL.manifold()
+    engine, manifold = NewtonSolver(), MODEL.manifold()
     together = engine.fit_batch(Ys, manifold, known)
     for Y, prediction, fit in zip(Ys, known, together, strict=True):
         alone = engine.fit(Y, manifold, prediction)

@@ -15,8 +15,8 @@ from arrivals.motion_models import BernoulliVonMises
 from arrivals.motion_models.bessel import log_i0
 from arrivals.scenarios import create, mean_gospa
 from arrivals.trackers import SVALSE, VALSE
-from arrivals.trackers.svalse.components import Fit, Prediction
-from arrivals.trackers.svalse.coordinate.solver import CoordinateAscent
+from arrivals.trackers.svalse.components import ComponentPosterior, ComponentPrior
+from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver
 from arrivals.trackers.svalse.newton.candidates import (
     Grid,
     evidence,
@@ -32,12 +32,12 @@ from arrivals.trackers.svalse.newton.elbo import (
     ODDS,
     PRIOR_KAPPA,
     PRIOR_MU,
+    Evaluation,
     S,
-    State,
     evaluate,
 )
-from arrivals.trackers.svalse.newton.expected_response import Response
-from arrivals.trackers.svalse.newton.solver import JointNewton, moves_on
+from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
+from arrivals.trackers.svalse.newton.solver import NewtonSolver, moves_on
 from arrivals.trackers.svalse.newton.state import Problem, log_odds
 from arrivals.trackers.svalse.newton.step import ascend, negative_hessian, slopes, weights
 from arrivals.trackers.svalse.noise_initialization import quiet_noise
@@ -65,9 +65,11 @@ def drawn(model: ArraySnapshot, seed: int, noise: float = 0.03) -> Complex:
     return model.looks(model.replace(noise=noise).simulate(DOA, w, rng))
 
 
-def scene(model: ArraySnapshot, seed: int = 0, temper: float = 1.0) -> tuple[Response, State]:
+def scene(
+    model: ArraySnapshot, seed: int = 0, temper: float = 1.0
+) -> tuple[ExpectedResponse, Evaluation]:
     """Components beside three sources, some of which have a prior."""
-    rng, response = np.random.default_rng(seed), Response(model.manifold(), temper)
+    rng, response = np.random.default_rng(seed), ExpectedResponse(model.manifold(), temper)
     facts = np.zeros((1, N_FACTS, 3))
     facts[0, MU] = model.manifold().from_doa(DOA) + 0.02 * rng.standard_normal(3)
     facts[0, S] = rng.uniform(5e-4, 3e-3, 3)
@@ -81,13 +83,15 @@ def scene(model: ArraySnapshot, seed: int = 0, temper: float = 1.0) -> tuple[Res
     return response, evaluate(response, Y, facts, np.array([3]), nu, tau, np.zeros(1))
 
 
-def shifted(response: Response, state: State, row: int, k: int, by: float) -> State:
+def shifted(
+    response: ExpectedResponse, state: Evaluation, row: int, k: int, by: float
+) -> Evaluation:
     facts = state.facts.copy()
     facts[0, row, k] += by
     return evaluate(response, state.Y, facts, state.K, state.nu, state.tau, state.rest)
 
 
-def slope_of(response: Response, state: State, row: int, k: int, h: float) -> float:
+def slope_of(response: ExpectedResponse, state: Evaluation, row: int, k: int, h: float) -> float:
     """∂F by differences of the fourth order."""
     at = {n: shifted(response, state, row, k, n * h).F[0] for n in (-2, -1, 1, 2)}
     return float((at[-2] - 8 * at[-1] + 8 * at[1] - at[2]) / (12 * h))
@@ -125,7 +129,7 @@ def test_hessian_is_the_slope_of_the_gradient_to_a_hundredth(model: ArraySnapsho
 
 
 def test_mean_responses_and_their_norms_are_those_of_a_dense_sum() -> None:
-    response, mu, s = Response(ELEMENTS.manifold()), np.array([[0.4]]), np.array([[0.02]])
+    response, mu, s = ExpectedResponse(ELEMENTS.manifold()), np.array([[0.4]]), np.array([[0.02]])
     theta = 0.4 + np.linspace(-1, 1, 4001)
     q = np.exp(-((theta - 0.4) ** 2) / 0.04)
     q /= q.sum()
@@ -208,7 +212,7 @@ def test_the_objective_never_falls_in_a_newton_step(
 
 def test_a_step_that_no_shorter_one_mends_takes_the_variances_along_gradually() -> None:
     """Far from the top, the variances' fixed point alone made F fall: the step was refused."""
-    rng, response = np.random.default_rng(70147), Response(MODEL.manifold())
+    rng, response = np.random.default_rng(70147), ExpectedResponse(MODEL.manifold())
     state = of_a_line(70147)
     facts = state.facts.copy()
     facts[0, MU] += 0.3 * rng.standard_normal(5)
@@ -217,7 +221,7 @@ def test_a_step_that_no_shorter_one_mends_takes_the_variances_along_gradually() 
 
 
 def wrapped_normal_bound(
-    manifold: Any, Y: Complex, known: Prediction, fit: Fit, kl: float
+    manifold: Any, Y: Complex, known: ComponentPrior, fit: ComponentPosterior, kl: float
 ) -> float:
     """The criterion of a fit's angles as wrapped normals, amplitudes refreshed."""
     on = np.flatnonzero(fit.active)
@@ -232,7 +236,7 @@ def wrapped_normal_bound(
             facts[0, ODDS, i] = log_odds(known.existence[k])
     problem = Problem(Y, None, 8)
     assert fit.bin_noise is not None
-    response = moves_on(JointNewton(), manifold, Y.shape[2]).response
+    response = moves_on(NewtonSolver(), manifold, Y.shape[2]).response
     nu, tau = fit.bin_noise / problem.power, np.full(len(Y), 0.3)
     K = np.array([len(on)])
     state = evaluate(response, problem.Y[None], facts, K, nu[None], tau[None], np.zeros(1))
@@ -241,7 +245,7 @@ def wrapped_normal_bound(
     return float(state.criterion(kl)[0])
 
 
-def ascend_variances(response: Response, state: State) -> State:
+def ascend_variances(response: ExpectedResponse, state: Evaluation) -> Evaluation:
     from arrivals.trackers.svalse.newton.step import learned
 
     return learned(response, state)
@@ -263,8 +267,8 @@ def test_the_bound_is_no_lower_than_that_of_coordinate_ascent(numbers: dict[str,
             tracker.predict()
             if t % 3 == 1:
                 known, Y = tracker._prediction(), model.looks(z)
-                ours = JointNewton().fit(Y, manifold, known)
-                other = CoordinateAscent(tolerance=1e-6).fit(Y, manifold, known)
+                ours = NewtonSolver().fit(Y, manifold, known)
+                other = CoordinateSolver(tolerance=1e-6).fit(Y, manifold, known)
                 bounds = [wrapped_normal_bound(manifold, Y, known, f, 0.5) for f in (ours, other)]
                 gain.append(bounds[0] - bounds[1])
             tracker.update(z)
@@ -289,7 +293,7 @@ def wrapped(angle: Float) -> Float:
 @pytest.mark.parametrize("model", [CIRCLE, LOOKS, ELEMENTS], ids=NAMES[:3])
 def test_a_circle_turned_by_some_of_its_births_turns_every_angle(model: ArraySnapshot) -> None:
     """By whole steps of the grid on which components are born; see the next for others."""
-    n = len(moves_on(JointNewton(), model.manifold(), 1).grid.theta)
+    n = len(moves_on(NewtonSolver(), model.manifold(), 1).grid.theta)
     turn, doa = 2 * np.pi * 5 / n, np.array([[0.3, -2.0, 1.6]] * 4)
     other, z = turned(model, turn), heard(model, doa)
     a, b = SVALSE(model, SLOW).run(z), SVALSE(other, SLOW).run(z)

@@ -12,8 +12,8 @@ from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.motion_models import BernoulliVonMises
 from arrivals.scenarios import Trial, create, mean_gospa
 from arrivals.trackers import SVALSE, VALSE, Run
-from arrivals.trackers.svalse.components import Fit, Prediction
-from arrivals.trackers.svalse.coordinate.solver import CoordinateAscent
+from arrivals.trackers.svalse.components import ComponentPosterior, ComponentPrior
+from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver
 from arrivals.trackers.svalse.newton.elbo import (
     KL_CONSTANT,
     MU,
@@ -24,8 +24,8 @@ from arrivals.trackers.svalse.newton.elbo import (
     S,
     evaluate,
 )
-from arrivals.trackers.svalse.newton.expected_response import Response
-from arrivals.trackers.svalse.newton.solver import JointNewton
+from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
+from arrivals.trackers.svalse.newton.solver import NewtonSolver
 from arrivals.trackers.svalse.newton.state import log_odds
 from arrivals.trackers.svalse.valse import reported
 from arrivals.typing import Complex, Float
@@ -164,7 +164,7 @@ def test_it_takes_a_tenth_of_coordinate_ascent_or_less() -> None:
 # -- the bound ----------------------------------------------------------------------------------
 
 
-def bound(y: Complex, manifold: Any, known: Prediction, fit: Fit) -> float:
+def bound(y: Complex, manifold: Any, known: ComponentPrior, fit: ComponentPosterior) -> float:
     """F of a fit's angles as wrapped normals, amplitudes refreshed."""
     from arrivals.motion_models.bessel import log_i0
 
@@ -184,7 +184,7 @@ def bound(y: Complex, manifold: Any, known: Prediction, fit: Fit) -> float:
     nu, tau = np.array([[fit.noise]]) / power, np.array([[fit.power]]) / power
     K = np.array([len(on)])
     z = y[None, None, :, None] / np.sqrt(power)
-    return float(evaluate(Response(manifold), z, facts, K, nu, tau, np.zeros(1)).F[0])
+    return float(evaluate(ExpectedResponse(manifold), z, facts, K, nu, tau, np.zeros(1)).F[0])
 
 
 def test_the_bound_is_no_lower_than_that_of_coordinate_ascent() -> None:
@@ -199,8 +199,8 @@ def test_the_bound_is_no_lower_than_that_of_coordinate_ascent() -> None:
             assert known is not None
             if t % 3 == 0 and t > 0:
                 middle, first = LINE.manifold("middle"), LINE.manifold("first")
-                other = CoordinateAscent(tolerance=1e-5).fit(Y, first, known)
-                ours = bound(y, middle, known, JointNewton().fit(Y, middle, known))
+                other = CoordinateSolver(tolerance=1e-5).fit(Y, first, known)
+                ours = bound(y, middle, known, NewtonSolver().fit(Y, middle, known))
                 gain.append(ours - bound(y, first, known, other))
             tracker.update(y)
     assert np.mean(np.array(gain) > -0.01) >= 0.88  # 8 of 9
@@ -322,7 +322,7 @@ def test_existence_of_what_is_reported_is_above_one_half() -> None:
 def test_what_the_engine_finds_is_what_is_reported() -> None:
     y = tone([[-0.5, 0.4]], noise=1e-3)[0]
     manifold = LINE.manifold()
-    fit = JointNewton(merge=0.0, snr_db=None).fit(y[None, :, None], manifold, None)
+    fit = NewtonSolver(merge=0.0, snr_db=None).fit(y[None, :, None], manifold, None)
     tracker = VALSE(LINE)
     tracker.update(y)
     found: Float = manifold.to_doa(fit.theta[reported(manifold, fit)])

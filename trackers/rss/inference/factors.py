@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arrivals.measurement_models.signal_strength.path_loss import Levels, Offsets
-from arrivals.trackers.rss.inference.joint_posterior import Problem, symmetric_2x2
+from arrivals.trackers.rss.inference.joint_posterior import JointPosterior, symmetric_2x2
 from arrivals.typing import Bool, Float, Int
 
 HALVINGS = 12  # of a Newton step that makes φ rise
@@ -33,13 +33,18 @@ class Factors(NamedTuple):
     P: Float
 
 
-def powers_precision(problem: Problem, lam: Float) -> Float:
+def powers_precision(problem: JointPosterior, lam: Float) -> Float:
     """Return 1/v = 1/v₀ + Σ W λ², (..., n_sources)."""
     return np.asarray(problem.prior.w + dot(problem.W[..., None, :] * lam, lam))  # (11)
 
 
 def gauss_seidel(
-    problem: Problem, found: Levels, u: Float, theta: Float, newton_steps: int, tolerance: float
+    problem: JointPosterior,
+    found: Levels,
+    u: Float,
+    theta: Float,
+    newton_steps: int,
+    tolerance: float,
 ) -> Factors:
     """Return the factors after one cycle in which each sees the newest of the others.
 
@@ -81,7 +86,12 @@ def gauss_seidel(
 
 
 def jacobi(
-    problem: Problem, found: Levels, u: Float, theta: Float, newton_steps: int, tolerance: float
+    problem: JointPosterior,
+    found: Levels,
+    u: Float,
+    theta: Float,
+    newton_steps: int,
+    tolerance: float,
 ) -> Factors:
     """Return the factors after one cycle in which each sees the others as they were.
 
@@ -103,7 +113,7 @@ class _Look(NamedTuple):
     phi: Float
 
 
-class Bowl(NamedTuple):
+class PositionCost(NamedTuple):
     """What one cycle asks of positions: φ(θ) = ½ Σ W ρ² + the prior's, ρ = base + c log R(θ).
 
     Parameters
@@ -117,7 +127,7 @@ class Bowl(NamedTuple):
         Those sources.
     """
 
-    problem: Problem
+    problem: JointPosterior
     c: Float
     half: Float
     base: Float
@@ -134,9 +144,9 @@ class Bowl(NamedTuple):
         phi = 0.5 * (dot(W * rho, rho) + (step * pull).sum(axis=-1))
         return _Look(seen, rho, phi)
 
-    def take(self, rows: Int) -> Bowl:
+    def take(self, rows: Int) -> PositionCost:
         """Return some of the batch."""
-        return Bowl(
+        return PositionCost(
             self.problem.take(rows), self.c[rows], self.half[rows], self.base[rows], self.which
         )
 
@@ -176,12 +186,16 @@ class Bowl(NamedTuple):
         )
 
 
-def bowl_of(problem: Problem, c: Float, r: Float, log_range: Float, which: slice) -> Bowl:
+def bowl_of(
+    problem: JointPosterior, c: Float, r: Float, log_range: Float, which: slice
+) -> PositionCost:
     """Return the bowl of sources from the residuals r and log ranges at the expansion point."""
-    return Bowl(problem, c, 0.5 * c, r - c * log_range, which)
+    return PositionCost(problem, c, 0.5 * c, r - c * log_range, which)
 
 
-def newton(bowl: Bowl, theta: Float, steps: int, tolerance: float) -> tuple[Float, Float, Float]:
+def newton(
+    bowl: PositionCost, theta: Float, steps: int, tolerance: float
+) -> tuple[Float, Float, Float]:
     """Return the modes of φ, its Hessians there, and ρ there.
 
     Each position stops by itself, when its step is shorter than `tolerance`, m.
@@ -199,7 +213,7 @@ def newton(bowl: Bowl, theta: Float, steps: int, tolerance: float) -> tuple[Floa
     return theta, H, look.rho
 
 
-def _descended(bowl: Bowl, theta: Float, step: Float, before: _Look) -> tuple[Float, _Look]:
+def _descended(bowl: PositionCost, theta: Float, step: Float, before: _Look) -> tuple[Float, _Look]:
     """Return positions after a step, halved until φ does not rise, and the look from there."""
     to = theta + step
     look = bowl.look(to)

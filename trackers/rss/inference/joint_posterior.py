@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from arrivals.measurement_models.signal_strength.path_loss import Field, Levels, slopes
+from arrivals.measurement_models.signal_strength.path_loss import Levels, PropagationModel, slopes
 from arrivals.typing import Float
 
 
@@ -39,7 +39,7 @@ class Prior(NamedTuple):
         return np.asarray((self.w * (u - self.mu) ** 2).sum(axis=-1) + far)
 
 
-class Problem(NamedTuple):
+class JointPosterior(NamedTuple):
     """Readings of a batch, the field they are of, and the priors of the sources.
 
     Parameters
@@ -52,14 +52,16 @@ class Problem(NamedTuple):
     prior : Prior
     """
 
-    field: Field
+    field: PropagationModel
     xi: Float
     W: Float
     prior: Prior
 
-    def take(self, rows: Any) -> Problem:
+    def take(self, rows: Any) -> JointPosterior:
         """Return some of a batch."""
-        return Problem(self.field.take(rows), self.xi[rows], self.W[rows], self.prior.take(rows))
+        return JointPosterior(
+            self.field.take(rows), self.xi[rows], self.W[rows], self.prior.take(rows)
+        )
 
     def misfit(self, found: Levels) -> Float:
         """Return q = Σ W (ξ - log σ_y)², (...,)."""
@@ -86,7 +88,7 @@ class Problem(NamedTuple):
 
         >>> one, zero = np.ones((1, 1)), np.zeros((1, 1))
         >>> prior = Prior(zero, one, np.array([[[1.0, 0.0]]]), np.eye(2)[None, None])
-        >>> problem = Problem(Field(np.zeros((1, 2))), one, one, prior)
+        >>> problem = JointPosterior(PropagationModel(np.zeros((1, 2))), one, one, prior)
         >>> problem.log_posterior(prior.mu, prior.theta)
         array([-0.5])
         """
@@ -139,7 +141,7 @@ def marginals(J: Float) -> Marginals:
     Parameters
     ----------
     J : ndarray, shape (..., 3 n_sources, 3 n_sources)
-        Positive definite, in the order of `Problem.gradient`.
+        Positive definite, in the order of `JointPosterior.gradient`.
 
     Examples
     --------

@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from arrivals.measurement_models.signal_strength.path_loss import slopes
-from arrivals.trackers.rss.inference.joint_posterior import Problem
+from arrivals.trackers.rss.inference.joint_posterior import JointPosterior
 from arrivals.typing import Bool, Float
 
 Method = Literal["lm", "bfgs"]
@@ -23,7 +23,7 @@ class Maximum(NamedTuple):
 
 
 def maximum(
-    problem: Problem,
+    problem: JointPosterior,
     u: Float,
     theta: Float,
     method: Method = "lm",
@@ -79,7 +79,9 @@ def _of(values: float | Float, heard: Bool) -> float | Float:
     return np.asarray(values)[..., heard] if np.ndim(values) else values
 
 
-def _levenberg_marquardt(problem: Problem, x: Float, with_prior: bool, tolerance: float) -> Maximum:
+def _levenberg_marquardt(
+    problem: JointPosterior, x: Float, with_prior: bool, tolerance: float
+) -> Maximum:
     from scipy.optimize import least_squares
 
     K = len(problem.prior.mu)
@@ -102,12 +104,12 @@ def _levenberg_marquardt(problem: Problem, x: Float, with_prior: bool, tolerance
     return Maximum(found.x[:K], found.x[K:].reshape(K, 2), bool(found.success), int(found.nfev))
 
 
-def _root(problem: Problem) -> Float:
+def _root(problem: JointPosterior) -> Float:
     """Return the transposed Cholesky factor of the priors' precision."""
     return np.asarray(np.linalg.cholesky(problem.prior_precision()).T, np.float64)
 
 
-def _bfgs(problem: Problem, x: Float, with_prior: bool, tolerance: float) -> Maximum:
+def _bfgs(problem: JointPosterior, x: Float, with_prior: bool, tolerance: float) -> Maximum:
     from scipy.optimize import minimize
 
     K = len(problem.prior.mu)

@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from arrivals.trackers.rss.inference.goodness_of_fit import Quality
-from arrivals.trackers.rss.inference.joint_posterior import Marginals, Problem, marginals
-from arrivals.trackers.rss.model_order.model_selection import Fit
+from arrivals.trackers.rss.inference.joint_posterior import JointPosterior, Marginals, marginals
+from arrivals.trackers.rss.model_order.model_selection import Candidate
 from arrivals.typing import Bool, Float, Int
 
 
-class Told(NamedTuple):
+class WeightedReadings(NamedTuple):
     """Readings ξ, the weights to use, and the weights 1/r, (n_batch, n_sensors)."""
 
     xi: Float
@@ -20,7 +20,7 @@ class Told(NamedTuple):
     full: Float
 
 
-class Found(NamedTuple):
+class Solution(NamedTuple):
     """What a method finds for a batch of problems.
 
     Parameters
@@ -55,7 +55,7 @@ class Status(NamedTuple):
     diverged: bool = False
 
     @classmethod
-    def of(cls, found: Found, judged: Quality, b: int) -> Status:
+    def of(cls, found: Solution, judged: Quality, b: int) -> Status:
         """Return that of one of a batch."""
         return cls(
             bool(found.converged[b]), int(found.iterations[b]), float(judged.fit[b]),
@@ -63,7 +63,7 @@ class Status(NamedTuple):
         )  # fmt: skip
 
 
-def laplace(problem: Problem, u: Float, theta: Float) -> tuple[Float, Float]:
+def laplace(problem: JointPosterior, u: Float, theta: Float) -> tuple[Float, Float]:
     """Return J at solutions, and Laplace's log density of the readings, by batch.
 
     A solution that is not finite is replaced by its prior's mean: it will not be used.
@@ -79,19 +79,19 @@ def laplace(problem: Problem, u: Float, theta: Float) -> tuple[Float, Float]:
     return J, problem.log_posterior(u, theta, found) + 0.5 * density
 
 
-def found_of(fit: Fit) -> Found:
+def found_of(fit: Candidate) -> Solution:
     """Return a fit as what a method found, with one batch axis."""
     K = len(fit.u)
     problem, one = fit.problem, np.ones(1)
     J = problem.information(fit.levels)
     blocks = marginals(J) if K else Marginals(np.zeros(0), np.zeros((0, 2, 2)))
     L = one * problem.log_posterior(fit.u, fit.theta, fit.levels)
-    return Found(
+    return Solution(
         fit.u[None], fit.theta[None], Marginals(blocks.v[None], blocks.Sigma[None]), L, L,
         one * fit.log_likelihood, np.zeros(1, dtype=np.int64), one.astype(np.bool_),
     )  # fmt: skip
 
 
-def in_batch(problem: Problem) -> Problem:
+def in_batch(problem: JointPosterior) -> JointPosterior:
     """Return a problem as a batch of one."""
     return problem._replace(xi=problem.xi[None], W=problem.W[None], prior=problem.prior.take(None))

@@ -9,7 +9,7 @@ import numpy as np
 
 from arrivals.measurement_models.signal_strength.path_loss import Levels
 from arrivals.trackers.rss.inference.factors import Factors, gauss_seidel, jacobi
-from arrivals.trackers.rss.inference.joint_posterior import Prior, Problem
+from arrivals.trackers.rss.inference.joint_posterior import JointPosterior, Prior
 from arrivals.typing import Bool, Float, Int
 
 Sweep = Literal["gauss-seidel", "jacobi"]
@@ -19,7 +19,7 @@ SHORTEST = 2.0**-6  # share of a step, below which it is taken as it is
 
 
 @dataclass(frozen=True)
-class Cycling:
+class VariationalSettings:
     """How to cycle; the fields are parameters of `RSSVB`, which see there."""
 
     sweep: Sweep = "gauss-seidel"
@@ -32,7 +32,7 @@ class Cycling:
     newton_steps: int = 5
 
 
-class Solution(NamedTuple):
+class VariationalIterate(NamedTuple):
     """Where the cycles ended; all with the batch axis in front.
 
     Parameters
@@ -62,7 +62,9 @@ class Solution(NamedTuple):
     prior: Prior
 
 
-def solve(problem: Problem, u: Float, theta: Float, how: Cycling) -> Solution:
+def solve(
+    problem: JointPosterior, u: Float, theta: Float, how: VariationalSettings
+) -> VariationalIterate:
     """Cycle through the factors from a starting point.
 
     Parameters
@@ -80,12 +82,13 @@ def solve(problem: Problem, u: Float, theta: Float, how: Cycling) -> Solution:
 
     Examples
     --------
-    >>> from arrivals.measurement_models.signal_strength.path_loss import Field
-    >>> field = Field(np.array([[0.0, 0.0], [60.0, 0.0], [0.0, 60.0], [60.0, 60.0]]))
+    >>> from arrivals.measurement_models.signal_strength.path_loss import PropagationModel
+    >>> field = PropagationModel(np.array([[0.0, 0.0], [60.0, 0.0], [0.0, 60.0], [60.0, 60.0]]))
     >>> u, theta = np.array([[9.0]]), np.array([[[20.0, 30.0]]])
     >>> prior = Prior(u, np.full((1, 1), 8.0), theta + 5.0, np.eye(2)[None, None] / 400)
     >>> xi = field.levels(u, theta).log_sigma
-    >>> found = solve(Problem(field, xi, np.full((1, 4), 200.0), prior), u, theta + 5.0, Cycling())
+    >>> problem = JointPosterior(field, xi, np.full((1, 4), 200.0), prior)
+    >>> found = solve(problem, u, theta + 5.0, VariationalSettings())
     >>> found.theta.round(0), bool(found.converged[0])
     (array([[[20., 30.]]]), True)
     """
@@ -121,7 +124,7 @@ class _Point(NamedTuple):
     L: Float
 
 
-def _cycle(problem: Problem, point: _Point, how: Cycling) -> Factors:
+def _cycle(problem: JointPosterior, point: _Point, how: VariationalSettings) -> Factors:
     """Return the factors after one cycle, their means a share `damping` of the way there."""
     sweep = gauss_seidel if how.sweep == "gauss-seidel" else jacobi
     u, theta, found, _ = point
@@ -133,7 +136,9 @@ def _cycle(problem: Problem, point: _Point, how: Cycling) -> Factors:
     )
 
 
-def _moved(problem: Problem, point: _Point, factors: Factors, how: Cycling) -> _Point:
+def _moved(
+    problem: JointPosterior, point: _Point, factors: Factors, how: VariationalSettings
+) -> _Point:
     """Return the point after the cycle's step, halved while L is lower than before."""
     s = np.ones(len(point.u))
     du, dtheta = factors.u - point.u, factors.theta - point.theta
@@ -147,7 +152,7 @@ def _moved(problem: Problem, point: _Point, factors: Factors, how: Cycling) -> _
         s = np.where(lower, s / 2, s)
 
 
-def _still(point: _Point, u: Float, theta: Float, how: Cycling) -> Bool:
+def _still(point: _Point, u: Float, theta: Float, how: VariationalSettings) -> Bool:
     """Tell which of the batch moved less than the tolerances, or are lost."""
     du = np.abs(point.u - u).max(axis=-1, initial=0.0)
     dtheta = np.abs(point.theta - theta).max(axis=(-2, -1), initial=0.0)
@@ -177,9 +182,9 @@ class _Whole:
         for mine, part in zip(self.prior, prior, strict=True):
             mine[rows] = part
 
-    def solution(self, start: Float) -> Solution:
+    def solution(self, start: Float) -> VariationalIterate:
         """Return what was entered."""
-        return Solution(
+        return VariationalIterate(
             self.u, self.theta, self.w, self.P, self.L, start, self.cycles, self.converged,
             self.prior,
         )  # fmt: skip

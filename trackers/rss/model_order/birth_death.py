@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from arrivals.trackers.rss.belief import Sources
-from arrivals.trackers.rss.inference.joint_posterior import Marginals, Problem
-from arrivals.trackers.rss.inference.solution import Found, found_of, in_batch
-from arrivals.trackers.rss.model_order.grid_search import Newcomers
-from arrivals.trackers.rss.model_order.model_selection import Fit
+from arrivals.trackers.rss.belief import SourceBeliefs
+from arrivals.trackers.rss.inference.joint_posterior import JointPosterior, Marginals
+from arrivals.trackers.rss.inference.solution import Solution, found_of, in_batch
+from arrivals.trackers.rss.model_order.grid_search import NewSourcePrior
+from arrivals.trackers.rss.model_order.model_selection import Candidate
 from arrivals.typing import Bool, Float, Int
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ SURE = float(np.log(99.0))  # log odds at which a source is believed in, or give
 
 
 @dataclass(frozen=True, eq=False)
-class Census:
+class TrackTable:
     """Who is there; all (n_sources,).
 
     Parameters
@@ -40,12 +40,12 @@ class Census:
     next_label: int
 
     @classmethod
-    def known(cls, n: int) -> Census:
+    def known(cls, n: int) -> TrackTable:
         """Return n sources that are there beyond doubt.
 
         Examples
         --------
-        >>> Census.known(2).existence
+        >>> TrackTable.known(2).existence
         array([1., 1.])
         """
         return cls(np.arange(n), np.full(n, np.inf), np.ones(n, dtype=np.bool_), n)
@@ -55,11 +55,11 @@ class Census:
         """Probabilities that the sources are there."""
         return np.asarray(1 / (1 + np.exp(-self.odds)))
 
-    def take(self, rows: Int | Bool) -> Census:
+    def take(self, rows: Int | Bool) -> TrackTable:
         """Return some of the sources."""
-        return Census(self.label[rows], self.odds[rows], self.confirmed[rows], self.next_label)
+        return TrackTable(self.label[rows], self.odds[rows], self.confirmed[rows], self.next_label)
 
-    def weighed(self, evidence: Float, confirm: int) -> Census:
+    def weighed(self, evidence: Float, confirm: int) -> TrackTable:
         """Return the census after one more step's evidence for each source.
 
         A step counts for 2 ln 99 / `confirm` at most: so many it takes to be sure, either way.
@@ -69,16 +69,16 @@ class Census:
         odds = np.clip(odds, -SURE, SURE)
         return replace(self, odds=odds, confirmed=self.confirmed | (odds >= SURE - 1e-9))
 
-    def with_newborn(self, gains: list[float], confirm: int) -> Census:
+    def with_newborn(self, gains: list[float], confirm: int) -> TrackTable:
         """Return the census with some more, of whom nothing is sure but a first step's evidence."""
         n = len(gains)
-        fresh = Census(
+        fresh = TrackTable(
             self.next_label + np.arange(n),
             np.full(n, -SURE),
             np.zeros(n, dtype=np.bool_),
             self.next_label + n,
         ).weighed(np.array(gains), confirm)
-        return Census(
+        return TrackTable(
             np.append(self.label, fresh.label),
             np.append(self.odds, fresh.odds),
             np.append(self.confirmed, fresh.confirmed),
@@ -89,13 +89,15 @@ class Census:
 class Counted(NamedTuple):
     """Sources, census, and the fit behind them."""
 
-    sources: Sources
-    census: Census
-    fit: Fit
-    found: Found
+    sources: SourceBeliefs
+    census: TrackTable
+    fit: Candidate
+    found: Solution
 
 
-def counted(tracker: RSSTracker, sources: Sources, census: Census, xi: Float, W: Float) -> Counted:
+def counted(
+    tracker: RSSTracker, sources: SourceBeliefs, census: TrackTable, xi: Float, W: Float
+) -> Counted:
     """Correct sources by readings, with births and deaths.
 
     The sources that the readings speak for are corrected, the others only predicted. What speaks
@@ -112,8 +114,8 @@ def counted(tracker: RSSTracker, sources: Sources, census: Census, xi: Float, W:
     xi, W : ndarray, shape (n_sensors,)
         Readings and weights.
     """
-    problem = Problem(tracker.measurement.field, xi, W, sources.prior(tracker.xy))
-    expected = Fit(problem, sources.u, sources.x[:, tracker.xy])
+    problem = JointPosterior(tracker.measurement.field, xi, W, sources.prior(tracker.xy))
+    expected = Candidate(problem, sources.u, sources.x[:, tracker.xy])
     fit, heard, evidence = spoken_for(tracker, expected)
     census = census.weighed(evidence, tracker.confirm)
     room = tracker.max_sources - len(sources.u)
@@ -124,7 +126,7 @@ def counted(tracker: RSSTracker, sources: Sources, census: Census, xi: Float, W:
     moved = sources.take(heard).corrected(
         fit.u[:K], fit.theta[:K], old, tracker.xy, tracker.motion.angles
     )
-    sources = Sources(*(part.copy() for part in sources))
+    sources = SourceBeliefs(*(part.copy() for part in sources))
     for part, new in zip(sources, moved, strict=True):
         part[heard] = new
     alive = census.odds > -SURE + 1e-9
@@ -132,7 +134,9 @@ def counted(tracker: RSSTracker, sources: Sources, census: Census, xi: Float, W:
     return Counted(sources, census.take(alive).with_newborn(gains, tracker.confirm), fit, found)
 
 
-def with_newborn(fit: Fit, expected: Fit, new: Newcomers, room: int) -> tuple[Fit, list[float]]:
+def with_newborn(
+    fit: Candidate, expected: Candidate, new: NewSourcePrior, room: int
+) -> tuple[Candidate, list[float]]:
     """Return a fit enlarged as long as each more source raises the evidence enough, and the gains.
 
     Sources that have just appeared pull the known ones off their places, so the newborn are also
@@ -163,7 +167,7 @@ def with_newborn(fit: Fit, expected: Fit, new: Newcomers, room: int) -> tuple[Fi
     return fit, gains
 
 
-def spoken_for(tracker: RSSTracker, whole: Fit) -> tuple[Fit, Int, Float]:
+def spoken_for(tracker: RSSTracker, whole: Candidate) -> tuple[Candidate, Int, Float]:
     """Return the fit of the sources that raise the evidence, their numbers, and what it says.
 
     Returns
@@ -188,9 +192,9 @@ def spoken_for(tracker: RSSTracker, whole: Fit) -> tuple[Fit, Int, Float]:
     return fit, heard, evidence
 
 
-def solved(tracker: RSSTracker, fit: Fit) -> Fit:
+def solved(tracker: RSSTracker, fit: Candidate) -> Candidate:
     """Return the fit after the tracker's own method, and the joint maximum from there."""
     if len(fit.u) == 0:
         return fit
     found = tracker.solve(in_batch(fit.problem), fit.u[None], fit.theta[None])
-    return Fit(fit.problem, found.u[0], found.theta[0]).refitted()
+    return Candidate(fit.problem, found.u[0], found.theta[0]).refitted()

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from arrivals.measurement_models.signal_strength.path_loss import offsets
-from arrivals.trackers.rss.inference.joint_posterior import Prior, Problem
+from arrivals.trackers.rss.inference.joint_posterior import JointPosterior, Prior
 from arrivals.typing import Float, Int
 
 CANDIDATES = 3  # minima over the grid that are followed
@@ -17,7 +17,7 @@ CHUNK = 2_000_000  # numbers held at once while a grid is scanned
 
 
 @dataclass(frozen=True, eq=False)
-class Newcomers:
+class NewSourcePrior:
     """What is known of a source that nobody has seen yet.
 
     Parameters
@@ -46,12 +46,12 @@ class Newcomers:
         v: float,
         std: float | None = None,
         step: float | None = None,
-    ) -> Newcomers:
+    ) -> NewSourcePrior:
         """Return what sensors (n_sensors, 2) tell: sources may be where the sensors are.
 
         Examples
         --------
-        >>> round(Newcomers.among(np.array([[0.0, 0.0], [60.0, 80.0]]), 9.0, 0.1).std, 2)
+        >>> round(NewSourcePrior.among(np.array([[0.0, 0.0], [60.0, 80.0]]), 9.0, 0.1).std, 2)
         35.36
         """
         centre = sensors.mean(axis=0)
@@ -81,7 +81,9 @@ class Newcomers:
         )  # fmt: skip
 
 
-def scan(problem: Problem, log_sigma: Float, new: Newcomers) -> list[tuple[float, Float]]:
+def scan(
+    problem: JointPosterior, log_sigma: Float, new: NewSourcePrior
+) -> list[tuple[float, Float]]:
     """Return log amplitudes and places of sources whose addition lowers Σ W r² most.
 
     Parameters

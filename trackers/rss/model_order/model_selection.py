@@ -9,17 +9,17 @@ from math import lgamma, log, pi
 
 import numpy as np
 
-from arrivals.measurement_models.signal_strength.path_loss import Field, Levels
-from arrivals.trackers.rss.inference.joint_posterior import Prior, Problem
+from arrivals.measurement_models.signal_strength.path_loss import Levels, PropagationModel
+from arrivals.trackers.rss.inference.joint_posterior import JointPosterior, Prior
 from arrivals.trackers.rss.inference.map_search import maximum
-from arrivals.trackers.rss.model_order.grid_search import Newcomers, scan
+from arrivals.trackers.rss.model_order.grid_search import NewSourcePrior, scan
 from arrivals.typing import Float, Int
 
 GAIN = 0.1  # least rise of the log evidence that is worth another round
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class Candidate:
     """Sources fitted to readings, and how well they explain them.
 
     Parameters
@@ -30,7 +30,7 @@ class Fit:
     theta : ndarray, shape (n_sources, 2)
     """
 
-    problem: Problem
+    problem: JointPosterior
     u: Float
     theta: Float
 
@@ -74,23 +74,23 @@ class Fit:
         W = self.problem.W[self.problem.W > 0]
         return self.log_evidence + 0.5 * float(np.log(W).sum() - len(W) * log(2 * pi))
 
-    def refitted(self) -> Fit:
+    def refitted(self) -> Candidate:
         """Return the joint maximum from here."""
         if len(self.u) == 0:
             return self
         found = maximum(self.problem, self.u, self.theta)
-        return Fit(self.problem, found.u, found.theta)
+        return Candidate(self.problem, found.u, found.theta)
 
-    def part(self, rows: Int) -> Fit:
+    def part(self, rows: Int) -> Candidate:
         """Return some of the sources, as they are."""
         problem = self.problem._replace(prior=self.problem.prior.take(rows))
-        return Fit(problem, self.u[rows], self.theta[rows])
+        return Candidate(problem, self.u[rows], self.theta[rows])
 
-    def without(self, j: int) -> Fit:
+    def without(self, j: int) -> Candidate:
         """Return the fit without one source, the others refitted."""
         return self.part(np.delete(np.arange(len(self.u)), j)).refitted()
 
-    def enlarged(self, new: Newcomers) -> Fit:
+    def enlarged(self, new: NewSourcePrior) -> Candidate:
         """Return the fit with the source added that lowers Σ W r² most, all refitted.
 
         The lowest few minima over the grid are tried: near a sensor there are several.
@@ -100,32 +100,37 @@ class Fit:
         ))  # fmt: skip
         problem = self.problem._replace(prior=prior)
         places = scan(self.problem, self.levels.log_sigma, new)
-        fits = [Fit(problem, np.append(self.u, u), np.vstack([self.theta, theta])).refitted()
+        fits = [Candidate(problem, np.append(self.u, u), np.vstack([self.theta, theta])).refitted()
                 for u, theta in places]  # fmt: skip
         return max(fits, key=lambda fit: fit.log_evidence)
 
 
-def nothing(field: Field, xi: Float, W: Float) -> Fit:
+def nothing(field: PropagationModel, xi: Float, W: Float) -> Candidate:
     """Return the fit of no source at all."""
     prior = Prior(np.zeros(0), np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2, 2)))
-    return Fit(Problem(field, xi, W, prior), prior.mu, prior.theta)
+    return Candidate(JointPosterior(field, xi, W, prior), prior.mu, prior.theta)
 
 
 def grown(
-    field: Field, xi: Float, W: Float, new: Newcomers, n: int, patience: int | None = None
-) -> list[Fit]:
+    field: PropagationModel,
+    xi: Float,
+    W: Float,
+    new: NewSourcePrior,
+    n: int,
+    patience: int | None = None,
+) -> list[Candidate]:
     """Return the fits of 0 to n sources, each the last one with a source added.
 
     With a `patience`, growing ends when that many additions have not raised the evidence.
 
     Examples
     --------
-    >>> from arrivals.measurement_models.signal_strength.path_loss import Field
+    >>> from arrivals.measurement_models.signal_strength.path_loss import PropagationModel
     >>> rng = np.random.default_rng(0)
-    >>> field = Field(rng.uniform(-100.0, 100.0, (60, 2)), log_noise=4.6)
+    >>> field = PropagationModel(rng.uniform(-100.0, 100.0, (60, 2)), log_noise=4.6)
     >>> truth = np.array([[-40.0, 10.0], [30.0, 50.0]])
     >>> xi = field.levels(np.array([9.0, 9.2]), truth).log_sigma
-    >>> new = Newcomers.among(field.sensors, mu=9.2, v=0.12)
+    >>> new = NewSourcePrior.among(field.sensors, mu=9.2, v=0.12)
     >>> found = best(grown(field, xi, np.full(60, 200.0), new, 3), new)
     >>> found.theta[np.argsort(found.theta[:, 0])].round(0)
     array([[-40.,  10.],
@@ -140,7 +145,7 @@ def grown(
     return fits
 
 
-def best(fits: list[Fit], new: Newcomers) -> Fit:
+def best(fits: list[Candidate], new: NewSourcePrior) -> Candidate:
     """Return the fit of the largest evidence, then changed as long as that raises it.
 
     Growing one by one ends in basins where several sources share what is one's, or one has what
@@ -150,12 +155,12 @@ def best(fits: list[Fit], new: Newcomers) -> Fit:
     return _climbed(max(fits, key=lambda fit: fit.log_evidence_of_set), new, same_number=False)
 
 
-def refined(fit: Fit, new: Newcomers) -> Fit:
+def refined(fit: Candidate, new: NewSourcePrior) -> Candidate:
     """Return a fit of as many sources, changed as long as that raises the evidence."""
     return _climbed(fit, new, same_number=True)
 
 
-def _climbed(fit: Fit, new: Newcomers, same_number: bool) -> Fit:
+def _climbed(fit: Candidate, new: NewSourcePrior, same_number: bool) -> Candidate:
     while True:
         least = fit.log_evidence_of_set + GAIN
         others = changes(fit, new, same_number)
@@ -165,7 +170,7 @@ def _climbed(fit: Fit, new: Newcomers, same_number: bool) -> Fit:
         fit = better
 
 
-def changes(fit: Fit, new: Newcomers, same_number: bool) -> Iterator[Fit]:
+def changes(fit: Candidate, new: NewSourcePrior, same_number: bool) -> Iterator[Candidate]:
     """Give fits with one source dropped, two merged, or one looked for again.
 
     With `same_number`, a source is added for one dropped or merged.

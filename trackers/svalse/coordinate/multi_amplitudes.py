@@ -15,7 +15,7 @@ from arrivals.trackers.svalse.noise_initialization import NOISE_FLOOR
 from arrivals.typing import Complex, Float, Int
 
 
-class LooksAmplitudes(MergedSupport):
+class MultiSnapshotAmplitudes(MergedSupport):
     """Which of L components are in use, how strong in each look, and how strong the noise is.
 
     Attributes

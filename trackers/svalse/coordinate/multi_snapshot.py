@@ -13,7 +13,7 @@ import numpy as np
 
 from arrivals.measurement_models.manifolds.manifold import Manifold
 from arrivals.motion_models.bessel import inverse_bessel_ratio
-from arrivals.trackers.svalse.components import Fit, Prediction
+from arrivals.trackers.svalse.components import ComponentPosterior, ComponentPrior
 from arrivals.trackers.svalse.coordinate.angle_posterior import fold, quadrature, top_mode, unfold
 from arrivals.trackers.svalse.coordinate.circle_posterior import (
     CirclePrior,
@@ -21,16 +21,16 @@ from arrivals.trackers.svalse.coordinate.circle_posterior import (
     VonMisesPrior,
     grid_moments,
 )
-from arrivals.trackers.svalse.coordinate.multi_amplitudes import LooksAmplitudes
-from arrivals.trackers.svalse.coordinate.support import Places
+from arrivals.trackers.svalse.coordinate.multi_amplitudes import MultiSnapshotAmplitudes
+from arrivals.trackers.svalse.coordinate.support import InitialSupport
 from arrivals.trackers.svalse.noise_initialization import NOISE_FLOOR, noise_floor, power_floor
 from arrivals.typing import Complex, Float
 
 if TYPE_CHECKING:
-    from arrivals.trackers.svalse.coordinate.solver import CoordinateAscent
+    from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver
 
 
-class LooksAscent(LooksAmplitudes):
+class MultiSnapshotAscent(MultiSnapshotAmplitudes):
     """The working state of one step: amplitudes, and the angles of the components.
 
     Attributes
@@ -47,17 +47,17 @@ class LooksAscent(LooksAmplitudes):
 
     def __init__(
         self,
-        settings: CoordinateAscent,
+        settings: CoordinateSolver,
         Y: Complex,
         manifold: Manifold,
-        prediction: Prediction | None,
+        prediction: ComponentPrior | None,
     ) -> None:
         M = Y.shape[1]
         self.n_looks = Y.shape[0] * Y.shape[2]
         L = min(M, settings.max_components or M)
         self.settings, self.manifold = settings, manifold
         self._read_manifold()
-        places = Places.of(prediction, L)
+        places = InitialSupport.of(prediction, L)
         power = (Y.real**2 + Y.imag**2).sum(axis=(1, 2)) / (M * Y.shape[2])
         nu = self._first_noise(power, places.known)
         left = np.maximum(power - nu, NOISE_FLOOR * power)
@@ -86,7 +86,7 @@ class LooksAscent(LooksAmplitudes):
         else:
             self.norms = np.full((manifold.n_bins, 1), norm)
 
-    def _first_noise(self, power: Float, prediction: Prediction) -> Float:
+    def _first_noise(self, power: Float, prediction: ComponentPrior) -> Float:
         """Start ν from that of the last step, not above half the power; else from the SNR."""
         snr_db = 20.0 if self.settings.snr_db is None else self.settings.snr_db
         start = power * 10 ** (-snr_db / 10)
@@ -96,7 +96,7 @@ class LooksAscent(LooksAmplitudes):
             start = np.where(np.isnan(known), start, known)
         return np.asarray(np.maximum(start, NOISE_FLOOR * power))
 
-    def _read_prediction(self, prediction: Prediction, L: int) -> None:
+    def _read_prediction(self, prediction: ComponentPrior, L: int) -> None:
         n, mirror = self.n_carried, self.manifold.mirror
         weights = self.manifold.nuisance_weights
         eta = np.zeros(L, dtype=np.complex128)
@@ -256,12 +256,12 @@ class LooksAscent(LooksAmplitudes):
         moved, size = ((np.abs(x) ** 2 / power).sum() for x in (X - X_old, X_old))
         return bool(moved < self.settings.tolerance**2 * size) or not (X.any() or X_old.any())
 
-    def result(self, converged: bool) -> Fit:
+    def result(self, converged: bool) -> ComponentPosterior:
         """Return the fit; the amplitude of several looks is the root of their mean power."""
         single = self.Y.shape[0] == self.Y.shape[2] == 1
         resultant = np.minimum(np.abs(self.mean), 1 - 1e-15)
         rms = np.sqrt((np.abs(self.W) ** 2).mean(axis=(0, 2))) + 0j
-        return Fit(
+        return ComponentPosterior(
             theta=np.angle(self.mean),
             resultant=resultant,
             kappa=inverse_bessel_ratio(resultant),

@@ -15,7 +15,7 @@ import numpy as np
 
 from arrivals.measurement_models.manifolds.manifold import Manifold
 from arrivals.motion_models.bessel import inverse_bessel_ratio
-from arrivals.trackers.svalse.components import Fit, Prediction
+from arrivals.trackers.svalse.components import ComponentPosterior, ComponentPrior
 from arrivals.trackers.svalse.coordinate.angle_posterior import (
     AnglePosterior,
     fold,
@@ -25,9 +25,9 @@ from arrivals.trackers.svalse.coordinate.angle_posterior import (
     top_mode,
     unfold,
 )
-from arrivals.trackers.svalse.coordinate.multi_snapshot import LooksAscent
+from arrivals.trackers.svalse.coordinate.multi_snapshot import MultiSnapshotAscent
 from arrivals.trackers.svalse.coordinate.single_snapshot import Amplitudes
-from arrivals.trackers.svalse.coordinate.support import Places
+from arrivals.trackers.svalse.coordinate.support import InitialSupport
 from arrivals.trackers.svalse.noise_initialization import NOISE_FLOOR, autocorrelation, first_noise
 from arrivals.typing import Complex, Int
 
@@ -35,7 +35,7 @@ PosteriorName = Literal["quadrature", "mixture"]
 
 
 @dataclass(frozen=True)
-class CoordinateAscent:
+class CoordinateSolver:
     """Settings of the ascent.
 
     Parameters
@@ -78,7 +78,9 @@ class CoordinateAscent:
     max_snr_db: float | None = None
     n_moments: int = 0
 
-    def fit(self, Y: Complex, manifold: Manifold, prediction: Prediction | None) -> Fit:
+    def fit(
+        self, Y: Complex, manifold: Manifold, prediction: ComponentPrior | None
+    ) -> ComponentPosterior:
         """Fit the looks of one step: start, then iterate (sections III and IV, Fig. 3).
 
         Parameters
@@ -92,9 +94,9 @@ class CoordinateAscent:
             return SILENCE
         if self._for_a_line(Y, manifold):
             return self.iterate(self.step(Y[0, :, 0], manifold, prediction))
-        return self.iterate(LooksAscent(self, Y, manifold, prediction))
+        return self.iterate(MultiSnapshotAscent(self, Y, manifold, prediction))
 
-    def iterate(self, step: Ascent | LooksAscent) -> Fit:
+    def iterate(self, step: SingleSnapshotAscent | MultiSnapshotAscent) -> ComponentPosterior:
         """Improve support, variances and angles in turn until the reconstruction rests."""
         x, converged, most = step.start(), False, self.max_iterations
         while not converged and step.iterations < most and not step.cycles(most):
@@ -112,8 +114,8 @@ class CoordinateAscent:
         self,
         Ys: Sequence[Complex],
         manifold: Manifold,
-        predictions: Sequence[Prediction | None],
-    ) -> list[Fit]:
+        predictions: Sequence[ComponentPrior | None],
+    ) -> list[ComponentPosterior]:
         """Fit independent snapshots of one array, one after the other."""
         return [self.fit(Y, manifold, known) for Y, known in zip(Ys, predictions, strict=True)]
 
@@ -123,12 +125,14 @@ class CoordinateAscent:
         line = manifold.coefficients is None and Y.shape[0] == Y.shape[2] == 1
         return plain and line and self.temper == 1
 
-    def step(self, y: Complex, manifold: Manifold, prediction: Prediction | None) -> Ascent:
+    def step(
+        self, y: Complex, manifold: Manifold, prediction: ComponentPrior | None
+    ) -> SingleSnapshotAscent:
         """Return the working state for one snapshot."""
-        return Ascent(self, y, manifold, prediction)
+        return SingleSnapshotAscent(self, y, manifold, prediction)
 
 
-class Ascent(Amplitudes):
+class SingleSnapshotAscent(Amplitudes):
     """The working state of one snapshot: amplitudes, and the angles of the components.
 
     Attributes
@@ -141,16 +145,16 @@ class Ascent(Amplitudes):
 
     def __init__(
         self,
-        settings: CoordinateAscent,
+        settings: CoordinateSolver,
         y: Complex,
         manifold: Manifold,
-        prediction: Prediction | None,
+        prediction: ComponentPrior | None,
     ) -> None:
         M = len(y)
         L = min(M, settings.max_components or M)
         self.settings, self.manifold, self.k = settings, manifold, manifold.harmonics
         self.degree = max(int(np.abs(self.k).max()), 1)
-        places = Places.of(prediction, L)
+        places = InitialSupport.of(prediction, L)
         known, n = places.known, places.n_carried
         power = float(np.vdot(y, y).real) / M
         nu = first_noise(y, self.k, settings.snr_db)
@@ -222,10 +226,10 @@ class Ascent(Amplitudes):
         rests = np.linalg.norm(x - x_old) < self.settings.tolerance * np.linalg.norm(x_old)
         return bool(rests or not (x.any() or x_old.any()))
 
-    def result(self, converged: bool) -> Fit:
+    def result(self, converged: bool) -> ComponentPosterior:
         """Return the fit."""
         resultant = np.minimum(np.abs(self.mean), 1 - 1e-15)
-        return Fit(
+        return ComponentPosterior(
             theta=np.angle(self.mean),
             resultant=resultant,
             kappa=inverse_bessel_ratio(resultant),
@@ -240,7 +244,7 @@ class Ascent(Amplitudes):
         )
 
 
-SILENCE = Fit(
+SILENCE = ComponentPosterior(
     theta=np.zeros(0),
     resultant=np.zeros(0),
     kappa=np.zeros(0),

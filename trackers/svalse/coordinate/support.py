@@ -12,7 +12,7 @@ import numpy as np
 
 from arrivals.measurement_models.manifolds.manifold import Manifold
 from arrivals.motion_models.von_mises import wrap
-from arrivals.trackers.svalse.components import Prediction
+from arrivals.trackers.svalse.components import ComponentPrior
 from arrivals.typing import Bool, Complex, Float, Int
 
 CYCLE = 0.2  # of the iterations allowed: a component merged away so often is in a limit cycle
@@ -63,7 +63,7 @@ class GreedySupport(ABC):
 
 
 @dataclass(frozen=True, eq=False)
-class Places:
+class InitialSupport:
     """How a step begins: what the prediction says of each of L components.
 
     Parameters
@@ -79,25 +79,25 @@ class Places:
         Whether ρ is learned, since nothing is carried.
     """
 
-    known: Prediction
+    known: ComponentPrior
     n_carried: int
     rho: Float
     n_expected: int
     learn_rho: bool
 
     @classmethod
-    def of(cls, prediction: Prediction | None, L: int) -> Places:
+    def of(cls, prediction: ComponentPrior | None, L: int) -> InitialSupport:
         """Return the beginning of a step.
 
         Examples
         --------
-        >>> Places.of(None, 4).rho
+        >>> InitialSupport.of(None, 4).rho
         array([0.5, 0.5, 0.5, 0.5])
         """
         half = max(L // 2, 1)
         if prediction is None or len(prediction.mu) == 0:
             noise, none = None if prediction is None else prediction.noise, np.zeros(0)
-            known = Prediction(none, none, none, half / L, noise=noise)
+            known = ComponentPrior(none, none, none, half / L, noise=noise)
             return cls(known, 0, np.full(L, half / L), half, learn_rho=True)
         n = min(len(prediction.mu), L)
         rho = np.concatenate([prediction.existence[:n], np.full(L - n, prediction.birth)])
@@ -129,7 +129,7 @@ class MergedSupport(GreedySupport):
     merged: Int
     iterations: int
 
-    def begin(self, places: Places) -> None:
+    def begin(self, places: InitialSupport) -> None:
         """Keep what a step begins with."""
         L = len(places.rho)
         self.n_carried, self.learn_rho = places.n_carried, places.learn_rho

@@ -28,7 +28,7 @@ def every(rows: Bool) -> bool:
 
 
 @dataclass(eq=False)
-class Rows:
+class BatchRecord:
     """A record whose fields are arrays, or such records, with the same leading axis.
 
     Asked for all of its rows a record gives itself, not a copy, so that one problem alone costs
@@ -47,7 +47,7 @@ class Rows:
     def _taken(self, of: Int) -> Self:
         return type(self)(
             **{
-                name: part._taken(of) if isinstance(part, Rows) else part.take(of, axis=0)
+                name: part._taken(of) if isinstance(part, BatchRecord) else part.take(of, axis=0)
                 for name, part in vars(self).items()
             }
         )
@@ -63,7 +63,7 @@ class Rows:
 
 
 def _put(old: Any, of: Int, new: Any) -> Any:
-    if isinstance(old, Rows):
+    if isinstance(old, BatchRecord):
         return old._with(of, new)
     if old.shape[1:] == new.shape[1:]:
         full = old.copy()

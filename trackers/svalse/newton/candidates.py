@@ -19,10 +19,10 @@ from arrivals.trackers.svalse.newton.elbo import (
     PLACE,
     PRIOR_KAPPA,
     PRIOR_MU,
+    Evaluation,
     S,
-    State,
 )
-from arrivals.trackers.svalse.newton.expected_response import Response, over_snapshots
+from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse, over_snapshots
 from arrivals.trackers.svalse.newton.step import LARGEST_VARIANCE
 from arrivals.typing import Bool, Float, Int
 
@@ -42,7 +42,7 @@ class Grid:
         Two components are to be no nearer than this, rad of direction.
     """
 
-    def __init__(self, response: Response, per_sensor: int, merge: float) -> None:
+    def __init__(self, response: ExpectedResponse, per_sensor: int, merge: float) -> None:
         self.manifold: Manifold = response.manifold
         self.response = response
         n = int(np.ceil(per_sensor * max(response.extent, 4)))
@@ -67,7 +67,7 @@ class Grid:
         return np.asarray(np.cos(doa[..., None] - self.doa) > self.cos_merge)
 
 
-def nearest_later(grid: Grid, state: State) -> Int:
+def nearest_later(grid: Grid, state: Evaluation) -> Int:
     """Return the first component too near to an earlier one, (B,), or -1."""
     none = np.full(len(state), -1)
     L = state.facts.shape[2]
@@ -83,7 +83,7 @@ def nearest_later(grid: Grid, state: State) -> Int:
     return np.where(later.any(axis=1), later.argmax(axis=1), -1)
 
 
-def removal_gains(response: Response, state: State, kl: float) -> Float:
+def removal_gains(response: ExpectedResponse, state: Evaluation, kl: float) -> Float:
     """Return by how much the criterion would rise without each component, (B, L).
 
     Exact while the angles are held; -inf in unused places.
@@ -96,7 +96,7 @@ def removal_gains(response: Response, state: State, kl: float) -> Float:
     return np.where(state.used, gain, -np.inf)
 
 
-def relearned(response: Response, state: State) -> Float:
+def relearned(response: ExpectedResponse, state: Evaluation) -> Float:
     """Return what F would rise further after each removal if ν were learned again, (B, L).
 
     A bin of d' degrees of freedom without the component, whose noise would be x times ν, gains
@@ -111,7 +111,7 @@ def relearned(response: Response, state: State) -> Float:
 
 
 @dataclass(frozen=True, eq=False)
-class Births:
+class NewComponents:
     """The best component to add to each problem, and its rivals.
 
     Attributes
@@ -128,14 +128,14 @@ class Births:
 
 def births(
     grid: Grid,
-    state: State,
+    state: Evaluation,
     odds: Float,
     memory: Float,
     revivable: Bool,
     barred: Bool,
     room: Int,
     kl: float,
-) -> Births:
+) -> NewComponents:
     """Find what to add: a fresh component, or one that was removed before.
 
     Parameters
@@ -171,10 +171,10 @@ def births(
         n = rivals(grid, facts, n, fresh, u2, variance, room)
     if revivable.any():
         revive(grid, facts, n, gain, base, variance, cost, memory, revivable, kl)
-    return Births(facts, n)
+    return NewComponents(facts, n)
 
 
-def evidence(grid: Grid, state: State) -> tuple[Float, Float, Float]:
+def evidence(grid: Grid, state: Evaluation) -> tuple[Float, Float, Float]:
     """Return what a component at each angle would gain, its |u|², and its angle's variance."""
     P = state.A.conj() @ grid.A.swapaxes(1, 2)  # âᴴa
     residual = state.Y - state.A.swapaxes(2, 3) @ state.W
@@ -247,7 +247,7 @@ def without(facts: Float, k: Int) -> Float:
     return np.asarray(facts[rows, :, np.minimum(order, L - 1)].swapaxes(1, 2))
 
 
-def joined(facts: Float, K: Int, new: Births) -> tuple[Float, Int]:
+def joined(facts: Float, K: Int, new: NewComponents) -> tuple[Float, Int]:
     """Return the components (B, 7, L) with the new ones behind the K in use."""
     total = K + new.n
     full = np.zeros((*facts.shape[:2], max(int(total.max()), facts.shape[2])))

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from arrivals.trackers.svalse.newton.batch import Rows
-from arrivals.trackers.svalse.newton.expected_response import Response, diagonals
+from arrivals.trackers.svalse.newton.batch import BatchRecord
+from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse, diagonals
 from arrivals.typing import Bool, Complex, Float, Int
 
 # What is known of a component: rows of the arrays of components, (B, 7, L).
@@ -27,7 +27,7 @@ LOG_2PIE = float(np.log(2 * np.pi * np.e))
 
 
 @dataclass(eq=False)
-class State(Rows):
+class Evaluation(BatchRecord):
     """Components, variances, and all that follows from them; never written into.
 
     Attributes
@@ -46,7 +46,8 @@ class State(Rows):
     A : ndarray, shape (B, F, L, n_sensors)
         Mean steering vectors â.
     X : ndarray, shape (B, F, 3 or 4, L, L)
-        `Response.products`; the diagonals are ⟨‖a‖²⟩ in the first, and half its first and second
+        `ExpectedResponse.products`; the diagonals are ⟨‖a‖²⟩ in the first, and half its first and
+        second
         derivatives in the second and third.
     h : ndarray, shape (B, F, 3, L, N)
         âᴴY, (∂â)ᴴY, (∂²â)ᴴY.
@@ -93,12 +94,12 @@ class State(Rows):
         """(∂â)ᴴ∂â off the diagonal, (B, F, L, L)."""
         return self.X[:, :, 3] if self.X.shape[2] == 4 else -self.X[:, :, 2]
 
-    def trimmed(self) -> State:
+    def trimmed(self) -> Evaluation:
         """Return the same without places that no problem uses."""
         L = max(*self.K.tolist(), 1)
         if self.facts.shape[2] == L:
             return self
-        return State(
+        return Evaluation(
             self.Y, self.facts[:, :, :L], self.K, self.used[:, :L], self.nu, self.tau, self.rest,
             self.A[:, :, :L], self.X[..., :L, :L], self.h[:, :, :, :L], self.lost[:, :, :L],
             self.pull[:, :L], self.D[:, :L], self.prior, self.W[:, :, :L], self.G[:, :, :L, :L],
@@ -111,8 +112,8 @@ class State(Rows):
 
 
 def evaluate(
-    response: Response, Y: Complex, facts: Float, K: Int, nu: Float, tau: Float, rest: Float
-) -> State:
+    response: ExpectedResponse, Y: Complex, facts: Float, K: Int, nu: Float, tau: Float, rest: Float
+) -> Evaluation:
     """Return the state of given components and variances."""
     L = facts.shape[2]
     used = np.arange(L) < K[:, None]
@@ -128,23 +129,25 @@ def evaluate(
         pull, D, each = pull * used, D * used, each * used
     prior = rest + each.sum(axis=1)
     W, G, explained, F = amplitudes(response, X[:, :, 0], h[:, :, 0], used, K, nu, tau)
-    return State(
+    return Evaluation(
         Y, facts, K, used, nu, tau, rest, A, X, h, lost, pull, D, prior, W, G, explained, F + prior
     )
 
 
-def with_variances(response: Response, state: State, nu: Float, tau: Float) -> State:
+def with_variances(
+    response: ExpectedResponse, state: Evaluation, nu: Float, tau: Float
+) -> Evaluation:
     """Return the state with other variances; the angles stay."""
     s = state
     W, G, explained, F = amplitudes(response, s.X[:, :, 0], s.h[:, :, 0], s.used, s.K, nu, tau)
-    return State(
+    return Evaluation(
         s.Y, s.facts, s.K, s.used, nu, tau, s.rest, s.A, s.X, s.h, s.lost, s.pull, s.D, s.prior,
         W, G, explained, F + s.prior,
     )  # fmt: skip
 
 
 def amplitudes(
-    response: Response, J: Complex, H: Complex, used: Bool, K: Int, nu: Float, tau: Float
+    response: ExpectedResponse, J: Complex, H: Complex, used: Bool, K: Int, nu: Float, tau: Float
 ) -> tuple[Complex, Complex, Float, Float]:
     """Return Ŵ = G H, G = (J + ν/τ I)⁻¹, Re tr HᴴŴ, and what all this gives to the ELBO.
 

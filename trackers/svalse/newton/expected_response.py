@@ -13,7 +13,7 @@ from arrivals.typing import Bool, Complex, Float
 Array = TypeVar("Array", Float, Complex)
 
 
-class Response:
+class ExpectedResponse:
     """Mean steering vectors of wrapped normal angles, â = G ⟨d⟩ with ⟨d_k⟩ = exp(jkμ - k²s/2).
 
     Parameters
@@ -37,8 +37,8 @@ class Response:
 
     Examples
     --------
-    >>> from arrivals.measurement_models.manifolds.manifold import GridLine
-    >>> response = Response(GridLine(np.arange(3), step=np.pi, origin=1.0))
+    >>> from arrivals.measurement_models.manifolds.manifold import UniformLineManifold
+    >>> response = ExpectedResponse(UniformLineManifold(np.arange(3), step=np.pi, origin=1.0))
     >>> response(np.zeros((1, 1)), np.full((1, 1), 0.2))[0, 0, 0].real.round(4)
     array([[0.9048, 1.    , 0.9048]])
     >>> round(float(response.extent), 6)

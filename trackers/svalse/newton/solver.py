@@ -13,19 +13,19 @@ from functools import lru_cache
 import numpy as np
 
 from arrivals.measurement_models.manifolds.manifold import Manifold
-from arrivals.trackers.svalse.components import Fit, Prediction
+from arrivals.trackers.svalse.components import ComponentPosterior, ComponentPrior
 from arrivals.trackers.svalse.newton.batch import every, some
 from arrivals.trackers.svalse.newton.candidates import Grid, removal_gains
-from arrivals.trackers.svalse.newton.expected_response import Response
-from arrivals.trackers.svalse.newton.state import Problem, Work, nothing_found, result, start
+from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
+from arrivals.trackers.svalse.newton.state import Problem, SolverState, nothing_found, result, start
 from arrivals.trackers.svalse.newton.step import ascend
-from arrivals.trackers.svalse.newton.support_search import Bursts, Moves
+from arrivals.trackers.svalse.newton.support_search import IterationLimits, SupportSearch
 from arrivals.trackers.svalse.noise_initialization import noise_floor, power_floor
 from arrivals.typing import Complex
 
 
 @dataclass(frozen=True)
-class JointNewton:
+class NewtonSolver:
     """Settings of the engine.
 
     Parameters
@@ -91,7 +91,9 @@ class JointNewton:
     power_floor: float | None = None
     max_snr_db: float | None = None
 
-    def fit(self, Y: Complex, manifold: Manifold, prediction: Prediction | None) -> Fit:
+    def fit(
+        self, Y: Complex, manifold: Manifold, prediction: ComponentPrior | None
+    ) -> ComponentPosterior:
         """Fit looks (n_bins, n_sensors, n_snapshots); no prediction: nothing is known."""
         return self.fit_batch([Y], manifold, [prediction])[0]
 
@@ -99,8 +101,8 @@ class JointNewton:
         self,
         Ys: Sequence[Complex],
         manifold: Manifold,
-        predictions: Sequence[Prediction | None],
-    ) -> list[Fit]:
+        predictions: Sequence[ComponentPrior | None],
+    ) -> list[ComponentPosterior]:
         """Fit independent snapshots of one array, as one array program."""
         most = self.most(manifold)
         problems = [Problem(Y, known, most) for Y, known in zip(Ys, predictions, strict=True)]
@@ -116,13 +118,13 @@ class JointNewton:
         """Return how many components there may be on an array."""
         return min(manifold.n_sensors, self.max_components or manifold.n_sensors)
 
-    def _solved(self, problems: list[Problem], manifold: Manifold) -> list[Fit]:
+    def _solved(self, problems: list[Problem], manifold: Manifold) -> list[ComponentPosterior]:
         """Fit snapshots that have power: moves and Newton steps in turn until all rest."""
         moves = moves_on(self, manifold, problems[0].Y.shape[2])
         work = start(problems, moves.response, self.snr_db, len(moves.grid.theta), moves.places)
         work.left[:] = np.where(work.free, 0, self.inner)
         work.tolerance[:] = self.inner_tolerance
-        fits: dict[int, Fit] = {}
+        fits: dict[int, ComponentPosterior] = {}
         while len(work):
             over = work.left == 0
             if some(over):
@@ -143,7 +145,7 @@ class JointNewton:
             self.climb(moves.response, work)
         return [fits[n] for n in range(len(problems))]
 
-    def climb(self, response: Response, work: Work) -> None:
+    def climb(self, response: ExpectedResponse, work: SolverState) -> None:
         """Take one Newton step in every problem; a burst goes on while its steps gain much."""
         before = work.state.F
         work.state = ascend(response, work.state, work.learn)
@@ -155,19 +157,19 @@ class JointNewton:
 
 
 @lru_cache(maxsize=16)  # of a whole array, and of some sets of sensors: each holds a grid of waves
-def moves_on(engine: JointNewton, manifold: Manifold, n_snapshots: int) -> Moves:
+def moves_on(engine: NewtonSolver, manifold: Manifold, n_snapshots: int) -> SupportSearch:
     """Return the moves between Newton steps, for an array and so many snapshots a step."""
     M, most, n_looks = manifold.n_sensors, engine.most(manifold), manifold.n_bins * n_snapshots
-    response = Response(
+    response = ExpectedResponse(
         manifold,
         engine.temper,
         power_floor(engine.power_floor, n_looks),
         noise_floor(engine.max_snr_db),
     )
-    return Moves(
+    return SupportSearch(
         response,
         Grid(response, engine.grid, engine.merge),
-        Bursts(
+        IterationLimits(
             engine.inner,
             engine.removal,
             engine.fill_inner,

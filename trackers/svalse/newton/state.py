@@ -9,8 +9,8 @@ import numpy as np
 
 from arrivals.measurement_models.manifolds.manifold import Manifold
 from arrivals.motion_models.bessel import bessel_ratio, log_i0
-from arrivals.trackers.svalse.components import Fit, Prediction
-from arrivals.trackers.svalse.newton.batch import Rows
+from arrivals.trackers.svalse.components import ComponentPosterior, ComponentPrior
+from arrivals.trackers.svalse.newton.batch import BatchRecord
 from arrivals.trackers.svalse.newton.candidates import LOG_2PI
 from arrivals.trackers.svalse.newton.elbo import (
     KL_CONSTANT,
@@ -20,11 +20,11 @@ from arrivals.trackers.svalse.newton.elbo import (
     PLACE,
     PRIOR_KAPPA,
     PRIOR_MU,
+    Evaluation,
     S,
-    State,
     evaluate,
 )
-from arrivals.trackers.svalse.newton.expected_response import Response
+from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
 from arrivals.trackers.svalse.newton.step import LARGEST_VARIANCE
 from arrivals.trackers.svalse.noise_initialization import NOISE_FLOOR, first_noise, quiet_noise
 from arrivals.typing import Bool, Complex, Float, Int
@@ -32,7 +32,7 @@ from arrivals.typing import Bool, Complex, Float, Int
 SURE = 500.0  # log odds that stand for certainty
 DB = 10 / np.log(10)
 NOISIEST_DB, CLEANEST_DB = 0.7 * DB, 12 * DB  # signal-to-noise ratios from which to start
-NOTHING = Prediction(np.zeros(0), np.zeros(0), np.zeros(0), 0.5)
+NOTHING = ComponentPrior(np.zeros(0), np.zeros(0), np.zeros(0), 0.5)
 
 
 class Problem:
@@ -59,7 +59,7 @@ class Problem:
         Steps since each was last active.
     """
 
-    def __init__(self, Y: Complex, known: Prediction | None, most: int) -> None:
+    def __init__(self, Y: Complex, known: ComponentPrior | None, most: int) -> None:
         self.known = NOTHING if known is None else known
         self.power = (Y.real**2 + Y.imag**2).sum(axis=(1, 2)) / (Y.shape[1] * Y.shape[2])
         self.silent = not self.power.any()
@@ -88,7 +88,7 @@ class Problem:
 
 
 @dataclass(eq=False)
-class Work(Rows):
+class SolverState(BatchRecord):
     """The working state of problems that are being solved, one a row.
 
     Attributes
@@ -122,8 +122,8 @@ class Work(Rows):
     """
 
     row: Int
-    state: State
-    saved: State
+    state: Evaluation
+    saved: Evaluation
     memory: Float
     n_known: Int
     revivable: Bool
@@ -149,8 +149,12 @@ class Work(Rows):
 
 
 def start(
-    problems: Sequence[Problem], response: Response, snr_db: float | None, n_angles: int, most: int
-) -> Work:
+    problems: Sequence[Problem],
+    response: ExpectedResponse,
+    snr_db: float | None,
+    n_angles: int,
+    most: int,
+) -> SolverState:
     """Return the state in which all carried components are active, the noise as it starts."""
     B = len(problems)
     facts = carried(problems, response.extent)
@@ -169,7 +173,7 @@ def start(
     nu = np.outer(nu, np.ones(response.n_bins))
     state = evaluate(response, Y, facts, K, nu, tau, rest)
     off, zero, nan = np.zeros(B, dtype=np.bool_), np.zeros(B, dtype=np.int64), np.full(B, np.nan)
-    return Work(
+    return SolverState(
         row=np.arange(B), state=state, saved=state, memory=facts, n_known=K,
         revivable=np.zeros((B, facts.shape[2]), dtype=np.bool_),
         barred=np.zeros((B, n_angles), dtype=np.bool_),
@@ -212,14 +216,14 @@ def log_odds(rho: Float) -> Float:
 
 
 def result(
-    work: Work,
+    work: SolverState,
     i: int,
     problem: Problem,
     manifold: Manifold,
     gains: Float,
     keep: float,
     max_age: int,
-) -> Fit:
+) -> ComponentPosterior:
     """Return the fit of the i-th row, whose components would gain so much by removal."""
     state, K, n = work.state, int(work.state.K[i]), int(work.n_known[i])
     memory = work.memory[i, :, :n].copy()
@@ -235,7 +239,7 @@ def result(
     newest = -10 * mean(np.log10(state.nu[i]))
     noise, power = state.nu[i] * problem.power, state.tau[i] * problem.power
     snr_db = (1 - keep) * work.snr_db[i] + keep * newest
-    return Fit(
+    return ComponentPosterior(
         theta=front(manifold, memory[MU]),
         resultant=np.exp(-memory[S] / 2),
         kappa=1 / memory[S],
@@ -271,11 +275,11 @@ def front(manifold: Manifold, mu: Float) -> Float:
     return manifold.from_doa(manifold.to_doa(theta)) if manifold.mirror else theta
 
 
-def nothing_found(problem: Problem, max_age: int) -> Fit:
+def nothing_found(problem: Problem, max_age: int) -> ComponentPosterior:
     """Return the fit of a step that holds no source: what is carried ages, all power is noise."""
     known, n = problem.known, problem.n
     age = problem.age + 1
-    return Fit(
+    return ComponentPosterior(
         theta=known.mu[:n],
         resultant=bessel_ratio(known.kappa[:n]),
         kappa=known.kappa[:n],

@@ -8,8 +8,12 @@ from __future__ import annotations
 import numpy as np
 
 from arrivals.trackers.svalse.newton.batch import some
-from arrivals.trackers.svalse.newton.elbo import MU, S, State, evaluate, with_variances
-from arrivals.trackers.svalse.newton.expected_response import Response, diagonals, over_snapshots
+from arrivals.trackers.svalse.newton.elbo import MU, Evaluation, S, evaluate, with_variances
+from arrivals.trackers.svalse.newton.expected_response import (
+    ExpectedResponse,
+    diagonals,
+    over_snapshots,
+)
 from arrivals.typing import Bool, Complex, Float
 
 LARGEST_VARIANCE = 0.3  # rad²: a wrapped normal density of more is no longer normal
@@ -20,14 +24,16 @@ SHORTER = ((1 / 4, 1.0), (1 / 16, 1.0), (1 / 64, 1.0), (1 / 16, 1 / 16), (1 / 25
 SMALLEST_CURVATURE = 1e-3  # of the largest: what is flatter is no direction to run along
 
 
-def weights(state: State) -> tuple[Complex, Complex]:
+def weights(state: Evaluation) -> tuple[Complex, Complex]:
     """Return Ŵ*/ν, (B, F, L, N), and Pₗₗ' = Σ ŵ*ₗ ŵₗ'/ν + N Gₗ'ₗ, (B, F, L, L)."""
     v = state.W.conj() / state.nu[:, :, None, None]
     G, N = state.G.swapaxes(2, 3), v.shape[3]
     return v, v @ state.W.swapaxes(2, 3) + (G if N == 1 else N * G)
 
 
-def slopes(response: Response, state: State, v: Complex, P: Complex) -> tuple[Float, Float]:
+def slopes(
+    response: ExpectedResponse, state: Evaluation, v: Complex, P: Complex
+) -> tuple[Float, Float]:
     """Return ∂F/∂μ and the curvature with the amplitudes held, -∂²F/∂μ², both (B, L).
 
     The fixed point of the variances is s = 1/curvature: ∂F/∂s = 1/2s - curvature/2.
@@ -39,7 +45,9 @@ def slopes(response: Response, state: State, v: Complex, P: Complex) -> tuple[Fl
     return both[:, 0] - state.pull.imag, state.pull.real - both[:, 1]
 
 
-def negative_hessian(response: Response, state: State, P: Complex, curvature: Float) -> Float:
+def negative_hessian(
+    response: ExpectedResponse, state: Evaluation, P: Complex, curvature: Float
+) -> Float:
     """Return -∂²F/∂μ∂μ' with the amplitudes eliminated, (B, L, L).
 
     One term of second order, tr(G ∂J G ∂J), is left out.
@@ -66,7 +74,7 @@ def direction(g: Float, N: Float, longest: float) -> Float:
     return np.asarray(d * np.minimum(1.0, longest / np.maximum(size, 1e-300)))
 
 
-def ascend(response: Response, state: State, learn: Bool) -> State:
+def ascend(response: ExpectedResponse, state: Evaluation, learn: Bool) -> Evaluation:
     """Take one Newton step, and learn ν and τ in the rows that say so; the ELBO never falls.
 
     Parameters
@@ -88,7 +96,7 @@ def ascend(response: Response, state: State, learn: Bool) -> State:
     return best
 
 
-def moved(response: Response, state: State, d: Float, s: Float) -> State:
+def moved(response: ExpectedResponse, state: Evaluation, d: Float, s: Float) -> Evaluation:
     """Return the state with the angles moved by d and of the variances s."""
     facts = state.facts.copy()
     facts[:, MU] += d
@@ -96,7 +104,7 @@ def moved(response: Response, state: State, d: Float, s: Float) -> State:
     return evaluate(response, state.Y, facts, state.K, state.nu, state.tau, state.rest)
 
 
-def shortened(response: Response, state: State, d: Float, s: Float) -> State:
+def shortened(response: ExpectedResponse, state: Evaluation, d: Float, s: Float) -> Evaluation:
     """Return the state after the first of some shorter steps that does not make F fall."""
     best, left = state, np.ones(len(state), dtype=np.bool_)
     way = s / np.where(state.used, state.facts[:, S], s)
@@ -114,12 +122,12 @@ def shortened(response: Response, state: State, d: Float, s: Float) -> State:
     return best
 
 
-def fell(new: State, old: State) -> Bool:
+def fell(new: Evaluation, old: Evaluation) -> Bool:
     """Tell in which rows F fell by more than rounding."""
     return np.asarray(~(new.F >= old.F - ROUNDING))
 
 
-def learned(response: Response, state: State) -> State:
+def learned(response: ExpectedResponse, state: Evaluation) -> Evaluation:
     """Return the state with ν and τ by their fixed points, ν with effective degrees of freedom.
 
     It has the fixed points of (58) and (59), and is some 1.5 K/M times nearer to them. Where F
@@ -147,7 +155,7 @@ def learned(response: Response, state: State) -> State:
     return new
 
 
-def floored(response: Response, state: State, nu: Float, tau: Float) -> Float:
+def floored(response: ExpectedResponse, state: Evaluation, nu: Float, tau: Float) -> Float:
     """Return τ, not below the power that counts as a source; the old one where there is none."""
     if response.power_floor:
         tau = np.maximum(tau, response.power_floor * nu / response.norm2[:, 0])

@@ -16,16 +16,16 @@ from arrivals.trackers.svalse.newton.candidates import (
     removal_gains,
     without,
 )
-from arrivals.trackers.svalse.newton.elbo import MU, ODDS, PLACE, State, evaluate
-from arrivals.trackers.svalse.newton.expected_response import Response
-from arrivals.trackers.svalse.newton.state import Work, log_odds
+from arrivals.trackers.svalse.newton.elbo import MU, ODDS, PLACE, Evaluation, evaluate
+from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
+from arrivals.trackers.svalse.newton.state import SolverState, log_odds
 from arrivals.typing import Bool, Float, Int
 
 MARGIN = 1e-3  # nats by which an addition must raise the record
 
 
 @dataclass(frozen=True)
-class Bursts:
+class IterationLimits:
     """How many Newton steps follow a move, and the change of F, nats, at which they rest."""
 
     inner: int
@@ -37,7 +37,7 @@ class Bursts:
 
 
 @dataclass(frozen=True, eq=False)
-class Moves:
+class SupportSearch:
     """What is done to the support, with all that bounds it.
 
     Parameters
@@ -56,9 +56,9 @@ class Moves:
         Whether a removal counts what the noise gains by being learned again.
     """
 
-    response: Response
+    response: ExpectedResponse
     grid: Grid
-    bursts: Bursts
+    bursts: IterationLimits
     kl: float
     places: int
     most: int
@@ -67,7 +67,7 @@ class Moves:
     max_iterations: int
     relearn: bool = False
 
-    def choose(self, work: Work) -> None:
+    def choose(self, work: SolverState) -> None:
         """Judge what is on trial, and choose the next burst of each problem: one pass 1-4."""
         exhausted = self.judge(work)
         stop = (work.moves >= self.max_moves) | (work.iterations >= self.max_iterations)
@@ -80,7 +80,7 @@ class Moves:
         work.trial = added
         np.minimum(work.left, self.max_iterations - work.iterations, out=work.left)
 
-    def judge(self, work: Work) -> Bool:
+    def judge(self, work: SolverState) -> Bool:
         """Keep additions that raise the record, undo the others and tell which they are."""
         if not some(work.trial):
             return np.zeros(len(work), dtype=np.bool_)
@@ -96,7 +96,7 @@ class Moves:
             work.rejected = np.where(worse, work.state.F, work.rejected)
         return worse
 
-    def merge(self, work: Work, rows: Bool) -> None:
+    def merge(self, work: SolverState, rows: Bool) -> None:
         """Switch off every component too near to an earlier one, and let none be born there."""
         later = nearest_later(self.grid, work.state)
         while some(rows & (later >= 0)):
@@ -108,7 +108,7 @@ class Moves:
             self.drop(work, near, later, revivable=False)
             later = nearest_later(self.grid, work.state)
 
-    def remove(self, work: Work, rows: Bool) -> Bool:
+    def remove(self, work: SolverState, rows: Bool) -> Bool:
         """Remove the component whose removal gains most, if it gains; tell where one was."""
         if not some(rows):
             return rows
@@ -122,7 +122,7 @@ class Moves:
             self.burst(work, rows, self.bursts.removal, self.bursts.inner_tolerance)
         return rows
 
-    def drop(self, work: Work, rows: Bool, k: Int, revivable: bool) -> None:
+    def drop(self, work: SolverState, rows: Bool, k: Int, revivable: bool) -> None:
         """Remove the k-th component of some rows, and remember it as it is."""
         of, k = np.flatnonzero(rows), k[rows]
         state = work.state
@@ -135,7 +135,7 @@ class Moves:
         changed(work, rows)
         self.evaluated(work, rows, without(state.facts[rows], k), state.K[rows] - 1)
 
-    def add(self, work: Work, rows: Bool) -> Bool:
+    def add(self, work: SolverState, rows: Bool) -> Bool:
         """Add the best newcomers on trial; tell where there are some."""
         state = work.state
         room = np.where(work.filling, self.fill_to, self.most) - state.K
@@ -162,7 +162,7 @@ class Moves:
             self.burst(work, found, n, self.bursts.inner_tolerance)
         return found
 
-    def rest(self, work: Work, idle: Bool, stop: Bool) -> None:
+    def rest(self, work: SolverState, idle: Bool, stop: Bool) -> None:
         """Where no move is left: end the fill stage, take the final steps, or be done."""
         work.done = idle & ((work.finished & ~work.filling) | stop)
         work.finished = work.finished & ~(stop & ~work.finished)
@@ -182,12 +182,12 @@ class Moves:
             work.finished = work.finished | final
             self.burst(work, final, self.bursts.final, self.bursts.tolerance)
 
-    def burst(self, work: Work, rows: Bool, n: Int | int, tolerance: float) -> None:
+    def burst(self, work: SolverState, rows: Bool, n: Int | int, tolerance: float) -> None:
         """Set the number of Newton steps that follow."""
         work.left = np.where(rows, n, work.left)
         work.tolerance = np.where(rows, tolerance, work.tolerance)
 
-    def evaluated(self, work: Work, rows: Bool, facts: Float, K: Int) -> None:
+    def evaluated(self, work: SolverState, rows: Bool, facts: Float, K: Int) -> None:
         """Give some rows other components."""
         old = work.state.take(rows)
         rest = old.rest
@@ -210,16 +210,16 @@ class Moves:
         return log_odds(np.clip(K, 1, L - 1) / L)
 
 
-def changed(work: Work, rows: Bool) -> None:
+def changed(work: SolverState, rows: Bool) -> None:
     """Count a move."""
     work.moves = work.moves + rows
     work.finished = work.finished & ~rows
     work.rejected = np.where(rows, np.nan, work.rejected)
 
 
-def remember(work: Work, rows: Bool) -> None:
+def remember(work: SolverState, rows: Bool) -> None:
     """Give the components that passed their trial a place in the memory."""
-    state: State = work.state
+    state: Evaluation = work.state
     place = state.facts[:, PLACE]
     active = state.used & rows[:, None]
     fresh = active & (place < 0)
