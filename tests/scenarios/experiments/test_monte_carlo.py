@@ -111,10 +111,10 @@ def test_study_that_was_killed_goes_on(tmp_path: Path, serial: list[tuple[Any, .
     script = (
         "import os; import test_monte_carlo as t\n"
         "from arrivals.scenarios.experiments import batch as blocks\n"
-        "rows = blocks.Block.rows; n = []\n"
+        "rows = blocks.RunBatch.rows; n = []\n"
         "def dies(block):\n"
         "    n.append(1); os._exit(9) if len(n) == 3 else None; return rows(block)\n"
-        f"blocks.Block.rows = dies; t.small(out={str(tmp_path)!r})"
+        f"blocks.RunBatch.rows = dies; t.small(out={str(tmp_path)!r})"
     )
     environment = os.environ | {"PYTHONPATH": str(Path(__file__).parent)}
     done = subprocess.run([sys.executable, "-c", script], env=environment, check=False)
