@@ -19,15 +19,9 @@ from arrivals.trackers.gaussian.arguments import (
     noise_matrix,
 )
 from arrivals.trackers.gaussian.circular import add, wrapped
-from arrivals.trackers.gaussian.equations import (
-    Correction,
-    Inverse,
-    apply,
-    inverse,
-    predict_gaussian,
-    update_gaussian,
-)
+from arrivals.trackers.gaussian.equations import Correction, predict_gaussian, update_gaussian
 from arrivals.trackers.gaussian.filterpy_attributes import FilterpyAttributes
+from arrivals.trackers.gaussian.linalg import Inverse, apply, inverse
 from arrivals.trackers.gaussian.linearization import Linearization
 from arrivals.typing import Bool, Float
 from arrivals.validation import covariance, real

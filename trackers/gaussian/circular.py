@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from arrivals.motion_models.von_mises import wrap
-from arrivals.trackers.gaussian.equations import multiplication, transposed
+from arrivals.trackers.gaussian.linalg import multiplication, transposed
 from arrivals.typing import Float
 
 Angles = tuple[int, ...]

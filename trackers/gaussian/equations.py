@@ -1,29 +1,41 @@
-"""Gaussian beliefs: how they move by a matrix, and what a linear measurement makes of them.
+"""Predict, update and smooth Gaussian beliefs of linear models.
 
-The kernels take arrays with any leading (batch) axes.
+All functions take arrays with any leading (batch) axes: means x (..., n), covariances P
+(..., n, n). The matrices of a model may have fewer leading axes than the beliefs.
+
+References
+----------
+Särkkä, *Bayesian Filtering and Smoothing*, 2013, theorems 4.2 and 8.2; Bar-Shalom, Li,
+Kirubarajan, *Estimation with Applications to Tracking and Navigation*, 2001, sec. 5.2.3.
 """
 
 from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable
-from functools import cache, lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from arrivals.trackers.gaussian.linalg import (
+    Inverse,
+    apply,
+    cholesky,
+    half_log_det,
+    identity,
+    inner,
+    inverse,
+    multiplication,
+    symmetric,
+    transposed,
+)
 from arrivals.typing import Bool, Float
 
 LOG_2PI = math.log(2 * math.pi)
-JITTER = 1e-9  # of the mean variance, added to a covariance that has no Cholesky factor
-
-Inverse = Callable[[Float], Any]
-Product = Callable[[Float, Float], Float]
 
 
 class Correction(NamedTuple):
-    """A belief after a measurement, and what led there; the names are filterpy's."""
+    """A belief after a measurement and the quantities of its update, under filterpy's names."""
 
     x: Float
     P: Float
@@ -36,130 +48,17 @@ class Correction(NamedTuple):
     jittered: int
 
 
-def apply(A: Float, x: Float) -> Float:
-    """Return A x for matrices (..., m, n) and vectors (..., n).
-
-    Examples
-    --------
-    >>> apply(np.array([[1.0, 1.0]]), np.array([[1.0, 2.0], [3.0, 4.0]]))
-    array([[3.],
-           [7.]])
-    """
-    return A.dot(x) if x.ndim == 1 else (A @ x[..., None])[..., 0]
-
-
-def inner(a: Float, b: Float) -> Float:
-    """Return aᵀ b of vectors (..., n)."""
-    product: Float = a.dot(b) if a.ndim == 1 else (a[..., None, :] @ b[..., None])[..., 0, 0]
-    return product
-
-
-def multiplication(A: Float) -> Product:
-    """Return the product that suits matrices like A: on single ones dot takes a third of matmul."""
-    return np.ndarray.dot if A.ndim == 2 else np.matmul
-
-
-def transposed(A: Float) -> Float:
-    """Return Aᵀ of matrices (..., m, n)."""
-    return A.T if A.ndim == 2 else A.swapaxes(-1, -2)
-
-
-def symmetric(A: Float) -> Float:
-    """Return (A + Aᵀ)/2."""
-    total: Float = A + transposed(A)
-    total *= 0.5
-    return total
-
-
-def half_log_det(L: Float) -> float | Float:
-    """Return log |L|, half of log |L Lᵀ|, of Cholesky factors (..., n, n).
-
-    Examples
-    --------
-    >>> half_log_det(np.eye(2)), half_log_det(np.ones((3, 1, 1)))
-    (0.0, array([0., 0., 0.]))
-    """
-    diagonal = L.diagonal(0, -2, -1)
-    if diagonal.ndim == 1:
-        return sum(map(math.log, diagonal.tolist()))  # of a few numbers, a third of numpy's time
-    return np.asarray(np.log(diagonal).sum(axis=-1))
-
-
-@lru_cache(maxsize=64)
-def identity(n: int) -> Float:
-    """Return the unit matrix, shared and not to be written to."""
-    one = np.eye(n)
-    one.setflags(write=False)
-    return one
-
-
-@cache
-def lapack() -> Any:
-    """Return scipy's LAPACK, on a small matrix several times quicker than numpy's calls of it."""
-    from scipy.linalg import lapack  # takes long to import, so not before it is called
-
-    return lapack
-
-
-def cholesky(A: Float) -> tuple[Float, Float, int]:
-    """Return covariances, their lower Cholesky factors, and how many needed jitter.
-
-    Raises
-    ------
-    ValueError
-        If a matrix is not finite or has an eigenvalue below minus the jitter.
-
-    Examples
-    --------
-    >>> S, L, jittered = cholesky(np.ones((2, 2)))
-    >>> jittered, np.allclose(L @ L.T, 1.0)
-    (1, True)
-    """
-    if A.ndim == 2:
-        L, failed = lapack().dpotrf(A, lower=True)
-        return _jittered(A) if failed else (A, L, 0)
-    try:
-        return A, np.asarray(np.linalg.cholesky(A), np.float64), 0
-    except np.linalg.LinAlgError:
-        return _jittered(A)
-
-
-def _jittered(A: Float) -> tuple[Float, Float, int]:
-    n = A.shape[-1]
-    if not np.isfinite(A).all():
-        raise ValueError("a covariance of the filter is not finite: x, P, Q or R has grown too far")
-    size = np.trace(A, axis1=-2, axis2=-1) / n
-    jitter = JITTER * np.where(size > 0, size, 1.0)
-    lowest = np.linalg.eigvalsh(A)[..., 0]
-    if (lowest < -jitter / 2).any():
-        raise ValueError(
-            f"a covariance of the filter has the negative eigenvalue {lowest.min():.3g}: "
-            "P, Q or R is no covariance"
-        )
-    weak = lowest < jitter / 2
-    A = A + (weak * jitter)[..., None, None] * np.eye(n)
-    return A, np.asarray(np.linalg.cholesky(A), np.float64), int(np.sum(weak))
-
-
-def inverse(A: Float) -> Float:
-    """Return A⁻¹ of matrices (..., n, n): the numbers of `numpy.linalg.inv`.
-
-    Examples
-    --------
-    >>> inverse(np.array([[2.0, 0.0], [0.0, 4.0]]))
-    array([[0.5 , 0.  ],
-           [0.  , 0.25]])
-    """
-    if A.ndim > 2:
-        return np.asarray(np.linalg.inv(A), np.float64)
-    _, _, solution, failed = lapack().dgesv(A, identity(len(A)))
-    if failed:
-        raise np.linalg.LinAlgError("a matrix to invert is singular")
-    return np.asarray(solution)
-
-
 def predict_gaussian(P: Float, F: Float, Q: Float) -> Float:
-    """Return F P Fᵀ + Q, the covariance after a step.
+    """Return the covariance after a step.
+
+    Parameters
+    ----------
+    P : ndarray, shape (..., n, n)
+    F, Q : ndarray, shape (n, n) or (..., n, n)
+
+    Returns
+    -------
+    ndarray, shape (..., n, n)
 
     Examples
     --------
@@ -168,6 +67,7 @@ def predict_gaussian(P: Float, F: Float, Q: Float) -> Float:
            [1., 2.]])
     """
     dot = multiplication(P)
+    # P = F P F' + Q   (4.20)
     return dot(dot(F, P), transposed(F)) + Q
 
 
@@ -180,7 +80,7 @@ def update_gaussian(
     missing: Bool | None = None,
     inv: Inverse = inverse,
 ) -> Correction:
-    """Correct Gaussian beliefs by the residuals of linear measurements, in Joseph's form.
+    """Update Gaussian beliefs by the residuals of linear measurements.
 
     Parameters
     ----------
@@ -188,8 +88,8 @@ def update_gaussian(
     P : ndarray, shape (..., n, n)
     y : ndarray, shape (..., m)
         Residuals z - z_pred.
-    H : ndarray, shape (..., m, n)
-    R : ndarray, shape (..., m, m)
+    H : ndarray, shape (m, n) or (..., m, n)
+    R : ndarray, shape (m, m) or (..., m, m)
     missing : ndarray of bool, shape (..., m), optional
         Entries of z that are left out. There y, K are 0 and S has a row of the unit matrix.
     inv : callable
@@ -199,44 +99,172 @@ def update_gaussian(
     -------
     Correction
 
-    References
-    ----------
-    Bar-Shalom, Li, Kirubarajan, *Estimation with Applications to Tracking and Navigation*, 2001,
-    sec. 5.2.3 and (5.2.3-18).
-
     Examples
     --------
-    Two equally good looks at a number, from variance 1 to 1/2:
+    Two equally accurate measurements of a number, from variance 1 to 1/2:
 
     >>> one = np.eye(1)
-    >>> found = update_gaussian(np.zeros(1), one, np.ones(1), one, one)
-    >>> found.x, found.P, float(found.log_likelihood.round(4))
+    >>> update = update_gaussian(np.zeros(1), one, np.ones(1), one, one)
+    >>> update.x, update.P, float(update.log_likelihood.round(4))
     (array([0.5]), array([[0.5]]), -1.5155)
     """
-    dot, n_heard = multiplication(P), y.shape[-1]
+    dot, n_valid = multiplication(P), y.shape[-1]
+    # S = H P H' + R   (4.21)
     PHT = dot(P, transposed(H))
     S = dot(H, PHT) + R
     if missing is not None:
-        y, PHT, S = _without(missing, y, PHT, S)
-        n_heard = n_heard - missing.sum(axis=-1)
+        y, PHT, S = _leave_out(missing, y, PHT, S)
+        n_valid = n_valid - missing.sum(axis=-1)
     S, L, jittered = cholesky(S)
     SI = inv(S)
+    # K = P H' S^-1   (4.21)
     K = dot(PHT, SI)
-    I_KH = identity(P.shape[-1]) - dot(K, H)
-    P = symmetric(dot(dot(I_KH, P), transposed(I_KH)) + dot(dot(K, R), transposed(K)))
+    # x = x + K y   (4.21)
+    x = x + apply(K, y)
+    P = joseph(P, K, H, R)
+    # ln N(y; 0, S)
     square = inner(y, apply(SI, y))
-    log_likelihood = -0.5 * (n_heard * LOG_2PI + square) - half_log_det(L)
-    return Correction(x + apply(K, y), P, y, K, S, SI, log_likelihood, square, jittered)
+    log_likelihood = -0.5 * (n_valid * LOG_2PI + square) - half_log_det(L)
+    return Correction(x, P, y, K, S, SI, log_likelihood, square, jittered)
 
 
-def _without(missing: Bool, y: Float, PHT: Float, S: Float) -> tuple[Float, Float, Float]:
-    """Return residual, cross-covariance and S in which missing entries tell nothing."""
+def joseph(P: Float, K: Float, H: Float, R: Float) -> Float:
+    """Return covariances after an update by any gain, in Joseph's form.
+
+    Parameters
+    ----------
+    P : ndarray, shape (..., n, n)
+    K : ndarray, shape (..., n, m)
+    H : ndarray, shape (m, n) or (..., m, n)
+    R : ndarray, shape (m, m) or (..., m, m)
+
+    Returns
+    -------
+    ndarray, shape (..., n, n)
+
+    Examples
+    --------
+    >>> joseph(np.eye(1), np.full((1, 1), 0.5), np.eye(1), np.eye(1))
+    array([[0.5]])
+    """
+    dot = multiplication(P)
+    # P = (I - K H) P (I - K H)' + K R K'   (Bar-Shalom 5.2.3-18)
+    I_KH = identity(P.shape[-1]) - dot(K, H)
+    return symmetric(dot(dot(I_KH, P), transposed(I_KH)) + dot(dot(K, R), transposed(K)))
+
+
+def _leave_out(missing: Bool, y: Float, PHT: Float, S: Float) -> tuple[Float, Float, Float]:
+    """Return residual, cross-covariance and S without the information of missing entries."""
     either = missing[..., :, None] | missing[..., None, :]
     return (
         np.where(missing, 0.0, y),
         np.where(missing[..., None, :], 0.0, PHT),
         np.where(either, np.eye(y.shape[-1]), S),
     )
+
+
+def update_scalar(x: Float, P: Float, y: Float, h: Float, r: Float) -> tuple[Float, Float]:
+    """Update beliefs by independent measurements of the first entry of the state.
+
+    Together they are one scalar measurement, so that nothing is inverted.
+
+    Parameters
+    ----------
+    x : ndarray, shape (..., n)
+    P : ndarray, shape (..., n, n)
+    y : ndarray, shape (..., m)
+        Residuals h d + v of a deviation d of the first entry.
+    h : ndarray, shape (..., m)
+        Slopes; 0 (and y = 0) where a measurement is left out.
+    r : ndarray, shape (...)
+        Variance of each v.
+
+    Returns
+    -------
+    x, P : ndarray, shapes (..., n), (..., n, n)
+
+    Examples
+    --------
+    >>> update_scalar(np.zeros(1), np.eye(1), np.array([1.0]), np.array([1.0]), np.array(1.0))
+    (array([0.5]), array([[0.5]]))
+    """
+    # i = Σ h²/r,  g = Σ h y/r
+    information = (h * h).sum(axis=-1) / r
+    gradient = (h * y).sum(axis=-1) / r
+    # K = P₀ / (1 + i P₀₀)
+    K = P[..., 0] / (1 + information * P[..., 0, 0])[..., None]
+    # x = x + K g
+    x = x + K * gradient[..., None]
+    # P = P - i K P₀'
+    return x, P - (information[..., None] * K)[..., :, None] * P[..., None, 0, :]
+
+
+def update_leading(P: Float, A: Float, r: Float) -> tuple[Float, Float]:
+    """Return gains and covariances after measurements y = A x[:k] + e, e ~ (0, r I).
+
+    Parameters
+    ----------
+    P : ndarray, shape (..., n, n)
+        Predicted covariances.
+    A : ndarray, shape (..., m, k)
+        Measurement matrices of the first k entries of the state.
+    r : ndarray, shape (..., 1, 1)
+        Noise variances.
+
+    Returns
+    -------
+    K : ndarray, shape (..., n, m)
+    P : ndarray, shape (..., n, n)
+
+    Examples
+    --------
+    >>> one = np.ones((1, 1))
+    >>> update_leading(one, one, one)
+    (array([[0.5]]), array([[0.5]]))
+    """
+    m, k = A.shape[-2:]
+    P_k, AT = P[..., :k], transposed(A)
+    ATA = AT @ A
+    # A' (A P_kk A' + r I)^-1 = (r I + A'A P_kk)^-1 A': only k x k matrices are factored
+    solved = np.linalg.solve(ATA @ P_k[..., :k, :] + r * np.eye(k), np.concatenate([AT, ATA], -1))
+    # K = P_k (r I + A'A P_kk)^-1 A'
+    K = P_k @ solved[..., :m]
+    # P = P - P_k (r I + A'A P_kk)^-1 A'A P_k'
+    return K, symmetric(P - P_k @ solved[..., m:] @ transposed(P_k))
+
+
+def smooth_gaussian(x: Float, P: Float, G: Float, dx: Float, dP: Float) -> tuple[Float, Float]:
+    """Update beliefs by revised moments of a correlated quantity.
+
+    The quantity is the state of the next step (Rauch, Tung and Striebel's smoother,
+    G = P F' P_pred⁻¹), or a part of the same state that another method has updated
+    (G = P_{:,part} P_part⁻¹).
+
+    Parameters
+    ----------
+    x : ndarray, shape (..., n)
+    P : ndarray, shape (..., n, n)
+    G : ndarray, shape (..., n, m)
+        Regression of the state on the quantity.
+    dx : ndarray, shape (..., m)
+        Revised mean of the quantity minus the one that belongs to x.
+    dP : ndarray, shape (..., m, m)
+        Revised covariance minus the one that belongs to P.
+
+    Returns
+    -------
+    x, P : ndarray, shapes (..., n), (..., n, n)
+
+    Examples
+    --------
+    >>> G, dx, dP = np.array([[1.0], [0.5]]), np.array([2.0]), -np.eye(1)
+    >>> smooth_gaussian(np.zeros(2), np.eye(2), G, dx, dP)[0]
+    array([2., 1.])
+    """
+    # x = x + G (x_next - x_pred)   (8.6)
+    x = x + apply(G, dx)
+    # P = P + G (P_next - P_pred) G'   (8.6)
+    return x, symmetric(P + G @ dP @ transposed(G))
 
 
 def likelihood(log_likelihood: float) -> float:

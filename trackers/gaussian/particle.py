@@ -11,7 +11,8 @@ from arrivals.trackers.base import Tracker, is_missing
 from arrivals.trackers.estimates import StateEstimate
 from arrivals.trackers.gaussian.arguments import as_measurement, models
 from arrivals.trackers.gaussian.circular import circular_mean, difference, spread, wrapped
-from arrivals.trackers.gaussian.equations import LOG_2PI, cholesky, likelihood
+from arrivals.trackers.gaussian.equations import LOG_2PI, likelihood
+from arrivals.trackers.gaussian.linalg import cholesky
 from arrivals.trackers.registry import register
 from arrivals.typing import Float, Int
 from arrivals.validation import count, covariance, probability, real, shaped

@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike
 from arrivals.trackers.estimates import StateEstimate
 from arrivals.trackers.gaussian.arguments import PerStep, as_measurement, each_step, gaps
 from arrivals.trackers.gaussian.base import FilterBase
-from arrivals.trackers.gaussian.circular import add, difference
-from arrivals.trackers.gaussian.equations import Inverse, cholesky, predict_gaussian, symmetric
+from arrivals.trackers.gaussian.circular import difference, wrapped
+from arrivals.trackers.gaussian.equations import predict_gaussian, smooth_gaussian
+from arrivals.trackers.gaussian.linalg import Inverse, cholesky
 from arrivals.trackers.run import Run
 from arrivals.typing import Float
 from arrivals.validation import positive, real
@@ -48,9 +49,9 @@ class GaussianFilter(FilterBase):
     log_likelihood, mahalanobis : float
         Of the last measurement; 0 if it was missed.
     inv : callable
-        Inverts S: `gaussians.inverse`, unless another is assigned.
+        Inverts S: `linalg.inverse`, unless another is assigned.
     jitter_count : int
-        How often `gaussians.JITTER` had to be added to a covariance.
+        How often `linalg.JITTER` had to be added to a covariance.
 
     Raises
     ------
@@ -175,8 +176,9 @@ class GaussianFilter(FilterBase):
             step = self._controlled(us[k + 1], None)
             x_next = near.mean if step is None else near.mean + step
             K[k] = P[k] @ near.matrix.T @ inv(Pp[k])
-            x[k] = add(x[k], K[k] @ difference(x[k + 1], x_next, angles), angles)
-            P[k] = symmetric(P[k] + K[k] @ (P[k + 1] - Pp[k]) @ K[k].T)
+            dx = difference(x[k + 1], x_next, angles)
+            x_smooth, P[k] = smooth_gaussian(x[k], P[k], K[k], dx, P[k + 1] - Pp[k])
+            x[k] = wrapped(x_smooth, angles)
         return x.reshape(means.shape), P, K, Pp
 
     def run_batch(

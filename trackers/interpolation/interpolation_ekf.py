@@ -17,7 +17,8 @@ from arrivals.motion_models.delay import DelayWalk
 from arrivals.trackers.base import is_missing
 from arrivals.trackers.estimates import DirectionEstimate
 from arrivals.trackers.gaussian.arguments import noise_matrix
-from arrivals.trackers.gaussian.equations import Correction, apply, symmetric, update_gaussian
+from arrivals.trackers.gaussian.equations import Correction, update_gaussian
+from arrivals.trackers.gaussian.linalg import apply, symmetric
 from arrivals.trackers.gaussian.linearization import Linearization
 from arrivals.trackers.gaussian.smoothing import GaussianFilter
 from arrivals.trackers.interpolation.sample_buffer import SampleBuffer

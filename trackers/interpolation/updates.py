@@ -13,7 +13,7 @@ import numpy as np
 
 from arrivals.measurement_models.delays.delay_line import SourceAtCentre
 from arrivals.measurement_models.delays.interpolation import InterpolationDelay
-from arrivals.trackers.gaussian.equations import symmetric
+from arrivals.trackers.gaussian.linalg import symmetric
 from arrivals.typing import Bool, Float
 
 

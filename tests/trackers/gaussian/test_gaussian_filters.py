@@ -20,7 +20,7 @@ from arrivals.motion_models import (
 )
 from arrivals.trackers import EKF, IMM, UKF, GaussianFilter, Kalman, as_filterpy, create
 from arrivals.trackers.conformance import difference
-from arrivals.trackers.gaussian.equations import JITTER
+from arrivals.trackers.gaussian.linalg import JITTER
 from arrivals.typing import Float
 
 KINDS: list[type[GaussianFilter]] = [Kalman, EKF, UKF]
