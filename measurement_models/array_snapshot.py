@@ -303,6 +303,11 @@ class ArraySnapshot(MeasurementModel):
         """Covariance of the composite noise: half the variance for each part."""
         return self.noise / 2 * np.eye(self.dim_z)
 
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """doa, amplitude_re, amplitude_im."""
+        return "doa", "amplitude_re", "amplitude_im"
+
     def h(self, x: ArrayLike) -> Float:
         """Return the composite snapshot of states [β, Re w, Im w]: (..., 3) -> (..., dim_z)."""
         doa, re, im = np.moveaxis(state(x, 3), -1, 0)

@@ -1,34 +1,82 @@
-"""What every measurement model promises."""
+"""Base class of measurement models."""
+
+from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.parameters import FrozenModel
+from arrivals.parameters import FrozenModel, property_or_field
 from arrivals.typing import Float
+from arrivals.validation import state
 
 
 class MeasurementModel(FrozenModel, ABC):
-    """What a sensor sees of a state: z = h(x) + v, v ~ (0, R).
+    """Measurement of a state: z = h(x) + v, v ~ (0, R).
 
-    A model is frozen. The members below are its Gaussian face, in filterpy's calling convention;
-    the bound methods go into filterpy's filters as they are.
+    A model is frozen. The members below are its Gaussian interface, in filterpy's calling
+    convention; the bound methods go into filterpy's filters as they are.
 
     Notes
     -----
-    Shapes: states (..., dim_x), measurements (..., dim_z), any leading axes.
+    Shapes: states (..., dim_x), measurements (..., dim_z), any leading axes. `dim_z` and `R` may be
+    properties, class attributes or fields of a dataclass.
     """
 
-    @property
+    @property_or_field
     @abstractmethod
     def dim_z(self) -> int:
         """Number of entries of one measurement."""
 
-    @property
+    @property_or_field
     @abstractmethod
     def R(self) -> Float:
         """Covariance of the measurement noise, (dim_z, dim_z)."""
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Names of the entries of a state that `h` reads; () for any state of the right size."""
+        return ()
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether h(x) = H x, with the same H at every state."""
+        return False
+
+    def for_state(self, names: Sequence[str]) -> MeasurementModel:
+        """Return this model for states whose entries have these names.
+
+        Parameters
+        ----------
+        names : sequence of str
+            `state_names` of a motion model; () where entries have no names.
+
+        Returns
+        -------
+        MeasurementModel
+            The model itself where `names` or `needs` are (), or no entry has to be moved.
+
+        Raises
+        ------
+        TypeError
+            If the state lacks an entry that the model reads.
+
+        Examples
+        --------
+        >>> from arrivals.measurement_models import Bearing, Phasor
+        >>> Bearing([[0.0, 0.0]], noise=0.01).for_state(("x", "vx", "y", "vy")).position
+        (0, 2)
+        >>> Phasor(3, 0.1, frequency=0.25).for_state(("x", "y"))
+        Traceback (most recent call last):
+        TypeError: measurement must read entries of the state: Phasor needs 'delay'; got 'x', 'y'
+        """
+        if not names or not self.needs:
+            return self
+        entries, everything = locate(self, names), tuple(range(len(names)))
+        return self if entries == everything else SelectedEntries(self, entries, tuple(names))
 
     @abstractmethod
     def h(self, x: ArrayLike) -> Float:
@@ -47,3 +95,109 @@ class MeasurementModel(FrozenModel, ABC):
         expected = self.h(x)
         noise = rng.multivariate_normal(np.zeros(self.dim_z), self.R, expected.shape[:-1])
         return np.asarray(expected + noise)
+
+
+@dataclass(frozen=True)
+class SelectedEntries(MeasurementModel):
+    """A measurement model that reads some entries of a longer state.
+
+    Parameters
+    ----------
+    measurement : MeasurementModel
+        Model of states that hold these entries alone.
+    entries : tuple of int
+        Places of the entries in the state, in the order of the model.
+    names : tuple of str
+        Names of all entries of the state.
+
+    Examples
+    --------
+    >>> from arrivals.measurement_models import Phasor
+    >>> phasor = Phasor(3, 0.1, frequency=0.25)
+    >>> names = ("x", "delay", "amplitude_re", "amplitude_im")
+    >>> phasor.for_state(names).h([7.0, 0.5, 1.0, 0.0]).round(3)
+    array([0.707, 1.   , 0.707])
+    """
+
+    measurement: MeasurementModel
+    entries: tuple[int, ...]
+    names: tuple[str, ...]
+
+    @property
+    def dim_z(self) -> int:
+        """That of the model."""
+        return self.measurement.dim_z
+
+    @property
+    def R(self) -> Float:
+        """That of the model."""
+        return self.measurement.R
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Those of the model."""
+        return self.measurement.needs
+
+    @property
+    def is_linear(self) -> bool:
+        """That of the model."""
+        return self.measurement.is_linear
+
+    def for_state(self, names: Sequence[str]) -> MeasurementModel:
+        """Return the model for states with these names."""
+        return self if tuple(names) == self.names else self.measurement.for_state(names)
+
+    def h(self, x: ArrayLike) -> Float:
+        """Return the measurements expected of states: (..., dim_x) -> (..., dim_z)."""
+        return self.measurement.h(self._selected(x))
+
+    def H(self, x: ArrayLike) -> Float:
+        """Return the Jacobian of `h` at one state, zero for the other entries."""
+        H = np.zeros((self.dim_z, len(self.names)))
+        H[:, self.entries] = self.measurement.H(self._selected(x))
+        return H
+
+    def residual(self, z: ArrayLike, z_pred: ArrayLike) -> Float:
+        """Return the residual of the model."""
+        return self.measurement.residual(z, z_pred)
+
+    def sample(self, x: ArrayLike, rng: np.random.Generator) -> Float:
+        """Draw a measurement of each state: (..., dim_x) -> (..., dim_z)."""
+        return self.measurement.sample(self._selected(x), rng)
+
+    def _selected(self, x: ArrayLike) -> Float:
+        return state(x, len(self.names))[..., self.entries]
+
+
+def locate(measurement: MeasurementModel, names: Sequence[str]) -> tuple[int, ...]:
+    """Return the places of the entries that a model needs in a state with these names.
+
+    Raises
+    ------
+    TypeError
+        If the state lacks one.
+
+    Examples
+    --------
+    >>> from arrivals.measurement_models import Bearing
+    >>> locate(Bearing([[0.0, 0.0]], noise=0.01), ["x", "vx", "y", "vy"])
+    (0, 2)
+    """
+    missing = [name for name in measurement.needs if name not in names]
+    if missing:
+        raise TypeError(
+            f"measurement must read entries of the state: {type(measurement).__name__} needs "
+            f"{missing[0]!r}; got {', '.join(map(repr, names))}"
+        )
+    return tuple(names.index(name) for name in measurement.needs)
+
+
+def default_position(n: int) -> tuple[int, int]:
+    """Return the entries that are x and y of states of n entries without names.
+
+    Examples
+    --------
+    >>> default_position(2), default_position(4)
+    ((0, 1), (0, 2))
+    """
+    return (0, 1) if n < 4 else (0, 2)

@@ -1,12 +1,15 @@
 """Directions in which a position is seen from known places."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.measurement_models.base import MeasurementModel
+from arrivals.measurement_models.base import MeasurementModel, default_position, locate
 from arrivals.typing import Float
 from arrivals.validation import constant, count, covariance, positive, real
 
@@ -21,9 +24,9 @@ class Bearing(MeasurementModel):
         m.
     noise : float or array_like, shape (n_sensors, n_sensors)
         Variance of each bearing, or their covariance, rad².
-    position : tuple of two int
-        Entries of the state that are x and y: (0, 2) for `ConstantVelocity` and `CoordinatedTurn`,
-        (0, 1) for `RandomWalk`.
+    position : tuple of two int, optional
+        Entries of the state that are x and y. If None, those that the motion model calls so; in
+        states without names (0, 1) of 2 or 3 entries, (0, 2) of more.
 
     Raises
     ------
@@ -51,25 +54,22 @@ class Bearing(MeasurementModel):
 
     sensor_positions: Float
     noise: float | Float
-    position: tuple[int, int]
+    position: tuple[int, int] | None
     _R: ClassVar[Float]  # of the object, yet no parameter
 
     def __init__(
         self,
         sensor_positions: ArrayLike,
         noise: float | ArrayLike,
-        position: tuple[int, int] = (0, 2),
+        position: tuple[int, int] | None = None,
     ) -> None:
         places = constant("sensor_positions", sensor_positions)
         if places.shape[1] != 2:
             raise ValueError(f"sensor_positions must have shape (n, 2); got {places.shape}")
         noise = _bearing_noise(noise, len(places))
-        entries = tuple(count("position", entry, least=0) for entry in position)
-        if len(set(entries)) != 2 or len(entries) != 2:
-            raise ValueError(f"position must name two entries of the state; got {position}")
         object.__setattr__(self, "sensor_positions", places)
         object.__setattr__(self, "noise", noise)
-        object.__setattr__(self, "position", entries)
+        object.__setattr__(self, "position", _two_entries(position))
         R = noise if isinstance(noise, np.ndarray) else noise * np.eye(len(places))
         object.__setattr__(self, "_R", R)
 
@@ -79,41 +79,70 @@ class Bearing(MeasurementModel):
         return len(self.sensor_positions)
 
     @property
+    def needs(self) -> tuple[str, ...]:
+        """X and y, unless `position` is given."""
+        return ("x", "y") if self.position is None else ()
+
+    def for_state(self, names: Sequence[str]) -> Bearing:
+        """Return this model with `position` where the names have x and y.
+
+        Parameters
+        ----------
+        names : sequence of str
+            `state_names` of a motion model.
+
+        Returns
+        -------
+        Bearing
+
+        Raises
+        ------
+        TypeError
+            If the state has no x or no y.
+        """
+        if not names or self.position is not None:
+            return self
+        x, y = locate(self, names)
+        return self.replace(position=(x, y))
+
+    @property
     def R(self) -> Float:
         """Covariance of the bearings, rad²."""
         return self._R.copy()
 
     def h(self, x: ArrayLike) -> Float:
         """Return atan2(y - sy, x - sx) of states: (..., n) -> (..., n_sensors)."""
-        east, north = self._from_sensors(self._state(x))
+        east, north = self._from_sensors(*self._state(x))
         return np.arctan2(north, east)
 
     def H(self, x: ArrayLike) -> Float:
         """Return the Jacobian of `h` at one state, (n_sensors, n): (-Δy, Δx)/r²."""
-        x = self._state(x)
+        x, (i, j) = self._state(x)
         if x.ndim != 1:
-            raise ValueError(f"H wants one state, shape (n,); got {x.shape}")
-        east, north = self._from_sensors(x)
+            raise ValueError(f"x must have shape (n,); got {x.shape}")
+        east, north = self._from_sensors(x, (i, j))
         square = np.maximum(east * east + north * north, np.finfo(np.float64).tiny)
         H = np.zeros((self.dim_z, x.size))
-        H[:, self.position[0]], H[:, self.position[1]] = -north / square, east / square
+        H[:, i], H[:, j] = -north / square, east / square
         return H
 
     def residual(self, z: ArrayLike, z_pred: ArrayLike) -> Float:
         """Return z - z_pred, the shorter way round."""
         return np.asarray((np.subtract(z, z_pred) + np.pi) % (2 * np.pi) - np.pi)
 
-    def _state(self, x: ArrayLike) -> Float:
+    def _state(self, x: ArrayLike) -> tuple[Float, tuple[int, int]]:
+        """Return states (..., n), and the entries that are x and y."""
         x = real("x", x)
-        last = max(self.position)
+        i, j = self.position or default_position(x.shape[-1] if x.ndim else 0)
+        last = max(i, j)
         if x.ndim == 0 or x.shape[-1] <= last:
             column = x.ndim == 2 and x.shape[1] == 1 and len(x) > last
             got = f"the column {x.shape}: pass x.ravel()" if column else f"{x.shape}"
             raise ValueError(f"states must have shape (..., n), n > {last}; got {got}")
-        return x
+        return x, (i, j)
 
-    def _from_sensors(self, x: Float) -> tuple[Float, Float]:
-        i, j = self.position
+    def _from_sensors(self, x: Float, position: tuple[int, int]) -> tuple[Float, Float]:
+        i, j = position
         places = self.sensor_positions
         return x[..., i, None] - places[:, 0], x[..., j, None] - places[:, 1]
 
@@ -128,6 +157,15 @@ class Bearing(MeasurementModel):
     def _content(self) -> tuple[object, ...]:
         noise = np.asarray(self.noise)
         return self.sensor_positions.tobytes(), noise.shape, noise.tobytes(), self.position
+
+
+def _two_entries(position: tuple[int, int] | None) -> tuple[int, int] | None:
+    if position is None:
+        return None
+    entries = tuple(count("position", entry, least=0) for entry in position)
+    if len(set(entries)) != 2 or len(entries) != 2:
+        raise ValueError(f"position must name two entries of the state; got {position}")
+    return entries[0], entries[1]
 
 
 def _bearing_noise(noise: ArrayLike, n: int) -> float | Float:

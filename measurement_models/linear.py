@@ -66,6 +66,11 @@ class LinearMeasurement(MeasurementModel):
         return len(self.matrix)
 
     @property
+    def is_linear(self) -> bool:
+        """True."""
+        return True
+
+    @property
     def R(self) -> Float:
         """A copy of `noise`."""
         return self.noise.copy()

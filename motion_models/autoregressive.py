@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.motion_models.base import MotionModel
+from arrivals.motion_models.base import LinearMotionModel
 from arrivals.motion_models.combined import block_diagonal
 from arrivals.motion_models.companion_form import CompanionLayout, blocks, radius, stationary
 from arrivals.typing import Complex, Float
@@ -16,7 +16,7 @@ from arrivals.validation import positive, real, state
 
 
 @dataclass(frozen=True)
-class AutoregressiveSources(MotionModel):
+class AutoregressiveSources(LinearMotionModel):
     """Samples of sources, each a weighted sum of its last ones plus white noise.
 
     s_k(j) = Σ_i a_ki s_k(j-i) + v_k(j). The state of source k is [s_k(j), ..., s_k(j-p_k)]: one
@@ -114,6 +114,17 @@ class AutoregressiveSources(MotionModel):
         return self.n_parts * self.blocks.dim
 
     @property
+    def state_names(self) -> tuple[str, ...]:
+        """source_0_lag_0, ...; with _re and _im of complex sources."""
+        names = [""] * self.blocks.dim
+        for k, (order, lags) in enumerate(zip(self.orders, self.blocks.lags, strict=True)):
+            for i in range(order + 1):
+                names[lags[i]] = f"source_{k}_lag_{i}"
+        if self.real_valued:
+            return tuple(names)
+        return tuple(f"{name}_{part}" for part in ("re", "im") for name in names)
+
+    @property
     def padded(self) -> Float:
         """The coefficients as (n_sources, largest order), zero where a source has fewer."""
         table = np.zeros((self.n_sources, max(self.orders)))
@@ -127,10 +138,6 @@ class AutoregressiveSources(MotionModel):
         P = self.stationary_covariance()
         n = self.blocks.dim
         return np.asarray(self.n_parts * P[:n, :n].diagonal()[self.blocks.first])
-
-    def f(self, x: ArrayLike, dt: float = 1.0) -> Float:
-        """Return the states one sample later, without noise."""
-        return np.asarray(state(x, self.dim_x) @ self.F(dt=dt).T)
 
     def F(self, x: ArrayLike | None = None, dt: float = 1.0) -> Float:
         """Return the block companion matrix, (dim_x, dim_x), whatever the state."""

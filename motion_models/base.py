@@ -1,29 +1,41 @@
-"""What every motion model promises."""
+"""Base classes of motion models."""
 
 from abc import ABC, abstractmethod
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.parameters import FrozenModel
+from arrivals.parameters import FrozenModel, property_or_field
 from arrivals.typing import Float
+from arrivals.validation import state
 
 
 class MotionModel(FrozenModel, ABC):
-    """How a state moves in one step: x' = f(x) + w, w ~ (0, Q).
+    """Motion of a state in one step: x' = f(x) + w, w ~ (0, Q).
 
-    A model is frozen. The members below are its Gaussian face, in filterpy's calling convention;
-    the bound methods go into filterpy's filters as they are.
+    A model is frozen. The members below are its Gaussian interface, in filterpy's calling
+    convention; the bound methods go into filterpy's filters as they are.
 
     Notes
     -----
     Shapes: states (..., dim_x), any leading axes. Units: the model's own; `dt` in its unit of time.
+    `dim_x` may be a property, a class attribute or a field of a dataclass.
     """
 
-    @property
+    @property_or_field
     @abstractmethod
     def dim_x(self) -> int:
         """Number of entries of one state."""
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """Names of the entries of a state, such as ("x", "vx", "y", "vy"); () if they have none."""
+        return ()
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether f(x) = F x, with the same F at every state."""
+        return False
 
     @property
     def angles(self) -> tuple[int, ...]:
@@ -46,6 +58,34 @@ class MotionModel(FrozenModel, ABC):
         """Draw states after `dt`, each with its own noise: (..., dim_x) -> (..., dim_x)."""
         moved = self.f(x, dt)
         return moved + gaussian(self.Q(dt), moved.shape[:-1], rng)
+
+
+class LinearMotionModel(MotionModel):
+    """Motion by a matrix, the same at every state: x' = F x + w, w ~ (0, Q)."""
+
+    @property
+    def is_linear(self) -> bool:
+        """True."""
+        return True
+
+    @abstractmethod
+    def F(self, x: ArrayLike | None = None, dt: float = 1.0) -> Float:
+        """Return the transition matrix, (dim_x, dim_x); the state is not used."""
+
+    def f(self, x: ArrayLike, dt: float = 1.0) -> Float:
+        """Return the states after `dt`, without noise: F x, (..., dim_x) -> (..., dim_x)."""
+        return np.asarray(state(x, self.dim_x) @ self.F(x, dt).T)
+
+
+def coordinates(n: int) -> tuple[str, ...]:
+    """Return the names of n Cartesian coordinates.
+
+    Examples
+    --------
+    >>> coordinates(2), coordinates(4)
+    (('x', 'y'), ('x1', 'x2', 'x3', 'x4'))
+    """
+    return ("x", "y", "z")[:n] if n <= 3 else tuple(f"x{i}" for i in range(1, n + 1))
 
 
 def gaussian(covariance: Float, shape: tuple[int, ...], rng: np.random.Generator) -> Float:

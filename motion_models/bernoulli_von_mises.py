@@ -74,6 +74,11 @@ class BernoulliVonMises(MotionModel):
         return 1
 
     @property
+    def state_names(self) -> tuple[str, ...]:
+        """Doa."""
+        return ("doa",)
+
+    @property
     def angles(self) -> tuple[int, ...]:
         """Its only entry."""
         return (0,)

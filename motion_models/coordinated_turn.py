@@ -57,6 +57,11 @@ class CoordinatedTurn(MotionModel):
         """Position and velocity in the plane, and the turn rate."""
         return 5
 
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """x, vx, y, vy, turn_rate."""
+        return "x", "vx", "y", "vy", "turn_rate"
+
     def f(self, x: ArrayLike, dt: float = 1.0) -> Float:
         """Return the states after `dt` on their circles: (..., 5) -> (..., 5)."""
         px, vx, py, vy, omega = np.moveaxis(state(x, 5), -1, 0)

@@ -27,6 +27,11 @@ class DelayWalk(RandomWalk):
     q: float = 0.0
     n_dims: int = field(default=1, init=False)
 
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """Delay."""
+        return ("delay",)
+
 
 @dataclass(frozen=True)
 class DelayDrift(ConstantVelocity):
@@ -51,3 +56,8 @@ class DelayDrift(ConstantVelocity):
 
     q: float = 1e-9
     n_dims: int = field(default=1, init=False)
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """delay, delay_rate."""
+        return "delay", "delay_rate"

@@ -1,31 +1,19 @@
 """States that move by a matrix."""
 
-from abc import abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.motion_models.base import MotionModel
+from arrivals.motion_models.base import LinearMotionModel, coordinates
 from arrivals.typing import Float
-from arrivals.validation import constant, count, covariance, not_negative, shaped, state
-
-
-class _Linear(MotionModel):
-    """A model whose `F` is the same at every state."""
-
-    @abstractmethod
-    def F(self, x: ArrayLike | None = None, dt: float = 1.0) -> Float:
-        """Return the transition matrix, (dim_x, dim_x), whatever the state."""
-
-    def f(self, x: ArrayLike, dt: float = 1.0) -> Float:
-        """Return the states after `dt`, without noise: F x, (..., dim_x) -> (..., dim_x)."""
-        return np.asarray(state(x, self.dim_x) @ self.F(x, dt).T)
+from arrivals.validation import constant, count, covariance, entry_names, not_negative, shaped
 
 
 @dataclass(frozen=True)
-class RandomWalk(_Linear):
+class RandomWalk(LinearMotionModel):
     """A position that drifts by white noise.
 
     Parameters
@@ -63,6 +51,11 @@ class RandomWalk(_Linear):
         """One entry per coordinate."""
         return self.n_dims
 
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """x, y, z, or x1, x2, ... of more than three coordinates."""
+        return coordinates(self.n_dims)
+
     def F(self, x: ArrayLike | None = None, dt: float = 1.0) -> Float:
         """Return the identity, (dim_x, dim_x)."""
         return np.eye(self.n_dims)
@@ -73,7 +66,7 @@ class RandomWalk(_Linear):
 
 
 @dataclass(frozen=True)
-class ConstantVelocity(_Linear):
+class ConstantVelocity(LinearMotionModel):
     """A position whose velocity is disturbed by white noise in the acceleration.
 
     Parameters
@@ -119,6 +112,11 @@ class ConstantVelocity(_Linear):
         """Position and velocity per coordinate."""
         return 2 * self.n_dims
 
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """x, vx, y, vy, ..."""
+        return tuple(name for x in coordinates(self.n_dims) for name in (x, f"v{x}"))
+
     def F(self, x: ArrayLike | None = None, dt: float = 1.0) -> Float:
         """Return the transition matrix: each position gains its velocity times `dt`."""
         return _drift(self.n_dims, dt).copy()
@@ -129,7 +127,7 @@ class ConstantVelocity(_Linear):
 
 
 @dataclass(frozen=True, eq=False, init=False)
-class LinearMotion(_Linear):
+class LinearMotion(LinearMotionModel):
     """A state that moves by matrices of one's own: x' = F x + B u + w, w ~ (0, Q).
 
     Parameters
@@ -140,6 +138,8 @@ class LinearMotion(_Linear):
         Q, symmetric and without negative eigenvalues.
     control : array_like, shape (dim_x, dim_u), optional
         B, for trackers that are given a control input.
+    names : sequence of str, optional
+        Names of the entries of a state; a measurement model then reads them by name.
 
     Raises
     ------
@@ -162,9 +162,14 @@ class LinearMotion(_Linear):
     transition: Float
     noise: Float
     control: Float | None
+    names: tuple[str, ...]
 
     def __init__(
-        self, transition: ArrayLike, noise: ArrayLike, control: ArrayLike | None = None
+        self,
+        transition: ArrayLike,
+        noise: ArrayLike,
+        control: ArrayLike | None = None,
+        names: Sequence[str] = (),
     ) -> None:
         transition = constant("transition", transition)
         n = len(transition)
@@ -173,13 +178,20 @@ class LinearMotion(_Linear):
         if control is not None:
             control = constant("control", control)
             shaped("control", control, n, control.shape[1])
-        for name, value in (("transition", transition), ("noise", noise), ("control", control)):
-            object.__setattr__(self, name, value)
+        object.__setattr__(self, "transition", transition)
+        object.__setattr__(self, "noise", noise)
+        object.__setattr__(self, "control", control)
+        object.__setattr__(self, "names", entry_names("names", names, n))
 
     @property
     def dim_x(self) -> int:
         """Number of rows of `transition`."""
         return len(self.transition)
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """`names`."""
+        return self.names
 
     def F(self, x: ArrayLike | None = None, dt: float = 1.0) -> Float:
         """Return a copy of `transition`."""
@@ -201,11 +213,8 @@ class LinearMotion(_Linear):
 
     def _content(self) -> tuple[object, ...]:
         matrices = (self.transition, self.noise, self.control)
-        return tuple(None if A is None else (A.shape, tuple(A.ravel().tolist())) for A in matrices)
-
-    def __reduce__(self) -> tuple[object, ...]:
-        # Through the constructor: plain pickling would make the arrays writeable again.
-        return type(self), (self.transition, self.noise, self.control)
+        content = (None if A is None else (A.shape, tuple(A.ravel().tolist())) for A in matrices)
+        return (*content, self.names)
 
 
 @lru_cache(maxsize=64)  # read at every step of a filter, for the same dt

@@ -244,6 +244,11 @@ class VonMisesWalk(MotionModel):
         return 1
 
     @property
+    def state_names(self) -> tuple[str, ...]:
+        """Doa."""
+        return ("doa",)
+
+    @property
     def angles(self) -> tuple[int, ...]:
         """Its only entry."""
         return (0,)

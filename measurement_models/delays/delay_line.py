@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -30,6 +31,11 @@ class SourceAtCentre(MeasurementModel):
     @abstractmethod
     def dim_source(self) -> int:
         """Number of elements that hold the source."""
+
+    @property
+    @abstractmethod
+    def source_names(self) -> tuple[str, ...]:
+        """Names of these elements."""
 
     @property
     @abstractmethod
@@ -62,6 +68,19 @@ class SourceAtCentre(MeasurementModel):
     def centred(self) -> Float:
         """Steps from the array's centre, j - (N-1)/2, (n_sensors,)."""
         return np.arange(self.n_sensors, dtype=np.float64) - (self.n_sensors - 1) / 2
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """delay, then the names of the source's elements."""
+        return ("delay", *self.source_names)
+
+    def for_state(self, names: Sequence[str]) -> MeasurementModel:
+        """Return this model for states with these names.
+
+        Itself where the delay comes first and the source's elements last.
+        """
+        in_place = (*names[:1], *names[-self.dim_source :]) == self.needs
+        return self if in_place else super().for_state(names)
 
     def h(self, x: ArrayLike) -> Float:
         """Return the samples expected of states: (..., dim_x) -> (..., n_sensors)."""
@@ -149,6 +168,11 @@ class DelayLine(SourceAtCentre):
     def dim_source(self) -> int:
         """Number of taps."""
         return len(self.offsets)
+
+    @property
+    def source_names(self) -> tuple[str, ...]:
+        """waveform_lag_0, ... for the lags of `offsets`."""
+        return tuple(f"waveform_lag_{offset}" for offset in self.offsets)
 
     @property
     def transition(self) -> Float:
@@ -242,6 +266,11 @@ class Phasor(SourceAtCentre):
     def dim_source(self) -> int:
         """The two quadratures."""
         return 2
+
+    @property
+    def source_names(self) -> tuple[str, ...]:
+        """amplitude_re, amplitude_im: u and v."""
+        return "amplitude_re", "amplitude_im"
 
     @property
     def transition(self) -> Float:

@@ -227,6 +227,15 @@ class InterpolationDelay(MeasurementModel):
         taps, error = self.interpolator.linearise(tau, self.noise_ratio)
         return taps, self.inflation * (self.noise_ratio + error)
 
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Delay."""
+        return ("delay",)
+
+    def for_state(self, names: Sequence[str]) -> MeasurementModel:
+        """Return this model for states with these names; itself where the delay comes first."""
+        return self if tuple(names[:1]) == self.needs else super().for_state(names)
+
     def h(self, x: ArrayLike, regressors: ArrayLike | None = None) -> Float:
         """Return the samples foretold for states: X c(mΔ), (..., dim_x) -> (..., dim_z)."""
         c = self.interpolator.coefficients(self.baseline * _delay(x))

@@ -51,7 +51,9 @@ def gains(log_gain: ArrayLike, n: int) -> Float:
     return array
 
 
-def entries(position: tuple[int, int], amplitude: int | None) -> tuple[tuple[int, int], int | None]:
+def entries(
+    position: tuple[int, int] | None, amplitude: int | None
+) -> tuple[tuple[int, int] | None, int | None]:
     """Return the entries of a state that are x, y and u, all different.
 
     Examples
@@ -60,11 +62,13 @@ def entries(position: tuple[int, int], amplitude: int | None) -> tuple[tuple[int
     Traceback (most recent call last):
     ValueError: position and amplitude must be different entries; got (0, 1), 1
     """
+    if amplitude is not None:
+        amplitude = count("amplitude", amplitude, least=0)
+    if position is None:
+        return None, amplitude
     entries = tuple(count("position", entry, least=0) for entry in position)
     if len(entries) != 2:
         raise ValueError(f"position must name two entries of the state; got {position}")
-    if amplitude is not None:
-        amplitude = count("amplitude", amplitude, least=0)
     if len({*entries, amplitude}) != 3:
         raise ValueError(
             f"position and amplitude must be different entries; got {position}, {amplitude}"

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.measurement_models.base import MeasurementModel
+from arrivals.measurement_models.base import MeasurementModel, default_position, locate
 from arrivals.measurement_models.signal_strength.arguments import (
     entries,
     gains,
@@ -50,12 +51,12 @@ class LogNormalRSS(MeasurementModel):
     exact_moments : bool
         Expect the exact mean log σ_y + ½(ψ(N) - ln N), with variance ¼ψ'(N), in place of
         log σ_y and 1/4N. Of no effect with `sigma`.
-    position : tuple of two int
-        Entries of one source's state that are x and y: (0, 2) for `ConstantVelocity` and
-        `CoordinatedTurn`, (0, 1) for `RandomWalk`.
+    position : tuple of two int, optional
+        Entries of one source's state that are x and y. If None, those that the motion model calls
+        so; in states without names (0, 1) of 2 or 3 entries, (0, 2) of more.
     amplitude : int, optional
-        Entry of one source's state that is u, its log amplitude at 1 m, Np; if None, all u are
-        `log_amplitude`.
+        Entry of one source's state that is u, its log amplitude at 1 m, Np. If None, the one that
+        the motion model calls log_amplitude; without such an entry all u are `log_amplitude`.
     log_amplitude : float
         u of all sources where the state has none, Np.
     n_sources : int
@@ -97,7 +98,7 @@ class LogNormalRSS(MeasurementModel):
     log_gain: Float | None
     r_min: float
     exact_moments: bool
-    position: tuple[int, int]
+    position: tuple[int, int] | None
     amplitude: int | None
     log_amplitude: float
     n_sources: int
@@ -117,7 +118,7 @@ class LogNormalRSS(MeasurementModel):
         log_gain: ArrayLike | None = None,
         r_min: float = 1.0,
         exact_moments: bool = False,
-        position: tuple[int, int] = (0, 2),
+        position: tuple[int, int] | None = None,
         amplitude: int | None = None,
         log_amplitude: float = 0.0,
         n_sources: int = 1,
@@ -155,6 +156,36 @@ class LogNormalRSS(MeasurementModel):
         return len(self.sensors)
 
     @property
+    def needs(self) -> tuple[str, ...]:
+        """X and y, unless `position` is given."""
+        return ("x", "y") if self.position is None else ()
+
+    def for_state(self, names: Sequence[str]) -> LogNormalRSS:
+        """Return this model with `position` and `amplitude` where the names have them.
+
+        Parameters
+        ----------
+        names : sequence of str
+            `state_names` of the motion model of one source.
+
+        Returns
+        -------
+        LogNormalRSS
+
+        Raises
+        ------
+        TypeError
+            If the state has no x or no y.
+        """
+        if not names or self.position is not None:
+            return self
+        x, y = locate(self, names)
+        amplitude = self.amplitude
+        if amplitude is None and "log_amplitude" in names:
+            amplitude = names.index("log_amplitude")
+        return self.replace(position=(x, y), amplitude=amplitude)
+
+    @property
     def variance(self) -> Float:
         """Variances r of the readings, Np², (n_sensors,); not to be written to."""
         return self._variance
@@ -185,11 +216,12 @@ class LogNormalRSS(MeasurementModel):
         """Return the Jacobian of `h` at one state, (n_sensors, n)."""
         x = real("x", x)
         if x.ndim != 1:
-            raise ValueError(f"H wants one state, shape (n,); got {x.shape}")
+            raise ValueError(f"x must have shape (n,); got {x.shape}")
         u, theta = self.sources(x)
         G, K = slopes(self.levels(u, theta), self.alpha), self.n_sources
         H = np.zeros((self.dim_z, K, x.size // K))
-        H[..., self.position[0]], H[..., self.position[1]] = G[:, K::2], G[:, K + 1 :: 2]
+        i, j = self._position(x.size // K)
+        H[..., i], H[..., j] = G[:, K::2], G[:, K + 1 :: 2]
         if self.amplitude is not None:
             H[..., self.amplitude] = G[:, :K]
         return H.reshape(self.dim_z, x.size)
@@ -247,17 +279,30 @@ class LogNormalRSS(MeasurementModel):
     def sources(self, x: ArrayLike) -> tuple[Float, Float]:
         """Return log amplitudes (..., n_sources) and positions (..., n_sources, 2) of states."""
         x, K = real("x", x), self.n_sources
-        least = max(*self.position, -1 if self.amplitude is None else self.amplitude) + 1
         n = x.shape[-1] if x.ndim else 0
+        position = self._position(n // K)
+        least = max(*position, -1 if self.amplitude is None else self.amplitude) + 1
         if n % K or n < K * least:
             column = x.ndim == 2 and x.shape[1] == 1 and len(x) % K == 0 and len(x) >= K * least
             got = f"the column {x.shape}: pass x.ravel()" if column else f"{x.shape}"
             raise ValueError(f"states must have shape (..., {K} n), n at least {least}; got {got}")
         each = x.reshape(*x.shape[:-1], K, n // K)
-        theta = each[..., self.position]
+        theta = each[..., position]
         if self.amplitude is None:
             return np.full(theta.shape[:-1], self.log_amplitude), theta
         return each[..., self.amplitude], theta
+
+    def _position(self, n: int) -> tuple[int, int]:
+        """Return the entries that are x and y of a source's state of n entries."""
+        if self.position is not None:
+            return self.position
+        position = default_position(n)
+        if self.amplitude in position:
+            raise ValueError(
+                f"position and amplitude must be different entries; got {position}, "
+                f"{self.amplitude}: pass position"
+            )
+        return position
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, LogNormalRSS):

@@ -1,6 +1,7 @@
 """Checks of arguments; each says what was given and what is wanted."""
 
 import operator
+from collections.abc import Sequence
 from typing import Any, TypeVar
 
 import numpy as np
@@ -171,6 +172,22 @@ def state(x: ArrayLike, dim_x: int) -> Float:
         got = f"the column {array.shape}: pass x.ravel()" if column else f"{array.shape}"
         raise ValueError(f"states must have shape (..., {dim_x}); got {got}")
     return array
+
+
+def entry_names(name: str, value: Sequence[str], n: int) -> tuple[str, ...]:
+    """Return the names of n entries, all different, or ().
+
+    Examples
+    --------
+    >>> entry_names("names", ["x", "vx"], 3)
+    Traceback (most recent call last):
+    ValueError: names must be 3 different strings, one of each entry; got ['x', 'vx']
+    """
+    names = tuple(value)
+    strings = not isinstance(value, str) and all(isinstance(each, str) for each in names)
+    if names and not (strings and len(set(names)) == len(names) == n):
+        raise ValueError(f"{name} must be {n} different strings, one of each entry; got {value!r}")
+    return names
 
 
 def constant(name: str, value: ArrayLike) -> Float:

@@ -89,8 +89,11 @@ def test_models_with_the_same_numbers_are_interchangeable(model: Any) -> None:
         (lambda: Bearing(PLACES, 0.0), "noise must be finite and positive; got 0"),
         (lambda: Bearing(PLACES, np.eye(2)), r"noise must have shape \(3, 3\); got \(2, 2\)"),
         (lambda: Bearing(PLACES, 0.1, (1, 1)), r"position must name two entries.*\(1, 1\)"),
-        (lambda: Bearing(PLACES, 0.1).h([1.0, 2.0]), r"shape \(..., n\), n > 2; got \(2,\)"),
-        (lambda: Bearing(PLACES, 0.1).H(np.zeros((2, 4))), "H wants one state"),
+        (lambda: Bearing(PLACES, 0.1).h([1.0]), r"shape \(..., n\), n > 1; got \(1,\)"),
+        (
+            lambda: Bearing(PLACES, 0.1).H(np.zeros((2, 4))),
+            r"x must have shape \(n,\); got \(2, 4\)",
+        ),
         (lambda: LinearMeasurement([[1.0]], np.eye(2)), r"noise must have shape \(1, 1\)"),
         (lambda: LinearMeasurement([[1.0]], [[-1.0]]), "noise must have no negative eigenvalue"),
         (lambda: LinearMeasurement([[np.nan]], [[1.0]]), "matrix must be finite"),

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import ArrayLike
 
+from arrivals.measurement_models.base import default_position
 from arrivals.measurement_models.signal_strength.log_normal import LogNormalRSS
 from arrivals.motion_models.base import MotionModel
 from arrivals.trackers.base import Tracker, is_missing
@@ -84,7 +85,8 @@ class RSSTracker(Tracker):
         correlation_time: float | None,
     ) -> None:
         self.motion = instance("motion", motion, MotionModel)  # type: ignore[type-abstract]  # any
-        self.measurement = instance("measurement", measurement, LogNormalRSS)
+        model = instance("measurement", measurement, LogNormalRSS)
+        self.measurement = model.for_state(motion.state_names)
         if max(self.xy) >= motion.dim_x:
             raise ValueError(
                 f"position of the measurement must name entries of the motion's state, below "
@@ -134,7 +136,7 @@ class RSSTracker(Tracker):
     @property
     def xy(self) -> tuple[int, int]:
         """Entries of a source's state that are its position."""
-        return self.measurement.position
+        return self.measurement.position or default_position(self.motion.dim_x)
 
     @property
     def n_slots(self) -> int:

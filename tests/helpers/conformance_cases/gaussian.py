@@ -31,7 +31,7 @@ def positions() -> Measurements:
 
 def bearings(model: Bearing, position: tuple[float, float] = (5.0, 4.0)) -> Measurements:
     x = np.zeros(5)
-    x[list(model.position)] = position
+    x[list(model.position or (0, 2))] = position
     return np.array([model.sample(x, np.random.default_rng(seed)) for seed in range(5)])
 
 

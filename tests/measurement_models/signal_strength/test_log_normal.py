@@ -239,7 +239,7 @@ def test_two_sources_with_unknown_powers_run_in_the_ekf_and_the_particle_filter(
         ({"n_snapshots": 0}, "n_snapshots must be at least 1"),
         ({"position": (0, 0)}, "must be different entries"),
         ({"position": (0, 1, 2)}, "must name two entries"),
-        ({"amplitude": 0}, "must be different entries"),
+        ({"position": (0, 2), "amplitude": 0}, "must be different entries"),
         ({"sensors": [[0.0, 0.0, 0.0]]}, "sensors must have shape"),
     ],
 )
@@ -253,7 +253,7 @@ def test_states_of_the_wrong_shape_are_refused() -> None:
         TWO.h(STATE[:, None])
     with pytest.raises(ValueError, match=r"states must have shape \(..., 2 n\), n at least 3"):
         TWO.h(STATE[:4])
-    with pytest.raises(ValueError, match="H wants one state"):
+    with pytest.raises(ValueError, match=r"x must have shape \(n,\); got \(2, 6\)"):
         TWO.H(np.zeros((2, 6)))
 
 
