@@ -31,7 +31,7 @@ def models(motion: Any, measurement: Any) -> tuple[MotionModel, MeasurementModel
     )
 
 
-def as_measurement(z: ArrayLike, m: int) -> Float:
+def measurement_vector(z: ArrayLike, m: int) -> Float:
     """Return a measurement as (m,), a copy; NaN alone stands for NaN everywhere."""
     array = np.array(z)
     if array.shape == (m,) and array.dtype == np.float64:
@@ -46,7 +46,7 @@ def as_measurement(z: ArrayLike, m: int) -> Float:
     return array.reshape(m)
 
 
-def gaps(z: Float | None) -> Bool | None:
+def missing_mask(z: Float | None) -> Bool | None:
     """Return where measurements (..., m) are missing, or None if nowhere."""
     if z is None or np.vdot(z, z) < np.inf:  # NaN fails too; quicker than isfinite
         return None
@@ -96,12 +96,12 @@ def check_shape(name: str, matrix: Float, shape: tuple[int, ...]) -> None:
         raise ValueError(f"{name} must have shape {shape}; got {matrix.shape}")
 
 
-def each_step(name: str, values: PerStep, n_steps: int) -> Sequence[Any] | Float:
+def per_step_values(name: str, values: PerStep, n_steps: int) -> Sequence[Any] | Float:
     """Return one value a step, None where none are given.
 
     Examples
     --------
-    >>> each_step("Fs", [1, 2], 3)
+    >>> per_step_values("Fs", [1, 2], 3)
     Traceback (most recent call last):
     ValueError: Fs must have one entry a step, 3; got 2
     """

@@ -11,15 +11,15 @@ from numpy.typing import ArrayLike
 from arrivals.measurement_models.base import MeasurementModel
 from arrivals.motion_models.base import MotionModel
 from arrivals.trackers.gaussian.arguments import (
-    as_measurement,
     check_shape,
-    gaps,
     matrix_of,
+    measurement_vector,
+    missing_mask,
     models,
     noise_matrix,
 )
 from arrivals.trackers.gaussian.circular import add, wrapped
-from arrivals.trackers.gaussian.equations import Correction, predict_gaussian, update_gaussian
+from arrivals.trackers.gaussian.equations import GaussianUpdate, predict_gaussian, update_gaussian
 from arrivals.trackers.gaussian.filterpy_attributes import FilterpyAttributes
 from arrivals.trackers.gaussian.linalg import Inverse, apply, inverse
 from arrivals.trackers.gaussian.linearization import Linearization
@@ -35,15 +35,16 @@ class FilterBase(FilterpyAttributes):
     ) -> None:
         self.motion, self.measurement = models(motion, measurement)
         self.x, self.P = real("x", x), real("P", P)
-        mean, _ = self._belief(fresh=True)
+        mean, _ = self.belief(fresh=True)
         H, R = measurement.H(mean), measurement.R
         for name, matrix in (("F", motion.F(mean)), ("Q", motion.Q()), ("H", H), ("R", R)):
             real(f"{name} of the {'motion' if name in 'FQ' else 'measurement'}", matrix)
         check_shape("H of the measurement", H, (self.dim_z, self.dim_x))
         check_shape("R of the measurement", R, (self.dim_z, self.dim_z))
-        self._start()
+        self.initialize_record()
 
-    def _start(self) -> None:
+    def initialize_record(self) -> None:
+        """Set the attributes of the last step as before the first one."""
         n, m = self.dim_x, self.dim_z
         self.x_prior, self.x_post = self.x.copy(), self.x.copy()
         self.P_prior, self.P_post = self.P.copy(), self.P.copy()
@@ -51,16 +52,16 @@ class FilterBase(FilterpyAttributes):
         self.K, self.S, self.SI = np.zeros((n, m)), np.zeros((m, m)), np.zeros((m, m))
         self.inv: Inverse = inverse
         self.jitter_count = 0
-        self._note_missed()
+        self.record_missed()
 
     # What a method of this type defines
 
     @abstractmethod
-    def linear_motion(self, x: Float, P: Float, dt: float) -> Linearization:
+    def linearize_motion(self, x: Float, P: Float, dt: float) -> Linearization:
         """Return the motion as it looks near beliefs x (..., n), P (..., n, n), without Q."""
 
     @abstractmethod
-    def linear_measurement(self, x: Float, P: Float) -> Linearization:
+    def linearize_measurement(self, x: Float, P: Float) -> Linearization:
         """Return the measurement as it looks near beliefs x (..., n), P (..., n, n), without R."""
 
     # The two steps
@@ -87,12 +88,12 @@ class FilterBase(FilterpyAttributes):
         B : array_like, shape (n, dim_u), optional
             In place of the motion model's `control`.
         """
-        x, P = self._belief()
-        step = self._controlled(u, B)
-        x, P = self._moved(x, P, dt, F, Q)
+        x, P = self.belief()
+        step = self.control_effect(u, B)
+        x, P = self.predict_belief(x, P, dt, F, Q)
         if step is not None:
             x = add(x, step, self.state_motion.angles)
-        self.hold(x, P)
+        self.set_belief(x, P)
         self._dt = dt
         self.x_prior, self.P_prior = self.x.copy(), P.copy()
 
@@ -110,45 +111,47 @@ class FilterBase(FilterpyAttributes):
         H : array_like, shape (m, n), optional
             In place of the measurement model: z = H x + v.
         """
-        x, P = self._belief()
+        x, P = self.belief()
         linear = None if H is None else matrix_of("H", H, self.dim_x)
         m = self.dim_z if linear is None else len(linear)
-        z = None if z is None else as_measurement(z, m)
-        missing = gaps(z)
+        z = None if z is None else measurement_vector(z, m)
+        missing = missing_mask(z)
         if z is None or (missing is not None and missing.all()):
-            self._note_missed()
+            self.record_missed()
         else:
             noise = self.measurement.R if R is None else noise_matrix(R, m)
             if linear is not None:
                 check_shape("R", noise, (m, m))
-            found = self._corrected(x, P, z, missing, noise, linear)
-            self.hold(found.x, found.P)
-            self._note(z, found)
+            found = self.update_belief(x, P, z, missing, noise, linear)
+            self.set_belief(found.x, found.P)
+            self.record_update(z, found)
         self.x_post, self.P_post = self.x.copy(), self.P.copy()
 
-    def _moved(
+    def predict_belief(
         self, x: Float, P: Float, dt: float, F: ArrayLike | None, Q: ArrayLike | None
     ) -> tuple[Float, Float]:
-        near = self._near(x, P, dt, F)
-        noise = self.state_motion.Q(dt) if Q is None else self._process_noise(Q)
-        return near.mean, predict_gaussian(P, near.matrix, near.noise(noise))
+        """Return the predictions of beliefs x (..., n), P (..., n, n)."""
+        near = self.linearize(x, P, dt, F)
+        noise = self.state_motion.Q(dt) if Q is None else self.process_noise(Q)
+        return near.mean, predict_gaussian(P, near.jacobian, near.noise(noise))
 
-    def _near(self, x: Float, P: Float, dt: float, F: ArrayLike | None) -> Linearization:
+    def linearize(self, x: Float, P: Float, dt: float, F: ArrayLike | None) -> Linearization:
+        """Return the linearization of the motion, or F in its place."""
         if F is None:
-            return self.linear_motion(x, P, dt)
+            return self.linearize_motion(x, P, dt)
         F = matrix_of("F", F, self.dim_x)
         check_shape("F", F, P.shape[-2:])
         return Linearization(apply(F, x), F)
 
-    def _corrected(
+    def update_belief(
         self, x: Float, P: Float, z: Float, missing: Bool | None, R: Float, H: Float | None = None
-    ) -> Correction:
+    ) -> GaussianUpdate:
         """Return beliefs (..., n) corrected by measurements (..., m), NaN where missing."""
-        near = self.linear_measurement(x, P) if H is None else Linearization(apply(H, x), H)
+        near = self.linearize_measurement(x, P) if H is None else Linearization(apply(H, x), H)
         if missing is not None:
             z = np.where(missing, near.mean, z)
         y = self.measurement.residual(z, near.mean) if H is None else z - near.mean
-        found = update_gaussian(x, P, y, near.matrix, near.noise(R), missing, self.inv)
+        found = update_gaussian(x, P, y, near.jacobian, near.noise(R), missing, self.inv)
         angles = self.state_motion.angles
         if angles or near.jittered:
             jittered = found.jittered + near.jittered
@@ -157,7 +160,7 @@ class FilterBase(FilterpyAttributes):
 
     # The belief
 
-    def _belief(self, fresh: bool = False) -> tuple[Float, Float]:
+    def belief(self, fresh: bool = False) -> tuple[Float, Float]:
         """Return mean (n,) and covariance, checked if they were assigned since the last call."""
         n = self.state_motion.dim_x
         if not fresh and self.x is self._known_x and self.P is self._known_P:
@@ -169,12 +172,13 @@ class FilterBase(FilterpyAttributes):
             raise ValueError(f"x must be finite; got {x.ravel().tolist()}")
         return x.reshape(n), covariance("P", self.P, n)
 
-    def hold(self, x: Float, P: Float) -> None:
+    def set_belief(self, x: Float, P: Float) -> None:
         """Take over a belief, shapes (n,) and (n, n), that is known to be sound: no checks."""
         self.x = self._known_x = x.reshape(np.shape(self.x))
         self.P = self._known_P = P
 
-    def _note(self, z: Float, found: Correction) -> None:
+    def record_update(self, z: Float, found: GaussianUpdate) -> None:
+        """Set the attributes of the last measurement."""
         shape = self._as_given(len(z))
         self.z, self.y = z.reshape(shape), found.y.reshape(shape)
         self.K, self.S, self.SI = found.K, found.S, found.SI
@@ -182,7 +186,8 @@ class FilterBase(FilterpyAttributes):
         self.mahalanobis = math.sqrt(max(float(found.square), 0.0))
         self.jitter_count += found.jittered
 
-    def _note_missed(self) -> None:
+    def record_missed(self) -> None:
+        """Set the attributes of the last measurement to those of a missing one."""
         shape = self._as_given(self.dim_z)
         self.z, self.y = np.full(shape, np.nan), np.zeros(shape)
         self.log_likelihood = self.mahalanobis = 0.0
@@ -190,7 +195,7 @@ class FilterBase(FilterpyAttributes):
     def _as_given(self, m: int) -> tuple[int, ...]:
         return (m,) if np.ndim(self.x) == 1 else (m, 1)
 
-    def _controlled(self, u: ArrayLike | None, B: ArrayLike | None) -> Float | None:
+    def control_effect(self, u: ArrayLike | None, B: ArrayLike | None) -> Float | None:
         """Return B u, or None where no control is given."""
         if u is None or not np.any(u):
             return None
@@ -202,6 +207,7 @@ class FilterBase(FilterpyAttributes):
             raise ValueError(f"u must have shape ({B.shape[1]},); got {u.shape}")
         return np.asarray(B @ u)
 
-    def _process_noise(self, Q: ArrayLike) -> Float:
+    def process_noise(self, Q: ArrayLike) -> Float:
+        """Return Q, or Q times the unit matrix if it is a number."""
         n = self.dim_x
         return covariance("Q", np.multiply(np.eye(n), Q) if np.ndim(Q) == 0 else Q, n)

@@ -41,10 +41,10 @@ class EKF(GaussianFilter):
     array([5., 5.])
     """
 
-    def linear_motion(self, x: Float, P: Float, dt: float) -> Linearization:
+    def linearize_motion(self, x: Float, P: Float, dt: float) -> Linearization:
         """Return f(x) and its Jacobian."""
         return Linearization(self.motion.f(x, dt), at_each(self.motion.F, x, dt))
 
-    def linear_measurement(self, x: Float, P: Float) -> Linearization:
+    def linearize_measurement(self, x: Float, P: Float) -> Linearization:
         """Return h(x) and its Jacobian."""
         return Linearization(self.measurement.h(x), at_each(self.measurement.H, x))

@@ -34,7 +34,7 @@ from arrivals.typing import Bool, Float
 LOG_2PI = math.log(2 * math.pi)
 
 
-class Correction(NamedTuple):
+class GaussianUpdate(NamedTuple):
     """A belief after a measurement and the quantities of its update, under filterpy's names."""
 
     x: Float
@@ -79,7 +79,7 @@ def update_gaussian(
     R: Float,
     missing: Bool | None = None,
     inv: Inverse = inverse,
-) -> Correction:
+) -> GaussianUpdate:
     """Update Gaussian beliefs by the residuals of linear measurements.
 
     Parameters
@@ -125,7 +125,7 @@ def update_gaussian(
     # ln N(y; 0, S)
     square = inner(y, apply(SI, y))
     log_likelihood = -0.5 * (n_valid * LOG_2PI + square) - half_log_det(L)
-    return Correction(x, P, y, K, S, SI, log_likelihood, square, jittered)
+    return GaussianUpdate(x, P, y, K, S, SI, log_likelihood, square, jittered)
 
 
 def joseph(P: Float, K: Float, H: Float, R: Float) -> Float:

@@ -262,7 +262,7 @@ def _probabilities(name: str, values: Float) -> Float:
 
 def _hold(member: Filter, x: Float, P: Float) -> None:
     if isinstance(member, GaussianFilter):
-        member.hold(x, P)  # without the checks of a belief that a user assigned
+        member.set_belief(x, P)  # without the checks of a belief that a user assigned
     else:
         member.x, member.P = x.reshape(np.shape(member.x)), P
 

@@ -65,12 +65,12 @@ class Kalman(GaussianFilter):
         super().__init__(motion, measurement, x, P)
         check_linear(motion, measurement)
 
-    def linear_motion(self, x: Float, P: Float, dt: float) -> Linearization:
+    def linearize_motion(self, x: Float, P: Float, dt: float) -> Linearization:
         """Return F x and F."""
         F = self.motion.F(_first(x), dt)
         return Linearization(apply(F, x), F)
 
-    def linear_measurement(self, x: Float, P: Float) -> Linearization:
+    def linearize_measurement(self, x: Float, P: Float) -> Linearization:
         """Return H x and H."""
         H = self.measurement.H(_first(x))
         return Linearization(apply(H, x), H)

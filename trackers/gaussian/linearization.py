@@ -14,13 +14,13 @@ class Linearization(NamedTuple):
     """A function near a belief: f(x + d) ≈ mean + matrix d + e, with e ~ (0, excess)."""
 
     mean: Float
-    matrix: Float
-    excess: Float | None = None
+    jacobian: Float
+    extra_noise: Float | None = None
     jittered: int = 0  # covariances that needed it on the way
 
     def noise(self, own: Float) -> Float:
         """Return a noise covariance and the excess."""
-        return own if self.excess is None else own + self.excess
+        return own if self.extra_noise is None else own + self.extra_noise
 
 
 def at_each(jacobian: Callable[..., Float], x: Float, *args: float) -> Float:

@@ -9,7 +9,7 @@ from arrivals.measurement_models.base import MeasurementModel
 from arrivals.motion_models.base import MotionModel, gaussian
 from arrivals.trackers.base import Tracker, is_missing
 from arrivals.trackers.estimates import StateEstimate
-from arrivals.trackers.gaussian.arguments import as_measurement, models
+from arrivals.trackers.gaussian.arguments import measurement_vector, models
 from arrivals.trackers.gaussian.circular import circular_mean, difference, spread, wrapped
 from arrivals.trackers.gaussian.equations import LOG_2PI, likelihood
 from arrivals.trackers.gaussian.linalg import cholesky
@@ -175,7 +175,7 @@ class Particle(Tracker):
                     f"complex measurements need a model with log_likelihood; got {self.measurement}"
                 )
             return np.asarray(exact(z, particles))
-        z = as_measurement(z, self.measurement.dim_z)
+        z = measurement_vector(z, self.measurement.dim_z)
         heard = ~np.isnan(z)
         y = self.measurement.residual(z, self.measurement.h(particles))
         return log_normal(y[:, heard], self.measurement.R[np.ix_(heard, heard)])

@@ -10,7 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.trackers.estimates import StateEstimate
-from arrivals.trackers.gaussian.arguments import PerStep, as_measurement, each_step, gaps
+from arrivals.trackers.gaussian.arguments import (
+    PerStep,
+    measurement_vector,
+    missing_mask,
+    per_step_values,
+)
 from arrivals.trackers.gaussian.base import FilterBase
 from arrivals.trackers.gaussian.circular import difference, wrapped
 from arrivals.trackers.gaussian.equations import predict_gaussian, smooth_gaussian
@@ -25,8 +30,8 @@ Smoothed = tuple[Float, Float, Float, Float]
 class GaussianFilter(FilterBase):
     """A Gaussian belief, moved and corrected by what its two models look like near it.
 
-    A method of this type says how it makes the models linear: `linear_motion`,
-    `linear_measurement`. The rest is here, under filterpy's names.
+    A method of this type says how it makes the models linear: `linearize_motion`,
+    `linearize_measurement`. The rest is here, under filterpy's names.
 
     Parameters
     ----------
@@ -98,7 +103,7 @@ class GaussianFilter(FilterBase):
             If a sequence has another length than `zs`.
         """
         n_steps = len(zs)
-        given = (each_step(name, values, n_steps) for name, values in zip(
+        given = (per_step_values(name, values, n_steps) for name, values in zip(
             ("Fs", "Qs", "Hs", "Rs", "Bs", "us", "dts"), (Fs, Qs, Hs, Rs, Bs, us, dts), strict=True
         ))  # fmt: skip
         prior, post = [], []
@@ -165,17 +170,17 @@ class GaussianFilter(FilterBase):
         if P.shape != (n_steps, n, n):
             raise ValueError(f"Ps must have shape {(n_steps, n, n)}; got {P.shape}")
         x, Pp, K = means.reshape(n_steps, n).copy(), P.copy(), np.zeros_like(P)
-        Fs, Qs = each_step("Fs", Fs, n_steps), each_step("Qs", Qs, n_steps)
-        us, dts = each_step("us", us, n_steps), each_step("dts", dts, n_steps)
+        Fs, Qs = per_step_values("Fs", Fs, n_steps), per_step_values("Qs", Qs, n_steps)
+        us, dts = per_step_values("us", us, n_steps), per_step_values("dts", dts, n_steps)
         angles = self.state_motion.angles
         for k in range(n_steps - 2, -1, -1):
             dt = 1.0 if dts[k + 1] is None else dts[k + 1]
-            near = self._near(x[k], P[k], dt, Fs[k + 1])
-            Q = self.state_motion.Q(dt) if Qs[k + 1] is None else self._process_noise(Qs[k + 1])
-            Pp[k], _, _ = cholesky(predict_gaussian(P[k], near.matrix, near.noise(Q)))
-            step = self._controlled(us[k + 1], None)
+            near = self.linearize(x[k], P[k], dt, Fs[k + 1])
+            Q = self.state_motion.Q(dt) if Qs[k + 1] is None else self.process_noise(Qs[k + 1])
+            Pp[k], _, _ = cholesky(predict_gaussian(P[k], near.jacobian, near.noise(Q)))
+            step = self.control_effect(us[k + 1], None)
             x_next = near.mean if step is None else near.mean + step
-            K[k] = P[k] @ near.matrix.T @ inv(Pp[k])
+            K[k] = P[k] @ near.jacobian.T @ inv(Pp[k])
             dx = difference(x[k + 1], x_next, angles)
             x_smooth, P[k] = smooth_gaussian(x[k], P[k], K[k], dx, P[k + 1] - Pp[k])
             x[k] = wrapped(x_smooth, angles)
@@ -216,18 +221,18 @@ class GaussianFilter(FilterBase):
         if isinstance(sequences, np.ndarray) and sequences.ndim == 3 and sequences.shape[2] == m:
             return real("measurements", sequences)
         return np.array(
-            [[as_measurement(np.nan if z is None else z, m) for z in row] for row in sequences]
+            [[measurement_vector(np.nan if z is None else z, m) for z in row] for row in sequences]
         )
 
     def _filtered(self, zs: Float, dt: float) -> tuple[Float, Float]:
         """Return means (n_steps, n_sequences, n) and covariances of all sequences at once."""
-        x, P = self._belief()
+        x, P = self.belief()
         x = np.repeat(x[None], len(zs), axis=0)
         P = np.repeat(P[None], len(zs), axis=0)
         xs, Ps = [], []
         for z in zs.swapaxes(0, 1):
-            x, P = self._moved(x, P, dt, None, None)
-            found = self._corrected(x, P, z, gaps(z), self.measurement.R)
+            x, P = self.predict_belief(x, P, dt, None, None)
+            found = self.update_belief(x, P, z, missing_mask(z), self.measurement.R)
             x, P = found.x, found.P
             xs.append(x)
             Ps.append(P)

@@ -100,7 +100,7 @@ class UKF(GaussianFilter):
         if not kappa > -self.dim_x:
             raise ValueError(f"kappa must be above -{self.dim_x}; got {kappa}")
 
-    def linear_motion(self, x: Float, P: Float, dt: float) -> Linearization:
+    def linearize_motion(self, x: Float, P: Float, dt: float) -> Linearization:
         """Return the regression of f over the sigma points."""
         angles = self.motion.angles
         near = self._regression(
@@ -111,7 +111,7 @@ class UKF(GaussianFilter):
         )
         return near._replace(mean=wrapped(near.mean, angles))
 
-    def linear_measurement(self, x: Float, P: Float) -> Linearization:
+    def linearize_measurement(self, x: Float, P: Float) -> Linearization:
         """Return the regression of h over the sigma points."""
         return self._regression(x, P, self.measurement.h, self.measurement.residual)
 
@@ -131,9 +131,9 @@ class UKF(GaussianFilter):
         shift = apply(moved.swapaxes(-1, -2), mean)
         rest = moved - shift[..., None, :]
         cross = (covariance[:, None] * steps).swapaxes(-1, -2) @ rest
-        matrix = np.asarray(np.linalg.solve(P, cross), np.float64).swapaxes(-1, -2)
-        excess = spread(rest, covariance) - matrix @ cross
-        return Linearization(middle[..., 0, :] + shift, matrix, excess, jittered)
+        jacobian = np.asarray(np.linalg.solve(P, cross), np.float64).swapaxes(-1, -2)
+        extra_noise = spread(rest, covariance) - jacobian @ cross
+        return Linearization(middle[..., 0, :] + shift, jacobian, extra_noise, jittered)
 
     @staticmethod
     def _steps(L: Float) -> Float:

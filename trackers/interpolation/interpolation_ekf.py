@@ -17,7 +17,7 @@ from arrivals.motion_models.delay import DelayWalk
 from arrivals.trackers.base import is_missing
 from arrivals.trackers.estimates import DirectionEstimate
 from arrivals.trackers.gaussian.arguments import noise_matrix
-from arrivals.trackers.gaussian.equations import Correction, update_gaussian
+from arrivals.trackers.gaussian.equations import GaussianUpdate, update_gaussian
 from arrivals.trackers.gaussian.linalg import apply, symmetric
 from arrivals.trackers.gaussian.linearization import Linearization
 from arrivals.trackers.gaussian.smoothing import GaussianFilter
@@ -173,7 +173,7 @@ class InterpolationEKF(GaussianFilter):
         parts = self._parts
         delay = float(self.measurement.delay(self.doa))
         self.x, self.P = parts.start(delay, self._delay_std() ** 2, self.rate_std)
-        self._start()
+        self.initialize_record()
         self.heard = SampleBuffer.nothing(parts.span, parts.n_places)
 
     def update(
@@ -194,7 +194,7 @@ class InterpolationEKF(GaussianFilter):
         if H is not None:
             super().update(z, self.measurement.noise_ratio if R is None else R, H)
             return
-        x, P = self._belief()
+        x, P = self.belief()
         snapshot = self._snapshot(z)
         noise = None if R is None else noise_matrix(R, self.dim_z)
         heard = self.heard.then(self.measurement.frame(snapshot))
@@ -202,12 +202,12 @@ class InterpolationEKF(GaussianFilter):
         if noise is None:
             x, P = self._parts.update(x, P, self._frames(heard), heard.n_snapshots)
             found = found._replace(x=x, P=P)
-        self.hold(found.x, found.P)
+        self.set_belief(found.x, found.P)
         self.heard = heard
         if is_missing(snapshot):
-            self._note_missed()
+            self.record_missed()
         else:
-            self._note(snapshot, found)
+            self.record_update(snapshot, found)
         self.x_post, self.P_post = self.x.copy(), self.P.copy()
 
     @property
@@ -290,7 +290,7 @@ class InterpolationEKF(GaussianFilter):
             )
         n, shape, parts = self.dim_x, frames.shape[:-2], self._parts
         F, Q = parts.motion.F(np.zeros(n), dt), parts.motion.Q(dt)
-        x, P = self._belief()
+        x, P = self.belief()
         x, P = np.broadcast_to(x, (*shape, n)), np.broadcast_to(P, (*shape, n, n))
         heard = self.heard.copies(shape)
         xs, Ps = np.empty((*frames.shape[:-1], n)), np.empty((*frames.shape[:-1], n, n))
@@ -350,18 +350,19 @@ class InterpolationEKF(GaussianFilter):
 
     # -- one snapshot --------------------------------------------------------------------------
 
-    def _moved(
+    def predict_belief(
         self, x: Float, P: Float, dt: float, F: ArrayLike | None, Q: ArrayLike | None
     ) -> tuple[Float, Float]:
-        x, P = super()._moved(x, P, dt, F, Q)
+        """Return the predictions of beliefs, symmetric to the last bit."""
+        x, P = super().predict_belief(x, P, dt, F, Q)
         return x, symmetric(P)
 
-    def linear_motion(self, x: Float, P: Float, dt: float) -> Linearization:
+    def linearize_motion(self, x: Float, P: Float, dt: float) -> Linearization:
         """Return F x and F."""
         F = self.state_motion.F(np.zeros(self.dim_x), dt)
         return Linearization(apply(F, x), F)
 
-    def linear_measurement(self, x: Float, P: Float) -> Linearization:
+    def linearize_measurement(self, x: Float, P: Float) -> Linearization:
         """Return what is expected of `y`, nothing, and its slopes."""
         return Linearization(np.zeros(self.dim_z), self._seen(x, P, self.heard).H)
 
@@ -383,7 +384,9 @@ class InterpolationEKF(GaussianFilter):
         y, H, R = stage.linearise(x, P, self._frames(heard))
         return DelayObservation(y[places], H[places], R[places])
 
-    def _by_sensors(self, x: Float, P: Float, heard: SampleBuffer, R: Float | None) -> Correction:
+    def _by_sensors(
+        self, x: Float, P: Float, heard: SampleBuffer, R: Float | None
+    ) -> GaussianUpdate:
         """Correct a belief by one vector update of what the sensors say."""
         y, H, own = self._seen(x, P, heard)
         silent = np.asarray(~H.any(axis=-1))

@@ -14,7 +14,7 @@ from arrivals.motion_models.base import MotionModel
 from arrivals.trackers.base import Tracker, is_missing
 from arrivals.trackers.direction_tracker import padded
 from arrivals.trackers.estimates import PositionEstimate
-from arrivals.trackers.gaussian.arguments import as_measurement
+from arrivals.trackers.gaussian.arguments import measurement_vector
 from arrivals.trackers.gaussian.equations import likelihood
 from arrivals.trackers.rss.arguments import (
     known_sources,
@@ -185,7 +185,7 @@ class RSSTracker(Tracker):
         if z is None or is_missing(z):
             self._note_missed()
             return
-        xi = self.measurement.readings(as_measurement(z, self.measurement.dim_z))[None]
+        xi = self.measurement.readings(measurement_vector(z, self.measurement.dim_z))[None]
         told = self.told(xi, np.array([self.elapsed]))
         sources, census = self.by_source(), self.census
         if self.births:
@@ -309,6 +309,6 @@ class RSSTracker(Tracker):
         if self.births or not alike or len(self.by_source().u) == 0:
             return super().run_batch(sequences, dt)
         m = self.measurement.dim_z
-        z = [[as_measurement(np.nan if one is None else one, m) for one in row]
+        z = [[measurement_vector(np.nan if one is None else one, m) for one in row]
              for row in sequences]  # fmt: skip
         return run_in_chunks(self, self.measurement.readings(np.array(z)), dt)
