@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from arrivals.plots.bearing_time import NEUTRAL, PALETTE
-from arrivals.scenarios.experiments.methods import plain
+from arrivals.scenarios.experiments.methods import tracker_name
 from arrivals.scenarios.experiments.study import Study
 
 if TYPE_CHECKING:
@@ -106,9 +106,9 @@ def _draw(
     ends = np.array([study.interval(metric, label, case) for case in places])
     ends = np.where(np.isnan(ends), means[:, None], ends)
     any_colour = (*PALETTE, NEUTRAL)[n % (len(PALETTE) + 1)]
-    variant = plain(label) != label  # of a method: its colour, dashed
+    variant = tracker_name(label) != label  # of a method: its colour, dashed
     style: dict[str, Any] = {
-        "color": METHOD_COLOURS.get(plain(label), any_colour),
+        "color": METHOD_COLOURS.get(tracker_name(label), any_colour),
         "marker": "o",
         "markersize": 4,
         "linewidth": 1.2,
