@@ -24,7 +24,7 @@ from arrivals.scenarios.reproduce.interpolation.figures import (
     rmse_study,
     table1,
 )
-from arrivals.scenarios.reproduce.interpolation.trials import draws, filtered, rms, tracker
+from arrivals.scenarios.reproduce.interpolation.trials import draws, filter_directions, rms, tracker
 from arrivals.scenarios.simulations.sampled_source import InterpolationTone
 from arrivals.trackers import InterpolationEKF
 from arrivals.trackers.interpolation.updates import move
@@ -181,7 +181,9 @@ def capture(runs: int) -> None:
         for each_sensor in (False, True):
             shares = []
             for start in (0.0, 20.0):
-                last = filtered(scenario, samples, method, start, each_sensor=each_sensor)[:, -1]
+                last = filter_directions(scenario, samples, method, start, each_sensor=each_sensor)[
+                    :, -1
+                ]
                 shares.append(f"{100 * np.mean(np.abs(last - 60.0) < 3.0):.0f} %")
             form = "sensor" if each_sensor else "snapshot"
             print(f"| {method} | {form} | {' | '.join(shares)} |", flush=True)

@@ -25,7 +25,7 @@ from arrivals.measurement_models import LogNormalRSS, db_to_neper
 from arrivals.motion_models import RandomWalk
 from arrivals.recordings.network_calibration import Calibration, calibrate
 from arrivals.recordings.networks import Network, read_network
-from arrivals.scenarios.metrics.position_errors import Scores, assigned, distances, scores
+from arrivals.scenarios.metrics.position_errors import Scores, assign, distances, scores
 from arrivals.scenarios.reproduce.rss.birth_death import (
     gospa_over_time,
     told_nothing,
@@ -209,7 +209,7 @@ def covariances_and_flags(runs: int) -> None:
     J = problem.information(problem.field.levels(found.u, found.theta))
     joint, factor = marginals(J).Sigma, inverse_2x2(found.P)
     pairs = zip(found.theta, trials.theta, strict=True)
-    which = np.array([np.argsort(assigned(one, truth, "one-to-one")) for one, truth in pairs])
+    which = np.array([np.argsort(assign(one, truth, "one-to-one")) for one, truth in pairs])
     miss = found.theta - np.take_along_axis(trials.theta, which[..., None], axis=1)
     wrong = (np.hypot(miss[..., 0], miss[..., 1]) > 10).any(axis=1)
     for name, Sigma, known in (("joint", joint, "0.89"), ("factor", factor, "0.73")):

@@ -15,8 +15,8 @@ from pathlib import Path
 from joblib import parallel_config
 
 from arrivals.scenarios import create, monte_carlo
-from arrivals.scenarios.experiments.methods import plain
-from arrivals.scenarios.reproduce.svalse.figures_4_to_7 import compared, svalse_as_printed
+from arrivals.scenarios.experiments.methods import tracker_name
+from arrivals.scenarios.reproduce.svalse.figures_4_to_7 import svalse_as_printed, table_methods
 from arrivals.scenarios.reproduce.svalse.figures_8_to_10 import SCENES, SNR_DB, sweep
 from arrivals.scenarios.reproduce.svalse.published_values import ACTIVATION, REBUILT, SWEEP, SWEPT
 
@@ -31,18 +31,18 @@ def scenes(runs: int, out: Path, quick: bool) -> None:
     print("| scene | method | GOSPA ± std of runs | rebuilt | RMSE | rebuilt | within |")
     print("|---" * 7 + "|")
     for name, known in REBUILT.items():
-        study = monte_carlo({name: create(name)}, compared(quick), runs, 0, out=out, batch=2)
+        study = monte_carlo({name: create(name)}, table_methods(quick), runs, 0, out=out, batch=2)
         for method in study.methods:
             gospa, rmse = (study.mean(metric, method) for metric in ("gospa", "rmse"))
             mine = f"| {name} | {method} | {gospa:.2f} ± {study.spread('gospa', method):.2f} "
-            if plain(method) not in known:
+            if tracker_name(method) not in known:
                 print(f"{mine}| | {rmse:.2f} | | |", flush=True)
                 continue
-            its = known[plain(method)]
+            its = known[tracker_name(method)]
             off = abs(gospa - its.gospa) <= 2 * its.std
             print(f"{mine}| {its.gospa:.2f} ± {its.std:.2f} | {rmse:.2f} | {its.rmse:.2f} "
                   f"| {verdict(off)} |", flush=True)  # fmt: skip
-        for method in [label for label in study.methods if plain(label) == "svalse"]:
+        for method in [label for label in study.methods if tracker_name(label) == "svalse"]:
             d = study.paired("gospa", method, "ssbl")
             print(f"| {name} | {method} - ssbl, paired | {d.mean:.2f} ± {d.error:.2f}, below 0 in "
                   f"{d.n_below} of {d.n_runs} | below 0 | | | {verdict(d.mean < 0)} |")  # fmt: skip
@@ -56,10 +56,10 @@ def sweeps(runs: int, out: Path, quick: bool) -> None:
         study = sweep(name, runs, 0, out, quick)
         for snr in SNR_DB:
             for method in study.methods:
-                if plain(method) not in SWEPT:
+                if tracker_name(method) not in SWEPT:
                     continue
                 gospa, rmse = (study.mean(m, method, f"{snr:g}") for m in ("gospa", "rmse"))
-                g, r = SWEEP[name][snr][SWEPT.index(plain(method))]
+                g, r = SWEEP[name][snr][SWEPT.index(tracker_name(method))]
                 near = abs(gospa - g) <= max(0.2 * g, 1.0)
                 print(f"| {name} | {snr:g} | {method} | {gospa:.2f} | {g} | {rmse:.2f} | {r} "
                       f"| {verdict(near)} |", flush=True)  # fmt: skip

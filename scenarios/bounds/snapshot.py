@@ -107,8 +107,8 @@ def line_bound(scenario: LineScenario, runs: int, seed: int = 0, c: float = 10.0
     positive("c", c)
     steps = []
     for run in range(runs):
-        chance = np.random.SeedSequence(seed, spawn_key=(run,))
-        truth, amplitude, noise = scenario.signals(np.random.default_rng(chance))
+        seed_sequence = np.random.SeedSequence(seed, spawn_key=(run,))
+        truth, amplitude, noise = scenario.signals(np.random.default_rng(seed_sequence))
         for doa, w, variance in zip(truth, amplitude, noise, strict=True):
             on = ~np.isnan(doa)
             std = np.rad2deg(snapshot_bound(scenario.measurement, doa[on], w[on], variance))

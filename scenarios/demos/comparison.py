@@ -40,7 +40,7 @@ class MethodComparison:
     axes: Mapping[str, Any]
     prefix: str = ""
 
-    def show(
+    def run(
         self,
         out: str | PathLike[str],
         methods: Mapping[str, tuple[str, Tracker]],

@@ -95,4 +95,4 @@ def infrasound(
     axes = {"ylabel": "azimuth from north, degrees"}
     scene = MethodComparison("brp2012", measurement, steps, time, axes, prefix="brp2012-")
     methods = {name: (title, tracker(name, measurement)) for name, title in METHODS.items()}
-    scene.show(out, methods, bar, n_steps)
+    scene.run(out, methods, bar, n_steps)

@@ -74,4 +74,4 @@ def demo(
         name: (title, create(name, measurement=measurement)) for name, title in METHODS.items()
     }
     scene = MethodComparison("swellex96", measurement, snapshots, time, axes)
-    scene.show(out, methods, bar, n_steps)
+    scene.run(out, methods, bar, n_steps)

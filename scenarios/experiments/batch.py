@@ -61,13 +61,13 @@ class RunBatch:
             trials = {run: self._draw(run) for run in self.runs}
             return [row for method in self.methods for row in self._scored(method, trials)]
 
-    def chance(self, run: int) -> np.random.SeedSequence:
+    def seed_sequence(self, run: int) -> np.random.SeedSequence:
         """Return what the run draws from: the same, whichever process and whatever company."""
         return np.random.SeedSequence(self.seed, spawn_key=(run,))
 
     def _draw(self, run: int) -> Trial | Exception:
         try:
-            return self.scenario.sample(np.random.default_rng(self.chance(run)))
+            return self.scenario.sample(np.random.default_rng(self.seed_sequence(run)))
         except Exception as error:
             return error
 
@@ -88,7 +88,7 @@ class RunBatch:
     ) -> dict[int, tuple[Run, float] | Exception] | None:
         """Run a batch, if the tracker has a way of its own and the trials differ in data alone."""
         try:
-            made = [method.make(trial, self.chance(run)) for run, trial in trials.items()]
+            made = [method.make(trial, self.seed_sequence(run)) for run, trial in trials.items()]
             own = made and type(made[0]).run_batch is not Tracker.run_batch
             if not own or any(one.to_dict() != made[0].to_dict() for one in made):
                 return None
@@ -101,7 +101,7 @@ class RunBatch:
 
     def _alone(self, method: Method, run: int, trial: Trial) -> tuple[Run, float] | Exception:
         try:
-            tracker = method.make(trial, self.chance(run))
+            tracker = method.make(trial, self.seed_sequence(run))
             started = time.thread_time()
             found = tracker.run(trial.measurements)
             return found, time.thread_time() - started

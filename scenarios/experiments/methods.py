@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from arrivals.parameters import _plain
+from arrivals.parameters import to_plain
 from arrivals.scenarios.base import Trial
 from arrivals.trackers import Tracker, find
 
@@ -57,24 +57,25 @@ class Method:
         made = f"{self.tracker}({settings})" if settings else self.tracker
         object.__setattr__(self, "label", self.label or made)
 
-    def make(self, trial: Trial, chance: np.random.SeedSequence) -> Tracker:
-        """Make the tracker for a trial; one that takes an `rng` draws from `chance`."""
+    def make(self, trial: Trial, seed_sequence: np.random.SeedSequence) -> Tracker:
+        """Make the tracker for a trial; one that takes an `rng` draws from `seed_sequence`."""
         known = inspect.signature(self.kind).parameters
-        plain = {name: value for name, value in self.params.items() if name in known}
+        settings = {name: value for name, value in self.params.items() if name in known}
         nested = {name: value for name, value in self.params.items() if name not in known}
-        if "rng" in known and "rng" not in plain:
+        if "rng" in known and "rng" not in settings:
             own = np.random.SeedSequence(
-                chance.entropy, spawn_key=(*chance.spawn_key, zlib.crc32(self.label.encode()))
+                seed_sequence.entropy,
+                spawn_key=(*seed_sequence.spawn_key, zlib.crc32(self.label.encode())),
             )
-            plain["rng"] = np.random.default_rng(own)
-        made = trial.tracker(self.kind, **plain)
+            settings["rng"] = np.random.default_rng(own)
+        made = trial.tracker(self.kind, **settings)
         if not nested:
             return made
         return type(made)(**made.set_params(**nested).get_params(deep=False))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the description that a results file keeps."""
-        params = {name: _plain(value) for name, value in self.params.items()}
+        params = {name: to_plain(value) for name, value in self.params.items()}
         return {"tracker": self.tracker, "params": params, "label": self.label}
 
 
@@ -118,12 +119,12 @@ def grid(tracker: str, values: Mapping[str, Sequence[Any]]) -> list[Method]:
     return [Method(tracker, params) for params in ParameterGrid(values)]
 
 
-def plain(method: str) -> str:
+def tracker_name(method: str) -> str:
     """Return the tracker that a label begins with.
 
     Examples
     --------
-    >>> plain("svalse as printed")
+    >>> tracker_name("svalse as printed")
     'svalse'
     """
     return method.partition(" ")[0]

@@ -8,13 +8,13 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import arrivals
-from arrivals.parameters import _plain
+from arrivals.parameters import to_plain
 from arrivals.scenarios.base import Scenario, create
 from arrivals.scenarios.experiments.batch import ERROR, Row, RunBatch
 from arrivals.scenarios.experiments.methods import Method, methods
 from arrivals.scenarios.experiments.results_file import Results, code_mark
 from arrivals.scenarios.experiments.study import Study
-from arrivals.scenarios.experiments.workers import deaths_told
+from arrivals.scenarios.experiments.workers import report_worker_failure
 from arrivals.scenarios.metrics.registry import CPU, METRICS, Metric
 from arrivals.validation import count
 
@@ -93,7 +93,7 @@ def monte_carlo(
         "version": arrivals.__version__,
         "code": code_mark({one.__module__ for one in [*cases.values(), *scored.values()]}),
         "seed": count("seed", seed, least=0),
-        "scenarios": {name: _plain(one) for name, one in cases.items()},
+        "scenarios": {name: to_plain(one) for name, one in cases.items()},
         "methods": [method.to_dict() for method in compared],
         "metrics": {name: f"{f.__module__}.{f.__qualname__}" for name, f in scored.items()},
     }
@@ -161,7 +161,7 @@ def _computed(
     kept = "nothing is kept: no file was named"
     if results.path is not None:
         kept = f"finished runs are kept in {results.path}: call again to go on"
-    with deaths_told(kept):
+    with report_worker_failure(kept):
         yield from parallel(delayed(RunBatch.rows)(block) for block in blocks)
 
 

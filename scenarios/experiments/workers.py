@@ -12,7 +12,7 @@ NOT_KEPT = "this study keeps no runs and starts anew when called again; finished
 
 
 @contextmanager
-def deaths_told(kept: str) -> Iterator[None]:
+def report_worker_failure(kept: str) -> Iterator[None]:
     """Tell in one line that a process was killed, and what is kept.
 
     Parameters
@@ -49,7 +49,7 @@ def _cause(message: str) -> str:
     return ", ".join(bad) or "killed, or out of memory"
 
 
-def spread(function: Callable[..., T], cases: Iterable[Sequence[Any]]) -> list[T]:
+def parallel_map(function: Callable[..., T], cases: Iterable[Sequence[Any]]) -> list[T]:
     """Call a function with the arguments of every case, on as many processes as joblib is told.
 
     Inside `joblib.parallel_config(n_jobs=...)` that many, else in this one; the results are those
@@ -62,10 +62,10 @@ def spread(function: Callable[..., T], cases: Iterable[Sequence[Any]]) -> list[T
 
     Examples
     --------
-    >>> spread(pow, [(2, 3), (3, 2)])
+    >>> parallel_map(pow, [(2, 3), (3, 2)])
     [8, 9]
     """
     from joblib import Parallel, delayed
 
-    with deaths_told(NOT_KEPT):
+    with report_worker_failure(NOT_KEPT):
         return list(Parallel()(delayed(function)(*case) for case in cases))

@@ -78,7 +78,7 @@ def huber(errors: ArrayLike, k: float = HUBER) -> HuberEstimate:
     return HuberEstimate(bias, float(np.sqrt((weights * e**2).sum() / weights.sum())))
 
 
-def assigned(theta: ArrayLike, truth: ArrayLike, how: Assignment = "nearest") -> Int:
+def assign(theta: ArrayLike, truth: ArrayLike, how: Assignment = "nearest") -> Int:
     """Return, for each true position, the number of the estimate that stands for it.
 
     Parameters
@@ -94,7 +94,7 @@ def assigned(theta: ArrayLike, truth: ArrayLike, how: Assignment = "nearest") ->
     Examples
     --------
     >>> found, truth = [[0.0, 0.0], [90.0, 0.0]], [[1.0, 0.0], [10.0, 0.0]]
-    >>> assigned(found, truth), assigned(found, truth, "one-to-one")
+    >>> assign(found, truth), assign(found, truth, "one-to-one")
     (array([0, 0]), array([0, 1]))
     """
     apart = distances(theta, truth)
@@ -159,7 +159,7 @@ def scores(
     u, true_u : array_like, shape (n_runs, n_sources)
         Log amplitudes, Np.
     how : {"nearest", "one-to-one"}
-        As in `assigned`.
+        As in `assign`.
 
     References
     ----------
@@ -174,7 +174,7 @@ def scores(
     1.3
     """
     theta, truth = real("theta", theta), real("truth", truth)
-    which = np.array([assigned(t, s, how) for t, s in zip(theta, truth, strict=True)])
+    which = np.array([assign(t, s, how) for t, s in zip(theta, truth, strict=True)])
     found = np.take_along_axis(theta, which[..., None], axis=1)
     step = np.clip(np.nan_to_num(found - truth, nan=GONE), -GONE, GONE)
     far = np.hypot(step[..., 0], step[..., 1])

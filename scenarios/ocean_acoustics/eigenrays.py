@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from arrivals.scenarios.ocean_acoustics.rays import Fan, floor_reflection, traced
+from arrivals.scenarios.ocean_acoustics.rays import Fan, floor_reflection, trace_rays
 from arrivals.scenarios.ocean_acoustics.waveguide import Waveguide
 from arrivals.typing import Bool, Complex, Float, Int
 from arrivals.validation import count, number, positive, real
@@ -138,7 +138,7 @@ def eigenrays(
     if not 0 < number("steepest", steepest) < np.pi / 2:
         raise ValueError(f"steepest must lie in (0, π/2) rad; got {steepest}")
     angle = steepest * (np.arange(count("n_rays", n_rays, least=2)) + 1) / n_rays
-    fan = traced(guide, angle, source, depths)
+    fan = trace_rays(guide, angle, source, depths)
     floor = floor_reflection(guide, frequency, fan.slowness)
     parts = [
         _path(name, fan, guide, floor, source, depths, ranges)

@@ -52,7 +52,7 @@ class Fan:
         return self.range[node], self.time[node]
 
 
-def traced(guide: Waveguide, angle: ArrayLike, source_depth: float, depths: ArrayLike) -> Fan:
+def trace_rays(guide: Waveguide, angle: ArrayLike, source_depth: float, depths: ArrayLike) -> Fan:
     """Trace rays through water whose speed is linear between the nodes.
 
     Parameters
@@ -68,7 +68,7 @@ def traced(guide: Waveguide, angle: ArrayLike, source_depth: float, depths: Arra
     Examples
     --------
     >>> guide = Waveguide([0.0, 100.0], [1500.0, 1500.0])
-    >>> fan = traced(guide, np.deg2rad([45.0]), 30.0, [60.0])
+    >>> fan = trace_rays(guide, np.deg2rad([45.0]), 30.0, [60.0])
     >>> fan.depth, fan.range[:, 0].round(6)
     (array([  0.,  30.,  60., 100.]), array([  0.,  30.,  60., 100.]))
     """
@@ -201,7 +201,7 @@ def ray_line(
     """
     c_source, c = np.interp([source_depth, depth], guide.depths, guide.speeds)
     angle = np.arccos(np.clip(c_source / c * np.cos(doa), -1, 1))
-    fan = traced(guide, [angle], source_depth, [depth])
+    fan = trace_rays(guide, [angle], source_depth, [depth])
     there = ~np.isnan(fan.range[:, 0])
     z, y = fan.depth[there], fan.range[there, 0]
     if fan.turns_above[0]:  # between two nodes: drawn at the nearer one

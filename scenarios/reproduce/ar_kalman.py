@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from arrivals.scenarios.base import Trial
-from arrivals.scenarios.experiments.workers import spread
+from arrivals.scenarios.experiments.workers import parallel_map
 from arrivals.scenarios.metrics.separation import nmse
 from arrivals.scenarios.metrics.unlabelled_rmse import best_assignment_rmse
-from arrivals.scenarios.reproduce.claims import holds
+from arrivals.scenarios.reproduce.claims import verdict
 from arrivals.scenarios.reproduce.studies import Report
 from arrivals.scenarios.simulations.autoregressive_sources import (
     AutoregressiveField,
@@ -92,7 +92,7 @@ def cases() -> list[Experiment]:
 def ar_kf(runs: int, seed: int) -> Report:
     """Directions and AR models of the report's scenes, by its method, ours and two others."""
     all_cases = cases()
-    done = spread(_worked, [(case, runs, seed + n) for n, case in enumerate(all_cases)])
+    done = parallel_map(_worked, [(case, runs, seed + n) for n, case in enumerate(all_cases)])
     rows = [row for row, _ in done]
     paths = [path for _, path in done]
     figures = {
@@ -138,30 +138,30 @@ def _claims(rows: Sequence[tuple[Any, ...]]) -> list[str]:
     ar_error = {figure: max(float(row[6]) for row in part) for figure, part in of.items()}
     lines = []
     if 1 in of:
-        lines.append(holds("the AR coefficients converge (Fig. 1)", ar_error[1] < 0.05,
+        lines.append(verdict("the AR coefficients converge (Fig. 1)", ar_error[1] < 0.05,
                            f"error {ar_error[1]:.3f}"))  # fmt: skip
     if 2 in of:
-        lines.append(holds("the directions converge (Fig. 2)", rmse[2][0] < 0.5,
+        lines.append(verdict("the directions converge (Fig. 2)", rmse[2][0] < 0.5,
                            f"RMSE {rmse[2][0]:.2f} degrees, 10 off at the start"))  # fmt: skip
     if {3, 4} <= set(of):
         moving = rmse[3] + rmse[4]
-        lines.append(holds("moving sources are followed (Figs 3 and 4)", max(moving) < FOLLOWED,
+        lines.append(verdict("moving sources are followed (Figs 3 and 4)", max(moving) < FOLLOWED,
                            f"RMSE {min(moving):.2f} to {max(moving):.2f} degrees"))  # fmt: skip
     if 5 in of:
-        lines.append(holds("low SNR leaves the AR coefficients alone (Fig. 5)", ar_error[5] < 0.05,
-                           f"error {ar_error[5]:.3f} at most"))  # fmt: skip
+        lines.append(verdict("low SNR leaves the AR coefficients alone (Fig. 5)",
+                             ar_error[5] < 0.05, f"error {ar_error[5]:.3f} at most"))  # fmt: skip
     if 6 in of:
         told = ", ".join(f"{value:.2f}" for value in rmse[6])
-        lines.append(holds("the more sensors, the less error (Fig. 6)",
+        lines.append(verdict("the more sensors, the less error (Fig. 6)",
                            rmse[6] == sorted(rmse[6], reverse=True),
                            f"RMSE {told} degrees"))  # fmt: skip
     if {2, 7} <= set(of):
         low, high = (float(value) for value in of[2][0][3:5])
-        lines.append(holds("order 3 has no significant effect (Fig. 7)", low < rmse[7][0] < high,
+        lines.append(verdict("order 3 has no significant effect (Fig. 7)", low < rmse[7][0] < high,
                            f"RMSE {rmse[7][0]:.3f}; trials of Fig. 2 lie from {low:.3f} to "
                            f"{high:.3f}"))  # fmt: skip
     if 8 in of:
-        lines.append(holds("speech is followed by order 1 (Fig. 8)", max(rmse[8]) < FOLLOWED,
+        lines.append(verdict("speech is followed by order 1 (Fig. 8)", max(rmse[8]) < FOLLOWED,
                            f"RMSE {min(rmse[8]):.2f} to {max(rmse[8]):.2f} degrees"))  # fmt: skip
     return lines
 
@@ -171,8 +171,8 @@ def _worked(case: Experiment, runs: int, seed: int) -> tuple[tuple[Any, ...], Fl
     children = np.random.SeedSequence(seed).spawn(runs)
     trials = [case.scene.sample(np.random.default_rng(child)) for child in children]
     N = case.params.get("interval", 30)
-    found = tracked(trials, case)
-    plain = tracked(trials, case._replace(params=case.params | PLAIN))
+    found = run_tracker(trials, case)
+    plain = run_tracker(trials, case._replace(params=case.params | PLAIN))
     rms, bias, scored = _errors(trials, found, N)
     rms_plain, bias_plain, _ = _errors(trials, plain, N)
     others = [_unlabelled(trials[:FEW], name, case, scored) for name in ("esprit", "past")]
@@ -189,7 +189,7 @@ def _worked(case: Experiment, runs: int, seed: int) -> tuple[tuple[Any, ...], Fl
     return row, np.stack([line[:n] for line in lines])
 
 
-def tracked(trials: list[Trial], case: Experiment) -> list[Run]:
+def run_tracker(trials: list[Trial], case: Experiment) -> list[Run]:
     """Run the tracker over trials of one scene, each source off by `offset_deg`, alternately."""
     truth = trials[0].truth[0]
     order = np.argsort(np.argsort(truth))
@@ -232,18 +232,18 @@ def _unlabelled(trials: list[Trial], name: str, case: Experiment, scored: slice)
     errors = []
     for trial in trials:
         run = create(name, measurement=trial.measurement, **params).run(trial.measurements)
-        errors.append(best_assignment_rmse(trial.truth[scored], held(run.doa[scored])))
+        errors.append(best_assignment_rmse(trial.truth[scored], hold_last(run.doa[scored])))
     return float(np.rad2deg(np.median(errors)))
 
 
-def held(doa: Float) -> Float:
+def hold_last(doa: Float) -> Float:
     """Return directions (n_steps, n_sources) in which those not found are the last ones that were.
 
     Before the first ones they are broadside.
 
     Examples
     --------
-    >>> held(np.array([[0.1, 0.2], [0.3, np.nan]]))
+    >>> hold_last(np.array([[0.1, 0.2], [0.3, np.nan]]))
     array([[0.1, 0.2],
            [0.3, 0.2]])
     """

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 
-def holds(claim: str, fact: bool | None, numbers: str) -> str:
+def verdict(claim: str, fact: bool | None, numbers: str) -> str:
     """Return a line on a claim; None is for what the runs do not decide.
 
     Examples
     --------
-    >>> holds("one below two", 1 < 2, "1 and 2")
+    >>> verdict("one below two", 1 < 2, "1 and 2")
     'Holds: one below two (1 and 2).'
     """
-    verdict = "Not decided" if fact is None else "Holds" if fact else "Does not hold"
-    return f"{verdict}: {claim} ({numbers})."
+    word = "Not decided" if fact is None else "Holds" if fact else "Does not hold"
+    return f"{word}: {claim} ({numbers})."
 
 
 def negative(mean: float, error: float) -> bool | None:

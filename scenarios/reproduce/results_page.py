@@ -25,12 +25,12 @@ PAPERS = {
 }
 
 
-def stamped(text: str, stamp: Mapping[str, Any]) -> str:
+def add_stamp(text: str, stamp: Mapping[str, Any]) -> str:
     r"""Return a study's page with what it was made of at its end, where no reader sees it.
 
     Examples
     --------
-    >>> print(stamped("# Two\n", {"runs": 2}))
+    >>> print(add_stamp("# Two\n", {"runs": 2}))
     # Two
     <BLANKLINE>
     <!-- arrivals {"runs": 2} -->
@@ -39,7 +39,7 @@ def stamped(text: str, stamp: Mapping[str, Any]) -> str:
     return f"{text}\n{MARK}{json.dumps(dict(stamp), sort_keys=True)} -->\n"
 
 
-def stamp_of(page: Path) -> dict[str, Any] | None:
+def read_stamp(page: Path) -> dict[str, Any] | None:
     """Return what a study's page was made of; None if there is no such page, or no stamp."""
     try:
         last = page.read_text(encoding="utf-8").splitlines()[-1]
@@ -70,7 +70,7 @@ def write_page(path: Path, names: Sequence[str], folder: Path, command: str) -> 
             contents += ["", f"**{paper}**", ""]
             sections += [f"## {paper}", ""]
         contents.append(f"* [{_title(text)}](#{name}){_verdicts(text)}")
-        sections.append(_section(name, text, stamp_of(folder / f"{name}.md")))
+        sections.append(_section(name, text, read_stamp(folder / f"{name}.md")))
     head = (
         "# Results\n\nOur numbers beside the papers', and a line on each claim that has one. "
         f"Written by\n\n    {command}\n\nwith arrivals {arrivals.__version__}; each study's "

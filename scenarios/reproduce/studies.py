@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import arrivals
 from arrivals.files import atomic_write
 from arrivals.scenarios.experiments.results_file import code_mark
-from arrivals.scenarios.reproduce.results_page import stamp_of, stamped, write_page
+from arrivals.scenarios.reproduce.results_page import add_stamp, read_stamp, write_page
 from arrivals.trackers.run import text
 from arrivals.validation import count, one_of
 
@@ -203,7 +203,7 @@ def _shown(path: Path) -> str:
 def _is_done(name: str, folder: Path, stamp: Mapping[str, Any]) -> bool:
     """Tell whether the study's page is there, of the same runs and code, and what it shows."""
     page = folder / f"{name}.md"
-    return stamp_of(page) == stamp and all(path.exists() for path in _files(name, folder))
+    return read_stamp(page) == stamp and all(path.exists() for path in _files(name, folder))
 
 
 def _files(name: str, folder: Path) -> list[Path]:
@@ -240,7 +240,7 @@ def _write(name: str, report: Report, folder: Path, stamp: Mapping[str, Any]) ->
         with atomic_write(folder / picture, binary=True) as file:
             figure.savefig(file, format="png", dpi=130)
     with atomic_write(folder / f"{name}.md") as file:
-        file.write(stamped(report.markdown(pictures), stamp))
+        file.write(add_stamp(report.markdown(pictures), stamp))
 
 
 def add_reproduce(commands: Any) -> None:

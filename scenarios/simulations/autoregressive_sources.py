@@ -82,7 +82,7 @@ class SourceField(Scenario):
         end = self.doa_deg if self.end_deg is None else self.end_deg
         return np.deg2rad(np.linspace(self.doa_deg, end, n_steps))
 
-    def heard(
+    def make_trial(
         self, signals: Complex | Float, motion: AutoregressiveSources, rng: np.random.Generator
     ) -> Trial:
         """Return a trial of given source signals, (n_steps, n_sources), of power 1."""
@@ -147,7 +147,7 @@ class AutoregressiveField(SourceField):
             list(motion.coefficients), motion.noise, self.n_intervals * self.interval, rng,
             complex_valued=not self.real_valued,
         )  # fmt: skip
-        return self.heard(signals, motion, rng)
+        return self.make_trial(signals, motion, rng)
 
 
 @register("ar_fig3")

@@ -30,7 +30,7 @@ def bins(n_bins: int) -> list[float]:
     return [1 / f for f in np.linspace(LOWEST, 1.0, count("n_bins", n_bins)).tolist()]
 
 
-def observed(
+def simulate_snapshots(
     model: ArraySnapshot,
     truth: Float,
     snr_db: float,
@@ -116,7 +116,7 @@ class Circle(Scenario):
     def sample(self, rng: np.random.Generator) -> Trial:
         """Draw one trial; the motion model expects 3° a step."""
         truth, model = np.deg2rad(self.doa_deg()), self.measurement
-        z = observed(model, truth, self.snr_db, rng)
+        z = simulate_snapshots(model, truth, self.snr_db, rng)
         return Trial(z, truth, model, BernoulliVonMises(sigma_doa=np.deg2rad(3.0)))
 
 
@@ -165,7 +165,7 @@ class Cardioids(Scenario):
         apart = np.deg2rad(rng.uniform(40, 320, self.n_steps))
         truth = (np.stack([first, first + apart], axis=1) + np.pi) % (2 * np.pi) - np.pi
         model = self.measurement
-        z = observed(model, truth, self.snr_db, rng, received=True)
+        z = simulate_snapshots(model, truth, self.snr_db, rng, received=True)
         known = model if self.known else model.replace(response=None)
         return Trial(z, truth, known, BernoulliVonMises(sigma_doa=np.deg2rad(3.0)))
 
@@ -223,7 +223,7 @@ class Grating(Scenario):
     def sample(self, rng: np.random.Generator) -> Trial:
         """Draw one trial; the motion model expects 2° a step."""
         truth, model = np.deg2rad(self.doa_deg()), self.measurement
-        z = observed(model, truth, self.snr_db, rng)
+        z = simulate_snapshots(model, truth, self.snr_db, rng)
         if self.hopping and self.n_bins > 1:
             heard = rng.integers(self.n_bins, size=self.n_steps)
             z[np.arange(self.n_bins) != heard[:, None]] = complex(np.nan, np.nan)

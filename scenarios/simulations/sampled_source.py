@@ -90,12 +90,14 @@ class InterpolationScenario(Scenario):
         if self.reference == "first":
             places = places - places.max()
         earlier = direction(doa, 1) @ places.T
-        waves = heard(*self.sinusoids(rng), earlier, self.n_steps)
+        waves = received_waveforms(*self.sinusoids(rng), earlier, self.n_steps)
         noise = rng.standard_normal(waves.shape) * np.sqrt(model.noise_ratio)
         return Trial(waves + noise, truth, model, DelayWalk())
 
 
-def heard(frequencies: Float, amplitudes: Complex, earlier: Float, n_steps: int) -> Float:
+def received_waveforms(
+    frequencies: Float, amplitudes: Complex, earlier: Float, n_steps: int
+) -> Float:
     """Return a sum of sinusoids Re Σ a exp(j2πf (k + earlier)) at sensors, (n_steps, n_sensors).
 
     Parameters
@@ -108,7 +110,8 @@ def heard(frequencies: Float, amplitudes: Complex, earlier: Float, n_steps: int)
 
     Examples
     --------
-    >>> heard(np.array([0.25]), np.array([1.0]), np.array([[0.0, 1.0]]), 2).round(6) + 0.0
+    >>> lead = np.array([[0.0, 1.0]])
+    >>> received_waveforms(np.array([0.25]), np.array([1.0]), lead, 2).round(6) + 0.0
     array([[ 1.,  0.],
            [ 0., -1.]])
     """

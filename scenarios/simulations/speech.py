@@ -91,7 +91,7 @@ class SpeechField(SourceField):
 
     def sample(self, rng: np.random.Generator) -> Trial:
         """Draw the noise."""
-        return self.heard(self.signals, self.motion, rng)
+        return self.make_trial(self.signals, self.motion, rng)
 
 
 @register("ar_fig9")

@@ -88,7 +88,7 @@ class Configurable:
     def to_dict(self) -> dict[str, Any]:
         """Return the configuration as plain numbers, strings, lists and dictionaries."""
         params = self.get_params(deep=False)
-        return {"type": self._type_name()} | {key: _plain(value) for key, value in params.items()}
+        return {"type": self._type_name()} | {key: to_plain(value) for key, value in params.items()}
 
     @classmethod
     def from_dict(cls, config: Mapping[str, Any]) -> Self:
@@ -167,13 +167,14 @@ def _registered(name: str) -> type:
     raise unknown if FINDERS else ValueError(f"nothing is registered under {name!r}")
 
 
-def _plain(value: Any) -> Any:
+def to_plain(value: Any) -> Any:
+    """Return a value as JSON has it: parts as dictionaries, arrays and tuples as lists."""
     if isinstance(value, Configurable):
         return value.to_dict()
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     if isinstance(value, tuple | list):
-        return [_plain(item) for item in value]
+        return [to_plain(item) for item in value]
     return value
 
 

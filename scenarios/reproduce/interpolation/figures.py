@@ -13,17 +13,17 @@ import numpy as np
 
 from arrivals.measurement_models import DelayInterpolator
 from arrivals.motion_models import DelayDrift, DelayWalk, MotionModel
-from arrivals.scenarios.experiments.workers import spread
+from arrivals.scenarios.experiments.workers import parallel_map
 from arrivals.scenarios.reproduce.interpolation.trials import (
     FILTERS,
     bound_deg,
     draws,
-    filtered,
-    found,
+    filter_directions,
+    final_directions,
     mean_and_variance,
     moving_errors,
     rms,
-    scanned,
+    scan_records,
 )
 from arrivals.scenarios.reproduce.studies import Report
 from arrivals.scenarios.simulations.sampled_source import (
@@ -72,7 +72,7 @@ def table1(runs: int, seed: int) -> Report:
     """Means and variances at 5 dB for five directions, three kinds of source, seven methods."""
     methods = ("B", "Bw", "C", "D", "E2", "conventional", "mvdr", "mvdr on the grid")
     cases = [(name, m, n, runs, seed) for name in SOURCES for m in methods for n in range(5)]
-    rows = spread(_table1_row, cases)
+    rows = parallel_map(_table1_row, cases)
     remarks = (
         "The paper does not say what its source was; its figures stand beside all three of ours.",
         "Not reproduced: the paper's means of its own method, 0.99 degrees low at four angles and "
@@ -95,7 +95,7 @@ def table1(runs: int, seed: int) -> Report:
 
 def _table1_row(name: str, method: str, n: int, runs: int, seed: int) -> tuple[Any, ...]:
     scenario = SOURCES[name].replace(doa_deg=ANGLES[n])
-    ends = found(scenario, runs, seed + n, method, ANGLES[n] - 10)
+    ends = final_directions(scenario, runs, seed + n, method, ANGLES[n] - 10)
     paper = PAPER.get(method.removesuffix(" on the grid"), ((np.nan,) * 2,) * 5)[n]
     bound = bound_deg(scenario) ** 2
     return (name, method, ANGLES[n], *mean_and_variance(ends), *paper, bound)
@@ -141,7 +141,7 @@ def convergence(runs: int, seed: int) -> Report:
             samples = draws(scenario, runs, seed)
             bound = bound_deg(scenario)
             for method in ("B", "C", "D", "E"):
-                path = filtered(scenario, samples, method, start)
+                path = filter_directions(scenario, samples, method, start)
                 error = path - doa
                 ends = [rms(error[:, k - 1]) for k in (30, 100, 300)]
                 rows.append((doa, snr_db, method, *ends, _settled(error), bound))
@@ -177,7 +177,7 @@ def _coefficients(runs: int, seed: int) -> dict[str, Figure]:
     scenario = InterpolationTone(doa_deg=60.0, n_steps=100)
     taps = DelayInterpolator(scenario.correlation)
     model = scenario.measurement
-    doa = np.deg2rad(filtered(scenario, draws(scenario, runs, seed), "B", 50.0))
+    doa = np.deg2rad(filter_directions(scenario, draws(scenario, runs, seed), "B", 50.0))
     c, true = taps.coefficients(model.delay(doa)), taps.coefficients(model.delay(np.pi / 3))
     figures = {}
     for number, index, name in ((4, 1, "b"), (5, 0, "a")):
@@ -199,12 +199,12 @@ def _three_methods(runs: int, seed: int) -> Figure:
     scenario = InterpolationTone(doa_deg=60.0, n_steps=100)
     samples = draws(scenario, runs, seed)
     figure, axes = _figure(1, 2, (10.0, 3.8))
-    paths = {name: filtered(scenario, samples, name, 50.0) for name in ("B", "D")}
+    paths = {name: filter_directions(scenario, samples, name, 50.0) for name in ("B", "D")}
     steps = {name: np.arange(1, 101) for name in paths}
     lengths = np.array([4, 6, 8, 10, 14, 20, 30, 40, 60, 80, 100])
     few = samples[: min(runs, 40)]
     for method in ("conventional", "mvdr"):
-        scans = [scanned(scenario, few[:, :n], method) for n in lengths]
+        scans = [scan_records(scenario, few[:, :n], method) for n in lengths]
         paths[method], steps[method] = np.array(scans).T, lengths
     for name, path in paths.items():
         style: dict[str, Any] = {"color": COLOURS[name], "label": NAMES[name]}
@@ -235,7 +235,7 @@ def rmse_study(runs: int, seed: int) -> Report:
         for n, snr_db in enumerate((-10.0, -5.0, 0.0, 5.0, 10.0, 15.0, 20.0))
         for method in ("B", "C", "D", "E", "conventional", "mvdr")
     ]
-    rows = spread(_rmse_row, longer + louder)
+    rows = parallel_map(_rmse_row, longer + louder)
     against_snr = rows[len(longer) :]
     figures = {
         "fig7": _draw_rmse(rows[: len(longer)], 2, "snapshots", "log"),
@@ -259,7 +259,7 @@ def _rmse_row(
     name: str, scenario: InterpolationScenario, method: str, runs: int, seed: int
 ) -> tuple[Any, ...]:
     start = 55.0 if method == "E" else 50.0
-    ends = found(scenario, runs, seed, method, start)
+    ends = final_directions(scenario, runs, seed, method, start)
     error = rms(ends - scenario.doa_deg)
     begins = start if method in FILTERS else np.nan
     return (name, scenario.snr_db, scenario.n_steps, method, error, bound_deg(scenario), begins)
@@ -305,9 +305,9 @@ def moving(runs: int, seed: int) -> Report:
     rows: list[tuple[Any, ...]] = []
     for name in ("tone", "band"):
         filters = [c for c in MOVING if (name, c[0]) != ("band", "phasor")]
-        rows += spread(_moving_row, [(name, *case, runs, seed) for case in filters])
+        rows += parallel_map(_moving_row, [(name, *case, runs, seed) for case in filters])
         scans = ("conventional", "mvdr")
-        rows += spread(_window_row, [(name, scan, min(runs, 20), seed) for scan in scans])
+        rows += parallel_map(_window_row, [(name, scan, min(runs, 20), seed) for scan in scans])
     remarks = (
         "The paper has no moving source. RMSE over snapshots 50 to 380, degrees; the estimate of "
         "a filter that waits for later samples is held against the snapshot that it treats. The "
@@ -337,7 +337,7 @@ def _window_row(name: str, method: Any, runs: int, seed: int) -> tuple[Any, ...]
     """Return the RMSE, degrees, of scans of 26 snapshots around every tenth one."""
     scenario, at = _ramp(name), np.arange(50, 380, 10)
     samples, truth = draws(scenario, runs, seed), np.rad2deg(scenario.truth()[:, 0])
-    scans = [scanned(scenario, samples[:, k - 13 : k + 13], method) for k in at]
+    scans = [scan_records(scenario, samples[:, k - 13 : k + 13], method) for k in at]
     error = rms(np.array(scans) - (truth[at] + truth[at - 1])[:, None] / 2)
     return (name, f"{method}, window of 26", "-", np.nan, error, np.nan)
 
@@ -348,7 +348,7 @@ def _draw_ramp(runs: int, seed: int) -> Figure:
     figure, (ax,) = _figure(1, 1, (7.0, 4.2))
     drift = {"C": DelayDrift(1e-8), "B": DelayWalk(1e-3), "E": DelayDrift(1e-9)}
     for method, motion in sorted(drift.items()):
-        path = filtered(scenario, samples[:1], method, 20.0, motion=motion)[0]
+        path = filter_directions(scenario, samples[:1], method, 20.0, motion=motion)[0]
         ax.plot(path, color=COLOURS[method], linewidth=1,
                 label=f"{NAMES[method]}, {type(motion).__name__}")  # fmt: skip
     truth = np.rad2deg(scenario.truth()[:, 0])

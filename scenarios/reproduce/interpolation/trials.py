@@ -54,7 +54,7 @@ def tracker(
     )
 
 
-def filtered(
+def filter_directions(
     scenario: InterpolationScenario, samples: Float, method: str, start_deg: float, **params: Any
 ) -> Float:
     """Return the directions after every snapshot, degrees, (runs, n_steps)."""
@@ -63,7 +63,7 @@ def filtered(
     return np.rad2deg(scenario.measurement.doa(x[..., 0]))
 
 
-def scanned(
+def scan_records(
     scenario: InterpolationScenario, samples: Float, method: Method, **params: Any
 ) -> Float:
     """Return the directions from whole records, degrees, (runs,)."""
@@ -71,15 +71,15 @@ def scanned(
     return np.rad2deg([scan(record, model, method, **params) for record in samples])
 
 
-def found(
+def final_directions(
     scenario: InterpolationScenario, runs: int, seed: int, method: str, start_deg: float
 ) -> Float:
     """Return the directions that a filter or a scan ends with, degrees, (runs,)."""
     samples = draws(scenario, runs, seed)
     if method in FILTERS:
-        return filtered(scenario, samples, method, start_deg)[:, -1]
+        return filter_directions(scenario, samples, method, start_deg)[:, -1]
     kind: Method = "mvdr" if method.startswith("mvdr") else "conventional"
-    return scanned(scenario, samples, kind, refine=not method.endswith("grid"))
+    return scan_records(scenario, samples, kind, refine=not method.endswith("grid"))
 
 
 def bound_deg(scenario: InterpolationScenario) -> float:
@@ -100,7 +100,7 @@ def rms(error: Float) -> float:
     return float(np.sqrt(np.mean(np.square(error))))
 
 
-def smoothed(x: Float, P: Float, motion: MotionModel) -> Float:
+def smooth(x: Float, P: Float, motion: MotionModel) -> Float:
     """Return the means of Rauch, Tung and Striebel's smoother of a linear motion.
 
     Parameters
@@ -110,13 +110,13 @@ def smoothed(x: Float, P: Float, motion: MotionModel) -> Float:
     motion : MotionModel
     """
     F, Q = motion.F(np.zeros(motion.dim_x)), motion.Q()
-    smooth = x.copy()
+    means = x.copy()
     for k in range(x.shape[-2] - 2, -1, -1):
         predicted = F @ P[..., k, :, :] @ F.T + Q
         gain = np.swapaxes(np.linalg.solve(predicted, F @ P[..., k, :, :]), -1, -2)
-        ahead = smooth[..., k + 1, :] - (F @ x[..., k, :, None])[..., 0]
-        smooth[..., k, :] = x[..., k, :] + (gain @ ahead[..., None])[..., 0]
-    return smooth
+        ahead = means[..., k + 1, :] - (F @ x[..., k, :, None])[..., 0]
+        means[..., k, :] = x[..., k, :] + (gain @ ahead[..., None])[..., 0]
+    return means
 
 
 def moving_errors(
@@ -143,7 +143,7 @@ def moving_errors(
 
     if method in ("E", "E2"):
         return error(x), np.nan
-    return error(x), error(smoothed(x, P, made.state_motion))
+    return error(x), error(smooth(x, P, made.state_motion))
 
 
 def mean_and_variance(values: Sequence[float] | Float) -> tuple[float, float]:

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from arrivals.measurement_models import db_to_neper, neper_to_db
-from arrivals.scenarios.metrics.position_errors import Scores, assigned, scores
-from arrivals.scenarios.reproduce.claims import holds
+from arrivals.scenarios.metrics.position_errors import Scores, assign, scores
+from arrivals.scenarios.reproduce.claims import verdict
 from arrivals.scenarios.reproduce.rss.trials import (
     CYCLING,
     Answers,
@@ -111,10 +111,10 @@ def claims(results: dict[tuple[str, str], Scores], trials: dict[str, Draws]) -> 
     return [
         *_of_accuracy(results),
         *_of_time(),
-        holds("VB converges in fewer than 10 cycles", min(early.values()) > 0.95, shares),
-        holds("VB, undamped and in parallel with a fixed prior, diverges rather than sticks",
+        verdict("VB converges in fewer than 10 cycles", min(early.values()) > 0.95, shares),
+        verdict("VB, undamped and in parallel with a fixed prior, diverges rather than sticks",
               wild > 0.5, f"{wild:.0%} {jumps}"),
-        holds("so it does one after the other", tame > 0.5, f"{tame:.0%} {jumps}"),
+        verdict("so it does one after the other", tame > 0.5, f"{tame:.0%} {jumps}"),
     ]  # fmt: skip
 
 
@@ -125,10 +125,10 @@ def _of_accuracy(results: dict[tuple[str, str], Scores]) -> list[str]:
     )
     literal, fixed, ml = (rms["K=7 prior", name] for name in ("vb_literal", "vb", "lm"))
     return [
-        holds("VB beats ML for 3 close targets with a random start", anywhere > 1.2,
+        verdict("VB beats ML for 3 close targets with a random start", anywhere > 1.2,
               f"RMS of ML over that of VB {anywhere:.2f}, paper 1.66, for a start anywhere; "
               f"{near:.2f} for a start within 50 m, {prior:.2f} from the prior"),
-        holds("ML beats VB for 7 targets, VB being Algorithm 1 as printed", literal > 1.2 * ml,
+        verdict("ML beats VB for 7 targets, VB being Algorithm 1 as printed", literal > 1.2 * ml,
               f"{ml:.1f} and {literal:.1f} m; with the prior kept fixed VB has {fixed:.1f} m. The "
               "paper's table, 9.12 and 7.33 m, contradicts its prose"),
     ]  # fmt: skip
@@ -139,11 +139,11 @@ def _of_time() -> list[str]:
     vb, ml = cycle[50] / cycle[5], search[50] / search[5]
     few, many = search[5] / cycle[5], search[50] / cycle[50]
     return [
-        holds("VB is linear in K", vb < 20,
+        verdict("VB is linear in K", vb < 20,
               f"a cycle takes {vb:.0f} times as long for 10 times the sources"),
-        holds("ML is exponential in K", ml > 1000,
+        verdict("ML is exponential in K", ml > 1000,
               f"an iteration takes {ml:.0f} times as long for 10 times the sources"),
-        holds("VB is an order of magnitude faster", min(few, many) > 5,
+        verdict("VB is an order of magnitude faster", min(few, many) > 5,
               f"an iteration of ML takes {few:.2f} of a VB cycle at K = 5, {many:.2f} at K = 50"),
     ]  # fmt: skip
 
@@ -258,5 +258,5 @@ def _draw_powers(ax: Axes, drawn: Draws, vb: Answers, ml: Answers) -> None:
 
 def _of_truths(found: Answers, drawn: Draws) -> Float:
     """Return the log amplitudes found for each true source."""
-    which = np.array([assigned(t, s) for t, s in zip(found.theta, drawn.theta, strict=True)])
+    which = np.array([assign(t, s) for t, s in zip(found.theta, drawn.theta, strict=True)])
     return np.take_along_axis(found.u, which, axis=1)

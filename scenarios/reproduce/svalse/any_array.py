@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from arrivals.scenarios.base import Trial, create
-from arrivals.scenarios.experiments.workers import spread
+from arrivals.scenarios.experiments.workers import parallel_map
 from arrivals.scenarios.metrics.gospa import Gospa, mean_gospa
-from arrivals.scenarios.reproduce.claims import holds, negative
+from arrivals.scenarios.reproduce.claims import negative, verdict
 from arrivals.scenarios.reproduce.studies import Report
 from arrivals.scenarios.simulations.planar_arrays import Circle
 from arrivals.trackers.run import Run
@@ -94,7 +94,9 @@ CASES = [*_of_circle(), *_of_sparse_line()]
 
 def any_array(runs: int, seed: int) -> Report:
     """Mean GOSPA of every case, and a run on the circle as a picture."""
-    found = np.array(spread(_scored, [(case, seed + n) for case in CASES for n in range(runs)]))
+    found = np.array(
+        parallel_map(_scored, [(case, seed + n) for case in CASES for n in range(runs)])
+    )
     found = found.reshape(len(CASES), runs, 4)
     rows = []
     for case, parts in zip(CASES, found, strict=True):
@@ -141,7 +143,7 @@ def _claims(gospa: Float) -> list[str]:
         d = of[low] - of[high]
         mean, error = float(d.mean()), float(d.std(ddof=1) / np.sqrt(len(d)))
         numbers = f"paired difference {mean:.2f} ± {error:.2f} standard error"
-        lines.append(holds(told, negative(mean, error), numbers))
+        lines.append(verdict(told, negative(mean, error), numbers))
     return lines
 
 

@@ -10,10 +10,10 @@ import numpy as np
 from arrivals.motion_models import BernoulliVonMises
 from arrivals.scenarios.base import Scenario, create
 from arrivals.scenarios.bounds.snapshot import line_bound
-from arrivals.scenarios.experiments.methods import Method, methods, plain
+from arrivals.scenarios.experiments.methods import Method, methods, tracker_name
 from arrivals.scenarios.experiments.monte_carlo import monte_carlo
 from arrivals.scenarios.experiments.study import Study
-from arrivals.scenarios.reproduce.claims import holds, negative
+from arrivals.scenarios.reproduce.claims import negative, verdict
 from arrivals.scenarios.reproduce.studies import Report
 from arrivals.scenarios.reproduce.svalse.plots import draw_parts, draw_runs
 from arrivals.scenarios.reproduce.svalse.published_values import ACTIVATION, PAPER, REBUILT
@@ -46,7 +46,7 @@ COLUMNS = ("method", "GOSPA", "std of runs", "from", "to", "distance", "missed",
            "CPU ms a step", "paper's run", "rebuilt", "its std", "rebuilt RMSE")  # fmt: skip
 
 
-def compared(quick: bool) -> list[Method]:
+def table_methods(quick: bool) -> list[Method]:
     """Return the methods of the tables; the paper's form takes ten times as long."""
     return methods(FAST if quick else (*FAST, *PRINTED))
 
@@ -72,7 +72,7 @@ def scene(
 ) -> Report:
     """Compare all methods on one scene; draw the first run, and the parts of GOSPA."""
     scenario = create(name)
-    study = monte_carlo({name: scenario}, compared(quick), runs, seed, out=out,
+    study = monte_carlo({name: scenario}, table_methods(quick), runs, seed, out=out,
                         batch=batch_of(runs))  # fmt: skip
     rows = [_row(study, name, method) for method in study.methods]
     claims = [*_order(study), *_as_rebuilt(study, name), *_calibration(study)]
@@ -115,7 +115,7 @@ def _row(study: Study, name: str, method: str) -> tuple[Any, ...]:
         except ValueError:  # frame by frame there are no labels
             return NAN
 
-    rebuilt = REBUILT[name].get(plain(method))
+    rebuilt = REBUILT[name].get(tracker_name(method))
     known = (rebuilt.gospa, rebuilt.std, rebuilt.rmse) if rebuilt else (NAN,) * 3
     wanted = ("distance", "missed", "false", "rmse", "cardinality", "label_switches",
               "track_length", "nees", "coverage68", "coverage95", "cpu_ms")  # fmt: skip
@@ -125,7 +125,7 @@ def _row(study: Study, name: str, method: str) -> tuple[Any, ...]:
         study.spread("gospa", method),
         *study.interval("gospa", method),
         *map(mean, wanted),
-        PAPER[name].get(plain(method), NAN),
+        PAPER[name].get(tracker_name(method), NAN),
         *known,
     )
 
@@ -142,7 +142,7 @@ def _order(study: Study) -> list[str]:
             f"below 0 in {off.n_below} of {off.n_runs} runs"
         )
         fact = negative(off.mean, off.error)
-        lines.append(holds(f"{better} has a lower GOSPA than {worse}", fact, numbers))
+        lines.append(verdict(f"{better} has a lower GOSPA than {worse}", fact, numbers))
     return lines
 
 
@@ -150,13 +150,15 @@ def _as_rebuilt(study: Study, name: str) -> list[str]:
     """Hold the methods that are the rebuilt ones to what those gave."""
     lines = []
     for method in study.methods:
-        its = REBUILT[name].get(plain(method))
+        its = REBUILT[name].get(tracker_name(method))
         if its is None or method in ("valse", "svalse"):  # these are more than the paper's
             continue
         gospa = study.mean("gospa", method)
         numbers = f"GOSPA {gospa:.2f}, rebuilt {its.gospa:.2f} ± {its.std:.2f}"
         fact = abs(gospa - its.gospa) <= 2 * its.std
-        lines.append(holds(f"{method} is within two deviations of its rebuilt form", fact, numbers))
+        lines.append(
+            verdict(f"{method} is within two deviations of its rebuilt form", fact, numbers)
+        )
     return lines
 
 
@@ -173,7 +175,9 @@ def _calibration(study: Study) -> list[str]:
             f"intervals cover {100 * c68:.0f} % and {100 * c95:.0f} %"
         )
         fact = abs(c68 - 0.68) < 0.05 and abs(c95 - 0.95) < 0.05
-        lines.append(holds(f"{method} states the standard deviations of its errors", fact, numbers))
+        lines.append(
+            verdict(f"{method} states the standard deviations of its errors", fact, numbers)
+        )
     return lines
 
 
@@ -221,12 +225,14 @@ def _activation_claims(study: Study) -> list[str]:
     for label, (claim, metric) in zip(study.methods, CLAIMS, strict=False):
         here, usual = study.mean(metric, label), study.mean(metric, default)
         numbers = f"{metric} {here:.2f}, by default {usual:.2f}"
-        lines.append(holds(f"{claim} ({label})", here > usual + 1, numbers))
+        lines.append(verdict(f"{claim} ({label})", here > usual + 1, numbers))
     for label, known in zip(study.methods, ACTIVATION.values(), strict=True):
         gospa = study.mean("gospa", label)
         numbers = f"GOSPA {gospa:.2f}, rebuilt {known.gospa:.2f} ± {known.std:.2f}"
         fact = abs(gospa - known.gospa) <= 2 * known.std
-        lines.append(holds(f"{label} is within two deviations of the rebuilt form", fact, numbers))
+        lines.append(
+            verdict(f"{label} is within two deviations of the rebuilt form", fact, numbers)
+        )
     return lines
 
 

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 from arrivals.plots.study import METHOD_COLOURS, plot_metric
 from arrivals.scenarios.base import create
 from arrivals.scenarios.bounds.snapshot import LineBound, line_bound
-from arrivals.scenarios.experiments.methods import plain
+from arrivals.scenarios.experiments.methods import tracker_name
 from arrivals.scenarios.experiments.monte_carlo import monte_carlo
 from arrivals.scenarios.experiments.study import Study
-from arrivals.scenarios.reproduce.claims import holds, negative
+from arrivals.scenarios.reproduce.claims import negative, verdict
 from arrivals.scenarios.reproduce.studies import Report
-from arrivals.scenarios.reproduce.svalse.figures_4_to_7 import NAN, batch_of, compared
+from arrivals.scenarios.reproduce.svalse.figures_4_to_7 import NAN, batch_of, table_methods
 from arrivals.scenarios.reproduce.svalse.plots import panels
 from arrivals.scenarios.reproduce.svalse.published_values import SWEEP, SWEPT
 
@@ -32,7 +32,7 @@ MEASURED = ("gospa", "distance", "missed", "false", "rmse", "converged")
 def sweep(name: str, runs: int, seed: int, out: Path | None, quick: bool) -> Study:
     """Run all methods on a scene at every SNR; the cases are the SNRs."""
     cases = {f"{snr:g}": create(name, snr_db=snr) for snr in SNR_DB}
-    return monte_carlo(cases, compared(quick), runs, seed, metrics=MEASURED, out=out,
+    return monte_carlo(cases, table_methods(quick), runs, seed, metrics=MEASURED, out=out,
                        batch=batch_of(runs))  # fmt: skip
 
 
@@ -72,7 +72,11 @@ def _bounds(name: str, runs: int, seed: int) -> dict[str, LineBound]:
 def _row(study: Study, name: str, snr: float, method: str) -> tuple[Any, ...]:
     case = f"{snr:g}"
     means = [study.mean(m, method, case) for m in ("distance", "missed", "false", "rmse")]
-    known = SWEEP[name][snr][SWEPT.index(plain(method))] if plain(method) in SWEPT else (NAN, NAN)
+    known = (
+        SWEEP[name][snr][SWEPT.index(tracker_name(method))]
+        if tracker_name(method) in SWEPT
+        else (NAN, NAN)
+    )
     gospa, spread = study.mean("gospa", method, case), study.spread("gospa", method, case)
     return (snr, method, gospa, spread, *means, *known)
 
@@ -87,20 +91,20 @@ def _claims(study: Study, name: str) -> list[str]:
 
     low = [snr for snr in (0, 5, 10, 15, 20) if lowest(snr)]
     lines = [
-        holds("svalse has the lowest GOSPA of the four up to 20 dB", len(low) == 5,
+        verdict("svalse has the lowest GOSPA of the four up to 20 dB", len(low) == 5,
               f"at {', '.join(map(str, low)) or 'no'} dB"),
-        holds("below 10 dB sbl and ssbl suffer from false directions",
+        verdict("below 10 dB sbl and ssbl suffer from false directions",
               mean("false", "ssbl", 5) > 2 * mean("false", "svalse", 5),
               f"false at 5 dB: ssbl {mean('false', 'ssbl', 5):.1f}, "
               f"svalse {mean('false', 'svalse', 5):.1f}"),
-        holds("from 30 dB on, on-grid sources favour ssbl",
+        verdict("from 30 dB on, on-grid sources favour ssbl",
               mean("gospa", "ssbl", 40) < mean("gospa", "svalse", 40),
               f"at 40 dB: ssbl {mean('gospa', 'ssbl', 40):.2f}, "
               f"svalse {mean('gospa', 'svalse', 40):.2f}"),
     ]  # fmt: skip
     if name == "svalse_scenario2":
         lines.append(
-            holds("at 0 dB the RMSE, blind to false directions, favours ssbl over svalse",
+            verdict("at 0 dB the RMSE, blind to false directions, favours ssbl over svalse",
                   mean("rmse", "ssbl", 0) < mean("rmse", "svalse", 0),
                   f"{mean('rmse', 'ssbl', 0):.1f} and {mean('rmse', 'svalse', 0):.1f}")
         )  # fmt: skip
@@ -162,10 +166,14 @@ def _rmse_claims(study: Study, scene: str) -> Iterator[str]:
             f"{values[0]:.2f} and {values[1]:.2f}, difference {off.mean:.2f} ± {off.error:.2f}"
         )
         claim = f"{scene}, {snr} dB: {better} has a lower RMSE than {worse}"
-        yield holds(claim, negative(off.mean, off.error), numbers)
+        yield verdict(claim, negative(off.mean, off.error), numbers)
 
 
 def _rmse_row(study: Study, name: str, snr: float, method: str) -> tuple[Any, ...]:
     case = f"{snr:g}"
-    known = SWEEP[name][snr][SWEPT.index(plain(method))][1] if plain(method) in SWEPT else NAN
+    known = (
+        SWEEP[name][snr][SWEPT.index(tracker_name(method))][1]
+        if tracker_name(method) in SWEPT
+        else NAN
+    )
     return snr, method, study.mean("rmse", method, case), study.spread("rmse", method, case), known

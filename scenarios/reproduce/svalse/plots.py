@@ -9,7 +9,7 @@ import numpy as np
 
 from arrivals.plots.bearing_time import NEUTRAL, PALETTE, plot_bearing_time
 from arrivals.scenarios.base import Scenario
-from arrivals.scenarios.experiments.methods import Method, plain
+from arrivals.scenarios.experiments.methods import Method, tracker_name
 from arrivals.scenarios.experiments.study import Study
 from arrivals.scenarios.metrics.registry import METRICS
 from arrivals.scenarios.reproduce.svalse.published_values import PAPER, REBUILT
@@ -42,12 +42,12 @@ def draw_runs(
     >>> figure.axes[0].get_title()
     'cbf: GOSPA 12.6°, RMSE 5.7°'
     """
-    chance = np.random.SeedSequence(seed, spawn_key=(0,))
-    trial = scenario.sample(np.random.default_rng(chance))
+    seed_sequence = np.random.SeedSequence(seed, spawn_key=(0,))
+    trial = scenario.sample(np.random.default_rng(seed_sequence))
     n_rows = -(-len(shown) // 2)
     figure, axes = panels(n_rows, 2, (12.0, 2.9 * n_rows + 0.5))
     for ax, method, known in zip(axes, shown, paper, strict=False):
-        run = method.make(trial, chance).run(trial.measurements)
+        run = method.make(trial, seed_sequence).run(trial.measurements)
         plot_bearing_time(
             run, snapshots=trial.measurements, measurement=trial.measurement,  # type: ignore[arg-type]  # complex
             ax=ax,
@@ -108,8 +108,8 @@ def draw_parts(study: Study, name: str) -> Figure:
                 label="95 % of the mean")  # fmt: skip
     rebuilt = {method: known.gospa for method, known in REBUILT[name].items()}
     for known, marker, told in ((rebuilt, "D", "rebuilt"), (PAPER[name], "*", "paper, one run")):
-        there = [n for n, method in enumerate(labels) if plain(method) in known]
-        ax.plot(np.array(there) + 0.2, [known[plain(labels[n])] for n in there], marker,
+        there = [n for n, method in enumerate(labels) if tracker_name(method) in known]
+        ax.plot(np.array(there) + 0.2, [known[tracker_name(labels[n])] for n in there], marker,
                 color="black", markerfacecolor="white", label=told)  # fmt: skip
     ax.set_xticks(at, [label.replace(" ", "\n", 1) for label in labels])
     ax.set(ylabel="GOSPA, degrees")

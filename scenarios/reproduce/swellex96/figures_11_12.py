@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from arrivals.scenarios.experiments.workers import spread
+from arrivals.scenarios.experiments.workers import parallel_map
 from arrivals.scenarios.metrics.gospa import mean_gospa, mean_rmse
-from arrivals.scenarios.reproduce.claims import holds, negative
+from arrivals.scenarios.reproduce.claims import negative, verdict
 from arrivals.scenarios.reproduce.studies import Report
 from arrivals.scenarios.reproduce.swellex96.claims import Claim, claims
 from arrivals.scenarios.reproduce.swellex96.plots import environment_figure, field_figure
@@ -37,15 +37,15 @@ def swellex96(runs: int, seed: int) -> Report:
 
     With a single run every second step is left out: a quick look.
     """
-    step = steps(runs)
+    step = step_numbers(runs)
     scenario = TowPastLine(ranges=tuple(track()["range_m"][step - 1].tolist()))
     arrays = {63: scenario, 64: scenario.replace(missing=())}
     cases = [(arrays[n], name, seed, k) for n in arrays for name in METHODS for k in range(runs)]
-    tracked, cpu = zip(*spread(found, cases), strict=True)
+    tracked, cpu = zip(*parallel_map(track_draw, cases), strict=True)
     rows: list[tuple[Any, ...]] = []
     pairs = [(n, name) for n in arrays for name in METHODS]
     drawn = {pair: slice(k * runs, (k + 1) * runs) for k, pair in enumerate(pairs)}
-    doa = {pair: [strong(run) for run in tracked[drawn[pair]]] for pair in pairs}
+    doa = {pair: [strong_directions(run) for run in tracked[drawn[pair]]] for pair in pairs}
     for n, name in pairs:
         ms = float(np.mean(cpu[drawn[n, name]]))
         rows += [(n, name, *_row(scenario, doa[n, name], step, block), ms) for block in BLOCKS]
@@ -60,17 +60,17 @@ def swellex96(runs: int, seed: int) -> Report:
     thinned = ", every second step" if runs == 1 else ""
     draws = f"{runs} draws of the noise" if runs > 1 else "one draw of the noise"
     title = f"Figs 11 and 12: the SWellEx-96 tow, simulated, 10 dB, {draws}{thinned}"
-    said = compared(scenario, {name: doa[63, name] for name in METHODS}, step)
+    said = compare_methods(scenario, {name: doa[63, name] for name in METHODS}, step)
     remarks = (*REMARKS, *said, CURVED, FIELD, _table(claims(scenario, step)))
     return Report(title, columns, rows, remarks, figures)
 
 
-def steps(runs: int) -> Int:
+def step_numbers(runs: int) -> Int:
     """Return the steps that are looked at, from 1: every second one in a quick look.
 
     Examples
     --------
-    >>> steps(1)[:3], steps(4)[:3]
+    >>> step_numbers(1)[:3], step_numbers(4)[:3]
     (array([1, 3, 5]), array([1, 2, 3]))
     """
     return np.arange(1, 351, 2 if runs == 1 else 1)
@@ -103,7 +103,9 @@ CLAIMED = (
 FIELD = "The paper's statements on the field, and the simulated one:"
 
 
-def compared(scenario: TowPastLine, doa: Mapping[str, Sequence[Float]], step: Int) -> Iterator[str]:
+def compare_methods(
+    scenario: TowPastLine, doa: Mapping[str, Sequence[Float]], step: Int
+) -> Iterator[str]:
     """Give a line on each claim of steps 1 to 100, where many paths lie near each other."""
     score = {name: _scores(scenario, mine, step, (1, 100)) for name, mine in doa.items()}
     for better, claim, worse in CLAIMED:
@@ -113,10 +115,10 @@ def compared(scenario: TowPastLine, doa: Mapping[str, Sequence[Float]], step: In
         error = float(off.std(ddof=1)) / len(off) ** 0.5 if len(off) > 1 else np.nan
         numbers += f", difference {off.mean():.2f} ± {error:.2f}" if len(off) > 1 else ", one draw"
         fact = negative(float(off.mean()), error)
-        yield holds(f"in steps 1 to 100 {better} {claim} {worse}", fact, numbers)
+        yield verdict(f"in steps 1 to 100 {better} {claim} {worse}", fact, numbers)
 
 
-def found(scenario: TowPastLine, name: str, seed: int, draw: int) -> tuple[Run, float]:
+def track_draw(scenario: TowPastLine, name: str, seed: int, draw: int) -> tuple[Run, float]:
     """Track one draw of the noise, the same for all methods and arrays; tell CPU ms a step."""
     trial = scenario.sample(np.random.default_rng([seed, draw]))
     started = time.process_time()
@@ -124,7 +126,7 @@ def found(scenario: TowPastLine, name: str, seed: int, draw: int) -> tuple[Run, 
     return run, 1e3 * (time.process_time() - started) / len(run)
 
 
-def strong(run: Run) -> Float:
+def strong_directions(run: Run) -> Float:
     """Return the directions within 10 dB of the strongest of their step, degrees, else NaN."""
     size = np.nan_to_num(np.abs(run.amplitude))
     floor = size.max(axis=1, keepdims=True, initial=0.0) * 10 ** (-WITHIN_DB / 20)

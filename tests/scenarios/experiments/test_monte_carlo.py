@@ -49,10 +49,10 @@ def serial() -> list[tuple[Any, ...]]:
 def test_every_method_sees_the_same_draws_and_run_r_is_its_own(
     serial: list[tuple[Any, ...]],
 ) -> None:
-    chance = np.random.SeedSequence(3).spawn(5)[4]
-    trial = SHORT["fig6"].sample(np.random.default_rng(chance))
+    seed_sequence = np.random.SeedSequence(3).spawn(5)[4]
+    trial = SHORT["fig6"].sample(np.random.default_rng(seed_sequence))
     for method in methods(TRACKERS):
-        run = method.make(trial, chance).run(trial.measurements)
+        run = method.make(trial, seed_sequence).run(trial.measurements)
         score = repr(KNOWN["gospa"](trial, run))
         assert ("fig6", 4, method.label, "gospa", score, "") in serial
 

@@ -13,7 +13,7 @@ import pytest
 
 from arrivals.__main__ import main
 from arrivals.scenarios import PairsInTurn, Study, monte_carlo
-from arrivals.scenarios.experiments.workers import spread
+from arrivals.scenarios.experiments.workers import parallel_map
 from arrivals.scenarios.reproduce import studies as reproduce
 from arrivals.scenarios.reproduce.studies import Report
 from arrivals.trackers import CBF, Run, register
@@ -104,9 +104,9 @@ def test_study_that_keeps_no_runs_says_so() -> None:
         parallel_config(n_jobs=2),
         pytest.raises(ChildProcessError, match=r"died \(SIGKILL.*keeps no runs") as told,
     ):
-        spread(deadly, [(n,) for n in range(8)])
+        parallel_map(deadly, [(n,) for n in range(8)])
     assert "\n" not in str(told.value)
-    assert spread(deadly, [(1,), (2,)]) == [1, 2]
+    assert parallel_map(deadly, [(1,), (2,)]) == [1, 2]
 
 
 def written(runs: int, seed: int) -> Report:

@@ -6,7 +6,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from arrivals.scenarios.ocean_acoustics.eigenrays import eigenrays, path_names
-from arrivals.scenarios.ocean_acoustics.rays import floor_reflection, ray_line, traced
+from arrivals.scenarios.ocean_acoustics.rays import floor_reflection, ray_line, trace_rays
 from arrivals.scenarios.ocean_acoustics.waveguide import BottomLayer, Waveguide
 from arrivals.scenarios.reproduce.swellex96.claims import beam
 from arrivals.scenarios.simulations.swellex96 import TowPastLine, environment
@@ -88,7 +88,7 @@ def test_travel_times_obey_the_eikonal_of_the_water() -> None:
 
 def test_a_ray_keeps_its_parameter_and_stays_between_its_turning_points() -> None:
     guide = environment()
-    fan = traced(guide, np.deg2rad([1.0, 2.0, 10.0]), 9.0, [150.0])
+    fan = trace_rays(guide, np.deg2rad([1.0, 2.0, 10.0]), 9.0, [150.0])
     speed = np.interp(fan.depth, guide.depths, guide.speeds)
     came = ~np.isnan(fan.range)
     assert (speed[:, None] * fan.slowness < 1)[came].all()

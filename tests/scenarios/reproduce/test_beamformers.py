@@ -12,9 +12,9 @@ from arrivals.recordings.sample_stream import band_samples, live_samples, track_
 from arrivals.scenarios import create, read
 from arrivals.scenarios.reproduce.interpolation.beamformers import scan
 from arrivals.scenarios.reproduce.interpolation.figures import SOURCES
-from arrivals.scenarios.reproduce.interpolation.trials import bound_deg, draws, rms, scanned
+from arrivals.scenarios.reproduce.interpolation.trials import bound_deg, draws, rms, scan_records
 from arrivals.scenarios.reproduce.studies import reproduce
-from arrivals.scenarios.simulations.sampled_source import heard
+from arrivals.scenarios.simulations.sampled_source import received_waveforms
 from arrivals.trackers import CBF, MVDR, InterpolationEKF
 
 MODEL = ArraySnapshot(SensorArray.ula(10, spacing=0.5), wavelength=1.0, noise=0.1)
@@ -22,15 +22,17 @@ MODEL = ArraySnapshot(SensorArray.ula(10, spacing=0.5), wavelength=1.0, noise=0.
 
 def test_fig_8_the_conventional_scan_attains_the_bound_for_a_tone() -> None:
     scenario = SOURCES["tone"]
-    error = scanned(scenario, draws(scenario, 40, 0), "conventional") - 60
+    error = scan_records(scenario, draws(scenario, 40, 0), "conventional") - 60
     assert rms(error) < 1.4 * bound_deg(scenario)
 
 
 def test_table_1_mvdrs_zero_variance_is_the_grids() -> None:
     scenario = SOURCES["tone"].replace(doa_deg=30.0)
     samples = draws(scenario, 20, 0)
-    np.testing.assert_allclose(scanned(scenario, samples, "mvdr", refine=False), 30.0, atol=1e-12)
-    assert 0.05 < scanned(scenario, samples, "mvdr").std() < 0.25
+    np.testing.assert_allclose(
+        scan_records(scenario, samples, "mvdr", refine=False), 30.0, atol=1e-12
+    )
+    assert 0.05 < scan_records(scenario, samples, "mvdr").std() < 0.25
 
 
 @pytest.mark.parametrize("method", ["conventional", "mvdr"])
@@ -105,7 +107,7 @@ def test_a_wav_is_tracked_sample_by_sample(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     frequencies, weights = rng.uniform(600, 1600, 300) / rate, rng.standard_normal((300, 2))
     earlier = rate / 340 * np.sin(np.deg2rad(-25)) * array.positions.T
-    waves = heard(frequencies, weights @ np.array([1, 1j]), earlier, 800)
+    waves = received_waveforms(frequencies, weights @ np.array([1, 1j]), earlier, 800)
     waves += 0.3 * waves.std() * rng.standard_normal(waves.shape)
     wavfile.write(tmp_path / "a.wav", rate, (1000 * waves / waves.std()).astype(np.int16))
     recording = read(tmp_path / "a.wav")

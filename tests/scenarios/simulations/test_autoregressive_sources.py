@@ -17,7 +17,7 @@ from arrivals.scenarios import (
     nmse,
 )
 from arrivals.scenarios.reproduce import ar_kalman as reproduce_ar
-from arrivals.scenarios.reproduce.ar_kalman import Experiment, cases, held, tracked
+from arrivals.scenarios.reproduce.ar_kalman import Experiment, cases, hold_last, run_tracker
 from arrivals.scenarios.reproduce.studies import reproduce
 
 NAMES = [*(f"ar_fig{n}" for n in (1, 3, 4, 5, 6, 7, 8, 9)), "ar_three_on_three", "ar_four_on_three"]
@@ -89,7 +89,7 @@ def test_section_7_more_sources_than_a_subspace_method_can_tell(
     scene: AutoregressiveField, offset: float, params: dict[str, float], most: float
 ) -> None:
     trials = [scene.sample(np.random.default_rng(n)) for n in range(6)]
-    runs = tracked(trials, Experiment(0, "", scene, params, offset, ""))
+    runs = run_tracker(trials, Experiment(0, "", scene, params, offset, ""))
     error = [r.doa[2999::30] - t.truth[2999::30] for t, r in zip(trials, runs, strict=True)]
     assert np.rad2deg(np.median(np.sqrt(np.mean(np.square(error), axis=(1, 2))))) < most
     sent = np.asarray(trials[0].signals)
@@ -99,7 +99,7 @@ def test_section_7_more_sources_than_a_subspace_method_can_tell(
 
 
 def test_directions_that_are_not_found_are_held() -> None:
-    found = held(np.array([[np.nan, 0.2], [0.3, np.nan], [np.nan, np.nan]]))
+    found = hold_last(np.array([[np.nan, 0.2], [0.3, np.nan], [np.nan, np.nan]]))
     np.testing.assert_array_equal(found, [[0.0, 0.2], [0.3, 0.2], [0.3, 0.2]])
 
 

@@ -18,7 +18,7 @@ from arrivals.scenarios.bounds.detection import (
     true_false_alarm,
 )
 from arrivals.scenarios.bounds.signal_strength import rss_bound
-from arrivals.scenarios.metrics.position_errors import Assignment, assigned, huber, scores
+from arrivals.scenarios.metrics.position_errors import Assignment, assign, huber, scores
 from arrivals.scenarios.reproduce.rss import table_1 as reproduce_rss
 from arrivals.scenarios.reproduce.rss.table_1 import NAMES as METHOD_NAMES
 from arrivals.scenarios.reproduce.rss.table_1 import table1
@@ -202,7 +202,7 @@ def test_nearest_flatters_merged_solutions() -> None:
     assert strict.lost == 0.5
     assert near.median == 15
     with pytest.raises(ValueError, match="one-to-one wants an estimate for each of 2; got 1"):
-        assigned([[0.0, 0.0]], truth[0], "one-to-one")
+        assign([[0.0, 0.0]], truth[0], "one-to-one")
 
 
 def test_estimates_that_ran_away_count_as_lost() -> None:

@@ -15,7 +15,7 @@ from arrivals.scenarios.demos.swellex96 import swellex96 as shipped
 from arrivals.scenarios.reproduce.studies import reproduce
 from arrivals.scenarios.reproduce.swellex96 import figures_11_12 as reproduce_swellex
 from arrivals.scenarios.reproduce.swellex96.claims import beam
-from arrivals.scenarios.reproduce.swellex96.figures_11_12 import strong
+from arrivals.scenarios.reproduce.swellex96.figures_11_12 import strong_directions
 from arrivals.scenarios.simulations.swellex96 import TowPastLine, environment, line, track
 from arrivals.trackers import Run
 from arrivals.typing import Complex, Float
@@ -156,7 +156,9 @@ def test_valse_and_svalse_tell_more_paths_apart_far_away_than_the_beamformer() -
     trial = scenario.sample(rng())
     score = {
         name: mean_gospa(
-            np.rad2deg(trial.truth), strong(trial.tracker(name).run(trial.measurements)), c=10.0
+            np.rad2deg(trial.truth),
+            strong_directions(trial.tracker(name).run(trial.measurements)),
+            c=10.0,
         ).total
         for name in ("cbf", "valse", "svalse")
     }
@@ -173,8 +175,8 @@ def test_the_study_writes_table_statements_and_pictures(
         trial = scenario.sample(np.random.default_rng([seed, draw]))
         return trial.tracker("cbf").run(trial.measurements), 1.0
 
-    monkeypatch.setattr(reproduce_swellex, "found", conventional)
-    monkeypatch.setattr(reproduce_swellex, "steps", lambda runs: np.arange(1, 351, 10))
+    monkeypatch.setattr(reproduce_swellex, "track_draw", conventional)
+    monkeypatch.setattr(reproduce_swellex, "step_numbers", lambda runs: np.arange(1, 351, 10))
     written = reproduce("swellex96", tmp_path, quick=True)
     assert [path.suffix for path in written] == [".csv", ".md", ".png", ".png", ".png"]
     with open(tmp_path / "swellex96.csv", encoding="utf-8") as file:

@@ -13,8 +13,8 @@ from arrivals.scenarios.reproduce.interpolation.figures import SOURCES
 from arrivals.scenarios.reproduce.interpolation.trials import (
     bound_deg,
     draws,
-    filtered,
-    found,
+    filter_directions,
+    final_directions,
     moving_errors,
     rms,
 )
@@ -84,10 +84,10 @@ def test_section_7_sources_are_found_from_60_degrees_away(variant: Any, least: f
     """The specification saw 0.55 (B) and 0.9 (C, D) in 40 runs; B with one update 0.06."""
     scenario = InterpolationTone()
     samples = draws(scenario, 60, 3)
-    found = filtered(scenario, samples, variant, 0.0)[:, -1]
-    assert np.mean(abs(found - 60) < 3) >= least
+    ends = filter_directions(scenario, samples, variant, 0.0)[:, -1]
+    assert np.mean(abs(ends - 60) < 3) >= least
     if variant == "B":
-        at_once = filtered(scenario, samples, variant, 0.0, each_sensor=False)[:, -1]
+        at_once = filter_directions(scenario, samples, variant, 0.0, each_sensor=False)[:, -1]
         assert np.mean(abs(at_once - 60) < 3) < 0.3
 
 
@@ -170,22 +170,26 @@ def test_scale_changes_nothing_where_the_power_is_learned() -> None:
 def test_table_9_1_at_60_degrees(name: str, variant: str, std: float) -> None:
     """40 trials: the standard deviation of a standard deviation is 11 %; the limit is three."""
     scenario = SOURCES[name]
-    ends = found(scenario, 40, 3, variant, 50.0)
+    ends = final_directions(scenario, 40, 3, variant, 50.0)
     assert abs(ends.mean() - 60) < 0.3 + 3 * std / np.sqrt(40) * (variant == "B")
     assert ends.std(ddof=1) == pytest.approx(std, rel=0.36)
 
 
 def test_fig_8_the_joint_filter_attains_the_bound() -> None:
     scenario = InterpolationTone(snr_db=10.0)
-    assert rms(found(scenario, 60, 0, "E", 55.0) - 60) < 1.35 * bound_deg(scenario)
+    assert rms(final_directions(scenario, 60, 0, "E", 55.0) - 60) < 1.35 * bound_deg(scenario)
 
 
 def test_section_5_noise_biases_unless_the_taps_know_it() -> None:
     """A tone at 0.2 from 60 degrees at 5 dB: 3.94 degrees with the paper's taps, 0 with ours."""
     scenario = InterpolationTone(frequency=0.2, n_steps=800)
     samples = draws(scenario, 20, 0)
-    assert filtered(scenario, samples, "B", 60.0)[:, -1].mean() - 60 == pytest.approx(3.94, abs=0.4)
-    assert filtered(scenario, samples, "Bw", 60.0)[:, -1].mean() == pytest.approx(60, abs=0.25)
+    assert filter_directions(scenario, samples, "B", 60.0)[:, -1].mean() - 60 == pytest.approx(
+        3.94, abs=0.4
+    )
+    assert filter_directions(scenario, samples, "Bw", 60.0)[:, -1].mean() == pytest.approx(
+        60, abs=0.25
+    )
 
 
 def test_table_9_4_a_ramp_is_followed() -> None:
