@@ -25,11 +25,11 @@ from arrivals.recordings.framing import looks
 from arrivals.recordings.recording import Recording
 from arrivals.scenarios import Trial, create, mean_gospa
 from arrivals.scenarios.demos.infrasound import brp2012, tracker
-from arrivals.trackers import CBF, SVALSE, VALSE, Tracker
+from arrivals.trackers import CBF, SVALSE, VALSE, NewtonSolver, Tracker
 from arrivals.trackers.run import Run
 from arrivals.typing import Bool, Complex, Float
 
-MERGED: dict[str, Any] = {"merge": np.deg2rad(1.5)}
+MERGED: dict[str, Any] = {"merge": np.deg2rad(1.5)}  # of VALSE, as in SVALSE
 
 
 @dataclass(frozen=True)
@@ -54,14 +54,14 @@ def circle(n: dict[str, Any], svalse: float, svalse_spread: float, valse: float,
     """Return the rows of the circle for one kind of data."""
     return [
         Row("circle", n, "svalse", svalse, svalse_spread),
-        Row("circle", n, "valse", valse, spread, MERGED),
+        Row("circle", n, "valse", valse, spread, {"solver": NewtonSolver(**MERGED)}),
         Row("circle", n, "cbf", beam),
     ]
 
 
 HOP = {"n_bins": 10, "hopping": True}
 TWO: dict[str, Any] = {"n_sources": 2}
-WHOLE = {"carry": "posterior"}
+WHOLE = {"memory": "posterior"}
 SIMULATED = [
     *circle({"snr_db": 20.0}, 6.7, 0.9, 12.6, 0.9, 18.5),
     *circle({"snr_db": 10.0}, 14.0, 1.7, 18.2, 0.4, 19.4),
@@ -137,7 +137,7 @@ def engines(rows: Sequence[Row], runs: int) -> None:
     for row in rows:
         if row.method == "cbf":
             continue
-        whole = "carry" in row.params  # by coordinate ascent in any case
+        whole = "memory" in row.params  # by coordinate ascent in any case
         pair = ("coordinate" if whole else "fast", "coordinate")
         both = []
         for seed in tqdm(range(runs), desc=row.scene, leave=False):
@@ -198,12 +198,20 @@ def yka2012(folder: Path) -> None:
     model = ArraySnapshot(array, [2000.0, 1000.0, 2000 / 3], n_snapshots=4,
                           slowness=np.linspace(0.03, 0.15, 10).tolist())  # fmt: skip
     motion = BernoulliVonMises(sigma_doa=np.deg2rad(3.0))
-    recorded: dict[str, Any] = {"temper": 4.0, "max_snr_db": 10.0}
+    recorded: dict[str, Any] = {"tempering": 4.0, "max_snr_db": 10.0}
     cases: list[tuple[str, Tracker, str]] = [
-        ("SVALSE", SVALSE(model, motion, snr_db=10.0, **recorded), "0.8, 1.8; 1.4; 0"),
-        ("VALSE", VALSE(model, **recorded, **MERGED), "1.0, 1.8; 1.8; 0"),
+        (
+            "SVALSE",
+            SVALSE(model, motion, solver=NewtonSolver(snr_db=10.0, **recorded)),
+            "0.8, 1.8; 1.4; 0",
+        ),
+        ("VALSE", VALSE(model, solver=NewtonSolver(**recorded, **MERGED)), "1.0, 1.8; 1.8; 0"),
         ("beam", CBF(model, max_sources=1), "1.2, 3.1; 3.0; -"),
-        ("SVALSE, T = 1", SVALSE(model, motion, snr_db=10.0, power_floor=0.0), "2.4; 4.2; 4.2"),
+        (
+            "SVALSE, T = 1",
+            SVALSE(model, motion, solver=NewtonSolver(snr_db=10.0, power_floor=0.0)),
+            "2.4; 4.2; 4.2",
+        ),
     ]
     for told, runner, wanted in cases:
         run = runner.run(steps)
@@ -305,12 +313,12 @@ def bluetooth(folder: Path) -> None:
 
 def _ble_tracker(name: str, model: ArraySnapshot, motion: BernoulliVonMises) -> Tracker:
     # an array known to 3 to 4 degrees: what is left 10 dB below the power is laid to the model
-    imperfect: dict[str, Any] = {"max_snr_db": 10.0, "temper": float(model.n_snapshots)}
+    imperfect: dict[str, Any] = {"max_snr_db": 10.0, "tempering": float(model.n_snapshots)}
     if name == "cbf":
         return CBF(model, threshold_db=3.0)
     if name == "valse":
-        return VALSE(model, **MERGED, **imperfect)
-    return SVALSE(model, motion, snr_db=10.0, **imperfect)
+        return VALSE(model, solver=NewtonSolver(**MERGED, **imperfect))
+    return SVALSE(model, motion, solver=NewtonSolver(snr_db=10.0, **imperfect))
 
 
 def mixtures(

@@ -13,6 +13,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 
 from arrivals.scenarios import create
+from arrivals.trackers import CoordinateSolver
 
 FORMS: list[tuple[str, dict[str, Any]]] = [
     ("svalse", {}),
@@ -22,13 +23,11 @@ FORMS: list[tuple[str, dict[str, Any]]] = [
     (
         "svalse",
         {
-            "engine": "coordinate",
+            "solver": CoordinateSolver(tolerance=1e-6, max_iterations=5000),
             "reference": "first",
-            "tolerance": 1e-6,
-            "max_iterations": 5000,
         },
     ),
-    ("svalse", {"engine": "coordinate", "posterior": "mixture"}),
+    ("svalse", {"solver": CoordinateSolver(posterior="mixture")}),
 ]
 
 

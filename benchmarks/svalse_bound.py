@@ -113,6 +113,13 @@ def bound(y: Complex, manifold: Manifold, known: ComponentPrior, fit: ComponentP
     return float(state.F[0] - len(y) * np.log(power))
 
 
+def prior_of(tracker: SVALSE, y: Complex) -> ComponentPrior:
+    """Return the prior of the tracker's next step."""
+    observed = tracker.observe(y)
+    assert observed is not None
+    return tracker.component_prior(observed)
+
+
 def gains(name: str, seeds: range) -> dict[str, list[float]]:
     """Return by how much the fast bound is higher, for both phase references of the other."""
     out: dict[str, list[float]] = {"first": [], "middle": []}
@@ -126,11 +133,10 @@ def gains(name: str, seeds: range) -> dict[str, list[float]]:
         for t, y in enumerate(trial.measurements):
             tracker.predict()
             if t % 3 == 2:
-                known, Y = tracker._prediction(), y[None, :, None]
-                assert known is not None
-                ours = bound(y, middle, known, NewtonSolver().fit(Y, middle, known))
+                known, Y = prior_of(tracker, y), y[None, :, None]
+                ours = bound(y, middle, known, NewtonSolver().solve(Y, middle, known))
                 for reference, manifold in (("first", first), ("middle", middle)):
-                    slow.fit(Y, manifold, known)
+                    slow.solve(Y, manifold, known)
                     out[reference].append(ours - slow.last[0].bound())
             tracker.update(y)
     return out

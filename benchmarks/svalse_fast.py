@@ -24,17 +24,15 @@ import numpy as np
 from arrivals.measurement_models import ArraySnapshot
 from arrivals.motion_models import BernoulliVonMises
 from arrivals.scenarios import Trial, create, mean_gospa
-from arrivals.trackers import SVALSE, VALSE, Run
+from arrivals.trackers import SVALSE, VALSE, CoordinateSolver, Run
 from arrivals.typing import Float
 
 FIGURES = ("svalse_fig4", "svalse_fig5", "svalse_fig6")
 ELECTRICAL = BernoulliVonMises()  # the paper's walk
 IN_DIRECTION = BernoulliVonMises(sigma_doa=np.deg2rad(1.5))
 PAPER: dict[str, Any] = {
-    "engine": "coordinate",
+    "solver": CoordinateSolver(tolerance=1e-5, max_iterations=1000),
     "reference": "first",
-    "tolerance": 1e-5,
-    "max_iterations": 1000,
 }
 
 

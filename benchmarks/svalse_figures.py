@@ -15,20 +15,17 @@ from tqdm import tqdm
 
 from arrivals.motion_models import BernoulliVonMises
 from arrivals.scenarios import Trial, create, mean_gospa, mean_rmse
+from arrivals.trackers import CoordinateSolver
 
 PAPER_FORM: dict[str, dict[str, Any]] = {
     "svalse": {
         "motion": BernoulliVonMises(),
-        "engine": "coordinate",
+        "solver": CoordinateSolver(tolerance=1e-6, max_iterations=5000),
         "reference": "first",
-        "tolerance": 1e-6,
-        "max_iterations": 5000,
     },
     "valse": {
-        "engine": "coordinate",
+        "solver": CoordinateSolver(tolerance=1e-6, max_iterations=2000),
         "reference": "first",
-        "tolerance": 1e-6,
-        "max_iterations": 2000,
     },
 }
 # (GOSPA in the paper, GOSPA and RMSE of the rebuilt form, limit for our 20-seed mean)

@@ -46,7 +46,7 @@ class Trial:
         --------
         >>> from arrivals.scenarios import create
         >>> trial = create("svalse_fig4", n_steps=2).sample(np.random.default_rng(0))
-        >>> trial.tracker("svalse", snr_db=10.0).motion.p_activate
+        >>> trial.tracker("svalse", reference="first").motion.p_activate
         0.1
         """
         kind = find(name) if isinstance(name, str) else name

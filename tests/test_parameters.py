@@ -17,6 +17,7 @@ from arrivals.parameters import Configurable, FrozenModel
 from arrivals.trackers import (
     CBF,
     SVALSE,
+    NewtonSolver,
     Tracker,
     create,
 )
@@ -40,8 +41,9 @@ VonMisesWalkOfSources = BernoulliVonMises(kappa=20.0)
 def test_setting_reaches_into_parts_and_leaves_the_old_ones_alone() -> None:
     tracker = SVALSE(SNAPSHOTS, VonMisesWalkOfSources)
     old = tracker.measurement
-    tracker.set_params(motion__kappa=30.0, measurement__array__speed=340.0, merge=0.0)
-    assert (tracker.motion.kappa, tracker.merge) == (30.0, 0.0)
+    tracker.set_params(motion__kappa=30.0, measurement__array__speed=340.0, solver__merge=0.0)
+    assert tracker.motion.kappa == 30.0
+    assert tracker.solver == NewtonSolver(merge=0.0)
     assert tracker.measurement.array.speed == 340.0
     assert old.array.speed is None
     assert VonMisesWalkOfSources.kappa == 20.0
@@ -67,13 +69,13 @@ def test_setting_reaches_into_a_tracker_inside_a_tracker() -> None:
         (
             {"kappa": 1.0},
             ValueError,
-            "SVALSE has no parameter 'kappa'; it has: carry, engine, kl, max_comp",
+            "SVALSE has no parameter 'kappa'; it has: engine, measurement, memory, motion",
         ),
         ({"motion__kapa": 1.0}, ValueError, "BernoulliVonMises has no parameter 'kapa'"),
-        ({"merge__x": 1.0}, ValueError, "merge of SVALSE has no parameters of its own"),
+        ({"memory__x": 1.0}, ValueError, "memory of SVALSE has no parameters of its own"),
         ({"motion__kappa": -1.0}, ValueError, "kappa must be finite and positive; got -1"),
         ({"motion": VonMisesWalk(1.0)}, TypeError, "motion must be a BernoulliVonMises; got Von"),
-        ({"tolerance": 1e-3, "posterior": "magic"}, ValueError, "posterior must be one of"),
+        ({"solver__tolerance": 1e-3, "memory": "magic"}, ValueError, "memory must be one of"),
     ],
 )
 def test_refused_parameters_change_nothing(
@@ -119,7 +121,7 @@ def test_constructor_must_name_its_parameters() -> None:
 
 
 def test_configuration_is_plain_and_complete() -> None:
-    tracker = SVALSE(SNAPSHOTS, VonMisesWalkOfSources, merge=0.0)
+    tracker = SVALSE(SNAPSHOTS, VonMisesWalkOfSources, solver=NewtonSolver(merge=0.0))
     config = tracker.to_dict()
     assert config["type"] == "svalse"
     assert (
@@ -181,7 +183,10 @@ def test_whole_numbers_set_as_parameters_can_be_cloned() -> None:
     from sklearn.base import clone
 
     model = ArraySnapshot(SensorArray.ula(5, 0.5), 1.0)
-    for name, params in (("svalse", {"snr_db": 10, "merge": 0}), ("cbf", {"threshold_db": 6})):
+    for name, params in (
+        ("svalse", {"solver__snr_db": 10, "solver__merge": 0}),
+        ("cbf", {"threshold_db": 6}),
+    ):
         tracker = create(name, measurement=model).set_params(**params)
         assert clone(tracker).get_params() == tracker.get_params()
-        assert isinstance(getattr(tracker, next(iter(params))), float)
+        assert isinstance(tracker.get_params()[next(iter(params))], float)

@@ -31,12 +31,15 @@ from arrivals.trackers.subspace.esprit import ESPRIT
 from arrivals.trackers.subspace.music import MUSIC
 from arrivals.trackers.subspace.past import PAST
 from arrivals.trackers.subspace.root_music import RootMUSIC
+from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver
+from arrivals.trackers.svalse.newton.solver import NewtonSolver
 from arrivals.trackers.svalse.svalse import SVALSE
 from arrivals.trackers.svalse.valse import VALSE
 
 __all__ = [
     "ARKalmanQRDRLS",
     "CBF",
+    "CoordinateSolver",
     "DirectionEstimate",
     "EKF",
     "ESPRIT",
@@ -48,6 +51,7 @@ __all__ = [
     "GaussianFilter",
     "MUSIC",
     "MVDR",
+    "NewtonSolver",
     "PAST",
     "Particle",
     "PeaksGNN",

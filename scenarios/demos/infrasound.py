@@ -14,7 +14,7 @@ from arrivals.motion_models import BernoulliVonMises
 from arrivals.recordings.framing import looks
 from arrivals.recordings.readers import read
 from arrivals.scenarios.demos.comparison import MethodComparison
-from arrivals.trackers import CBF, SVALSE, VALSE, Tracker
+from arrivals.trackers import CBF, SVALSE, VALSE, NewtonSolver, Tracker
 from arrivals.typing import Complex, Float
 
 FREQUENCIES = (0.6, 1.0, 1.4, 1.8, 2.2)  # Hz
@@ -66,10 +66,10 @@ def tracker(name: str, measurement: ArraySnapshot) -> Tracker:
     """
     if name == "cbf":
         return CBF(measurement, max_sources=1)
-    settings: dict[str, Any] = {"temper": 4.0, "power_floor": 3.0, "max_components": 2}
+    solver = NewtonSolver(tempering=4.0, power_floor=3.0, max_components=2, merge=np.deg2rad(1.5))
     if name == "valse":
-        return VALSE(measurement, merge=np.deg2rad(1.5), **settings)
-    return SVALSE(measurement, BernoulliVonMises(sigma_doa=np.deg2rad(3.0)), **settings)
+        return VALSE(measurement, solver=solver)
+    return SVALSE(measurement, BernoulliVonMises(sigma_doa=np.deg2rad(3.0)), solver=solver)
 
 
 def infrasound(

@@ -33,7 +33,7 @@ OUT = ("--out", "tracks.csv", "--plot", "tracks.png")
         (("--set", "motion__kapa=3"), ("no parameter 'kapa'",)),
         (("--set", "motion=3"), ("motion must be a BernoulliVonMises; got 3",)),
         (("--set", "merge"), ("NAME=VALUE",)),
-        (("--set", "tolerance=small"), ("tolerance must be a number; got 'small'",)),
+        (("--set", "solver__tolerance=small"), ("tolerance must be a number; got 'small'",)),
         (("--window", "1"), ("window must be at least 2",)),
         (("--window", "100000"), ("one window takes 100000",)),
         (("--hop", "0"), ("hop must be at least 1",)),

@@ -133,7 +133,7 @@ def test_directions_that_look_alike_are_told_once(
     told = capsys.readouterr().err
     assert told.count("\n") == 1
     assert told.startswith("arrivals: warning: directions ")
-    assert "look alike to this array at every frequency" in told
+    assert "are ambiguous: they have the same response at every frequency" in told
 
 
 def test_the_infrasound_demo_finds_silence_and_both_sources(

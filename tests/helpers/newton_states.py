@@ -1,8 +1,10 @@
 """States of the Newton solver near a solution."""
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from arrivals.measurement_models import ArraySnapshot, SensorArray
+from arrivals.trackers.svalse.components import ComponentPrior
 from arrivals.trackers.svalse.newton.elbo import (
     KL_CONSTANT,
     MU,
@@ -15,9 +17,17 @@ from arrivals.trackers.svalse.newton.elbo import (
     evaluate,
 )
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
+from arrivals.trackers.svalse.svalse import SVALSE
 from arrivals.typing import Complex, Float
 
 MODEL = ArraySnapshot(SensorArray.ula(15, spacing=0.5), wavelength=1.0)
+
+
+def prior_of(tracker: SVALSE, z: ArrayLike) -> ComponentPrior:
+    """Return the prior of the tracker's next step."""
+    observed = tracker.observe(z)
+    assert observed is not None
+    return tracker.component_prior(observed)
 
 
 def unit(y: Complex) -> Complex:

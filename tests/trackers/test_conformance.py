@@ -21,7 +21,9 @@ from arrivals.trackers import (
     SSBL,
     SVALSE,
     VALSE,
+    CoordinateSolver,
     DirectionEstimate,
+    NewtonSolver,
     PeaksGNN,
     Run,
     Tracker,
@@ -58,7 +60,7 @@ GRIDLESS: list[tuple[str, MakeTracker, Measurements]] = [
     ("cbf", lambda: CBF(LINE, n_directions=91), two_sources(LINE)),
     ("cbf", lambda: CBF(CIRCLE, n_directions=90, max_sources=2), two_sources(CIRCLE)),
     ("valse", lambda: VALSE(LINE), two_sources(LINE)),
-    ("valse", lambda: VALSE(GAPS, max_components=3), two_sources(GAPS)),
+    ("valse", lambda: VALSE(GAPS, solver=NewtonSolver(max_components=3)), two_sources(GAPS)),
     ("sbl", lambda: SBL(LINE, n_directions=91), two_sources(LINE)),
     ("sbl", lambda: SBL(CIRCLE, n_directions=90, max_sources=2), two_sources(CIRCLE)),
     ("ssbl", lambda: SSBL(GAPS, n_directions=91), two_sources(GAPS)),
@@ -73,16 +75,22 @@ GRIDLESS: list[tuple[str, MakeTracker, Measurements]] = [
     (
         "svalse",
         lambda: SVALSE(
-            LINE, engine="coordinate", reference="first", posterior="mixture", tolerance=1e-6
+            LINE,
+            solver=CoordinateSolver(posterior="mixture", tolerance=1e-6),
+            reference="first",
         ),
         two_sources(LINE, n_steps=3),
     ),
     ("cbf", lambda: CBF(SLOWNESS, n_directions=90), two_sources(SLOWNESS)),
-    ("valse", lambda: VALSE(LOOKS, temper=2.0, max_snr_db=25.0), two_sources(LOOKS)),
+    (
+        "valse",
+        lambda: VALSE(LOOKS, solver=NewtonSolver(tempering=2.0, max_snr_db=25.0)),
+        two_sources(LOOKS),
+    ),
     ("svalse", lambda: SVALSE(CIRCLE), two_sources(CIRCLE)),
     (
         "svalse",
-        lambda: SVALSE(SLOWNESS, BernoulliVonMises(sigma_doa=0.05), carry="posterior"),
+        lambda: SVALSE(SLOWNESS, BernoulliVonMises(sigma_doa=0.05), memory="posterior"),
         two_sources(SLOWNESS),
     ),
 ]

@@ -1,13 +1,20 @@
-"""What goes into an engine of VALSE and SVALSE, and what comes out."""
+"""Prior and posterior of the components of VALSE and SVALSE, and their solvers' interface."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
 
 from arrivals.measurement_models.manifolds.manifold import Manifold
+from arrivals.parameters import FrozenModel
 from arrivals.typing import Bool, Complex, Float, Int
+from arrivals.validation import count, not_negative, positive
+
+Settings = TypeVar("Settings", bound="SolverSettings")
+MERGE_DISTANCE = float(np.deg2rad(1.5))  # rad of direction, of tracked components
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,8 +37,10 @@ class ComponentPrior:
         Noise variances of the last step, NaN where a bin was silent.
     nuisance : ndarray, shape (n_carried, n_nuisance), optional
         Densities of the second unknown.
-    moments : ndarray, shape (n_carried, n_moments), optional
+    moments : ndarray, shape (n_tracked, n_moments), optional
         Whole densities of the angles, ⟨exp(jiθ)⟩, i = 0, 1, ..., in place of `mu` and `kappa`.
+    n_moments : int
+        Number of moments wanted of the posterior densities; 0 for von Mises densities only.
     """
 
     mu: Float
@@ -43,6 +52,7 @@ class ComponentPrior:
     noise: Float | None = None
     nuisance: Float | None = None
     moments: Complex | None = None
+    n_moments: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,17 +103,77 @@ class ComponentPosterior:
 
 
 class Solver(Protocol):
-    """Maximises the ELBO of one step."""
+    """Maximization of the ELBO of one step: `NewtonSolver`, `CoordinateSolver` or a user's own."""
 
-    def fit(
-        self, Y: Complex, manifold: Manifold, prediction: ComponentPrior | None
+    @property
+    def max_components(self) -> int | None:
+        """Largest number of components; None for the number of sensors."""
+
+    def check(self, manifold: Manifold, n_snapshots: int, n_moments: int) -> None:
+        """Raise ValueError if the solver does not support such measurements."""
+
+    def solve(
+        self, snapshots: Complex, manifold: Manifold, prior: ComponentPrior | None
     ) -> ComponentPosterior:
-        """Fit data (n_bins, n_sensors, n_snapshots), with what is known of the components."""
+        """Return the components in snapshots (n_bins, n_sensors, n_snapshots) of one step."""
 
-    def fit_batch(
+    def solve_batch(
         self,
-        Ys: Sequence[Complex],
+        snapshots: Sequence[Complex],
         manifold: Manifold,
-        predictions: Sequence[ComponentPrior | None],
+        priors: Sequence[ComponentPrior | None],
     ) -> list[ComponentPosterior]:
-        """Fit independent snapshots of one array."""
+        """Return the components of independent steps of the same sensors, bins and shape."""
+
+
+@dataclass(frozen=True)
+class SolverSettings(FrozenModel):
+    """Settings that all solvers share; see `NewtonSolver` for their meaning."""
+
+    tolerance: float = 1e-4
+    max_iterations: int = 500
+    max_components: int | None = None
+    merge: float | None = None
+    snr_db: float | None = None
+    tempering: float = 1.0
+    power_floor: float | None = None
+    max_snr_db: float | None = None
+
+    def __post_init__(self) -> None:
+        self._set("tolerance", positive)
+        self._set("max_iterations", count)
+        self._set("max_components", count)
+        self._set("merge", not_negative)
+        self._set("snr_db", positive)
+        self._set("tempering", positive)
+        self._set("power_floor", not_negative)
+        self._set("max_snr_db", positive)
+        if self.tempering < 1:
+            raise ValueError(f"tempering must be at least 1; got {self.tempering:g}")
+
+    def _set(self, name: str, checked: Callable[[str, Any], Any]) -> None:
+        if getattr(self, name) is not None:
+            object.__setattr__(self, name, checked(name, getattr(self, name)))
+
+    def check(self, manifold: Manifold, n_snapshots: int, n_moments: int) -> None:
+        """Raise ValueError if the solver does not support such measurements."""
+
+    def converted(self, kind: type[Settings]) -> Settings:
+        """Return a solver of that kind with the settings that all solvers share."""
+        if isinstance(self, kind):
+            return self
+        return kind(**{each.name: getattr(self, each.name) for each in fields(SolverSettings)})
+
+    def n_components(self, n_sensors: int) -> int:
+        """Return the largest number of components for an array of n_sensors."""
+        return min(n_sensors, self.max_components or n_sensors)
+
+    def merge_distance(self, prior: ComponentPrior | None) -> float:
+        """Return the distance, rad, below which components are merged; 0 for never."""
+        if self.merge is None:
+            return 0.0 if prior is None else MERGE_DISTANCE
+        return self.merge
+
+    def initial_snr_db(self, prior: ComponentPrior | None) -> float | None:
+        """Return the signal-to-noise ratio of the initial noise; None to estimate it."""
+        return 20.0 if self.snr_db is None and prior is not None else self.snr_db

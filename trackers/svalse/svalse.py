@@ -1,4 +1,4 @@
-"""Directions tracked from snapshot to snapshot, gridless, their number unknown and changing."""
+"""Directions tracked from step to step, gridless, of an unknown and changing number of sources."""
 
 from __future__ import annotations
 
@@ -9,84 +9,85 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
-from arrivals.measurement_models.manifolds.manifold import Manifold, Reference
-from arrivals.measurement_models.observed import ObservedSnapshots, updated
+from arrivals.measurement_models.manifolds.manifold import Reference
+from arrivals.measurement_models.observed import updated
 from arrivals.motion_models.bernoulli_von_mises import BernoulliVonMises
 from arrivals.motion_models.bessel import bessel_ratio, bessel_ratios
 from arrivals.trackers.direction_tracker import padded
-from arrivals.trackers.estimates import DirectionEstimate
 from arrivals.trackers.registry import register
 from arrivals.trackers.svalse.components import ComponentPosterior, ComponentPrior, Solver
-from arrivals.trackers.svalse.coordinate.solver import PosteriorName
-from arrivals.trackers.svalse.valse import VALSE, EngineName, circular_std, described, reported
+from arrivals.trackers.svalse.valse import (
+    DEFAULT_SOLVER,
+    VALSE,
+    Engine,
+    Observation,
+    circular_std,
+    detected,
+)
 from arrivals.typing import Bool, Complex, Float, Int
-from arrivals.validation import instance, one_of, positive
+from arrivals.validation import instance, one_of
 
 DEFAULT_MOTION = BernoulliVonMises(sigma_doa=np.deg2rad(1.5))
-Carry = Literal["von_mises", "posterior"]
+Memory = Literal["von_mises", "posterior"]
 
 
 @register("svalse")
 class SVALSE(VALSE):
-    """Sequential VALSE: what was found in one step is the prior of the next.
+    """Sequential VALSE: the components of one step are the prior of the next.
 
-    The components in use at the end of a step are carried to the next one, and so, for some
-    steps, are those that were in use before. Each keeps its von Mises density, widened by the
+    The components active at the end of a step are tracked to the next one, and so, for some
+    steps, are those that were active before. Each keeps its von Mises density, widened by the
     motion model, and its label.
 
     Parameters
     ----------
     measurement : ArraySnapshot
-        Any array, of as many frequencies and snapshots a step as it says. Its noise is not used:
-        the method estimates it.
+        Any array, with any number of frequencies and snapshots a step. Its noise is not used: the
+        method estimates it.
     motion : BernoulliVonMises
         Steps, births and deaths. The default has the paper's probabilities, and a step of 1.5°
         in direction; the paper's, `BernoulliVonMises()`, is one in the electrical angle,
         2π d/λ sin β, which lets sources near endfire jump by many degrees.
-    engine, reference, posterior, tolerance, max_iterations, max_components, kl
-        As in `VALSE`. The paper's choices are "coordinate", "first", "mixture" and 1e-6.
-    temper, power_floor, max_snr_db
-        As in `VALSE`, for recorded data: see docs/any_array.md.
-    merge : float
-        Of two active components nearer than this, rad of direction, the later is switched off;
-        0 for never. (Only in the paper's program, not in its text.)
-    snr_db : float, optional
-        Signal-to-noise ratio from which the noise estimate of the first step starts, and, with
-        coordinate ascent, of every step; above 0, so that something is left to the sources. If
-        None, 20, or with at least as many snapshots a step as sensors that of their covariance;
-        with coordinate ascent and several looks later steps start from the noise before. The
-        fast engine's later steps start from what was found before in any case.
-    carry : {"von_mises", "posterior"}
-        What is kept of an angle from step to step: one von Mises density, or the whole one, which
-        remembers all directions that single steps cannot tell apart.
+    solver : NewtonSolver or CoordinateSolver
+        Maximization of the bound, with its settings; see `VALSE`. The paper's choices are
+        `CoordinateSolver.paper()` and `reference="first"`.
+    engine : {"newton", "fast", "coordinate"}, optional
+        Shorthand for a solver of that kind ("fast" is "newton") with those settings of `solver`
+        that both kinds have; the attribute is None afterwards.
+    reference : {"middle", "first"}
+        Sensor at which the amplitudes' phases are counted; "first" is the paper's.
+    memory : {"von_mises", "posterior"}
+        What is kept of an angle from step to step: one von Mises density, or the whole density,
+        with all directions that single steps leave ambiguous. The whole density needs coordinate
+        ascent: `NewtonSolver` passes it on to a `CoordinateSolver`.
 
     Attributes
     ----------
     mu, kappa, existence, label : ndarray, shape (L,)
-        The carried components: mean angle, concentration, probability of being active, and
-        label; NaN, 0, 0 and -1 in unused places. These are the belief, and may be assigned.
+        Tracked components: mean angle, concentration, probability of being active, and label;
+        NaN, 0, 0 and -1 in unused slots. These are the belief, and may be assigned.
     age : ndarray of int, shape (L,)
-        Steps since each was last in use; 0 for those that are.
+        Steps since each was last active; 0 for those that are.
     expected_snr_db : float or None
-        Smoothed signal-to-noise ratio, where the noise estimate of the next step starts.
+        Smoothed signal-to-noise ratio, from which the noise of the next step starts.
     moments : ndarray, shape (L, n_moments)
-        ⟨exp(jiθ)⟩ of the carried components, where the whole posterior is; else none.
+        ⟨exp(jiθ)⟩ of the tracked components, where the memory is the posterior; else none.
     nuisance : ndarray, shape (L, n_nuisance)
         Their densities over the values of an unknown slowness or elevation.
     bin_noise : ndarray, shape (n_bins,)
-        Noise of each bin when it was last heard; NaN before, and with coordinate ascent on one
-        look of a line.
+        Noise of each bin when it last had valid data; NaN before, and with coordinate ascent on
+        one snapshot of a line.
     x, P, noise
         As in `VALSE`.
 
     Notes
     -----
-    See `VALSE` for what `existence` and `std` of an estimate mean and do not mean. A label is
-    given when a component is first reported and stays while the component is carried; two
-    sources nearer than `merge` become one, and sources that cross may exchange their labels.
-    Between measurements, and after a missed one, the components whose predicted existence is
-    at least one half are reported; a snapshot that no more sensors heard than there are such
-    components counts as missed.
+    See `VALSE` for the limits of `existence` and `std` of an estimate. A label is
+    assigned when a component is first reported and stays while the component is tracked; two
+    sources nearer than the solver's `merge` become one, and sources that cross may exchange their
+    labels. Between measurements, and after a missing one, the components whose predicted existence
+    is at least one half are reported; a snapshot with valid data of no more sensors than there are
+    such components counts as missing.
 
     References
     ----------
@@ -116,127 +117,104 @@ class SVALSE(VALSE):
         measurement: ArraySnapshot,
         motion: BernoulliVonMises = DEFAULT_MOTION,
         *,
-        engine: EngineName = "fast",
+        solver: Solver = DEFAULT_SOLVER,
+        engine: Engine | None = None,
         reference: Reference = "middle",
-        posterior: PosteriorName = "quadrature",
-        tolerance: float | None = None,
-        max_iterations: int = 500,
-        max_components: int | None = None,
-        kl: float = 0.5,
-        temper: float = 1.0,
-        power_floor: float | None = None,
-        max_snr_db: float | None = None,
-        merge: float = np.deg2rad(1.5),
-        snr_db: float | None = None,
-        carry: Carry = "von_mises",
+        memory: Memory = "von_mises",
     ) -> None:
-        super().__init__(
-            measurement,
-            engine=engine,
-            reference=reference,
-            posterior=posterior,
-            tolerance=tolerance,
-            max_iterations=max_iterations,
-            max_components=max_components,
-            kl=kl,
-            temper=temper,
-            power_floor=power_floor,
-            max_snr_db=max_snr_db,
-            merge=merge,
-        )
         self.motion = instance("motion", motion, BernoulliVonMises)
-        self.snr_db = snr_db if snr_db is None else positive("snr_db", snr_db)
-        self.carry = one_of("carry", carry, ("von_mises", "posterior"))
-        if carry == "posterior" and posterior == "mixture":
-            raise ValueError('carry "posterior" wants the posterior "quadrature"')
-        self.n_labels = 0
-        self.birth = motion.p_activate
-        self.expected_snr_db: float | None = None
-        none = np.zeros(0)
-        self._carry(none, none, none, none.astype(np.int64), none.astype(np.int64))
-        self._carry_densities(None, none.astype(np.int64))
+        self.memory = one_of("memory", memory, ("von_mises", "posterior"))
+        super().__init__(measurement, solver=solver, engine=engine, reference=reference)
 
-    @property
-    def solver(self) -> Solver:
-        """What maximises the ELBO, with this tracker's settings."""
-        single = self.measurement.is_single
-        snr_db = 20.0 if self.snr_db is None and single else self.snr_db
-        return self._solver(snr_db, descending=False, n_moments=self.n_moments)
+    def reset(self) -> None:
+        """Forget all components, labels and noise estimates."""
+        self.n_labels, self.birth = 0, self.motion.p_activate
+        self.expected_snr_db: float | None = None
+        self.bin_noise = np.full(len(self.bin_noise), np.nan)
+        none = np.zeros(0)
+        self._keep(none, none, none, none.astype(np.int64), none.astype(np.int64))
+        self._keep_densities(None, none.astype(np.int64))
+        super().reset()
 
     @property
     def n_moments(self) -> int:
-        """Moments that a density has after a step of the motion model; 0 if none are carried."""
-        if self.carry == "von_mises":
+        """Number of moments that a density has after a step of the motion model; 0 if not kept."""
+        if self.memory == "von_mises":
             return 0
         manifold = self.measurement.manifold(self.reference)
         slowest = manifold.slope(manifold.from_doa(np.pi / 2))
         return int(7 * np.sqrt(float(self.motion.blur(np.inf, 1.0, slowest)))) + 8
 
+    @property
+    def tracked(self) -> Bool:
+        """Slots that hold a tracked component, (L,)."""
+        return ~np.isnan(self.mu)
+
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
-        """Widen the angles' densities, and let sources be born and die, (62)-(65).
+        """Predict the angles' densities, births and deaths, (62)-(65)."""
+        self.predict_batch([self], dt)
+        self.report_prior()
 
-        The width is that of the exact convolution, A(κ') = A(κ) A(κ_r), whose limit for large
-        κ (63) is.
-        """
-        super().predict(u, dt=dt)
+    def update(self, z: ArrayLike | None) -> None:
+        """Fit one measurement: sections III and IV."""
+        observed = self.observe(z)
+        if observed is None:
+            return
+        prior = self.component_prior(observed)  # (65)
+        posterior = self.solver.solve(observed.snapshots, observed.manifold, prior)  # (30)-(59)
+        self.store(posterior, observed)  # labels, components, noise per bin
 
-    def _move(self, trackers: Sequence[Self], dt: float) -> None:
+    def predict_batch(self, trackers: Sequence[Self], dt: float) -> None:
+        """Predict the beliefs of copies of this tracker by `dt`."""
+        super().predict_batch(trackers, dt)
         mu, kappa, existence = (
             np.stack([getattr(tracker, name) for tracker in trackers])
             for name in ("mu", "kappa", "existence")
         )
-        carried = ~np.isnan(mu)
-        slope = self.measurement.manifold(self.reference).slope(np.where(carried, mu, 0.0))
+        tracked = ~np.isnan(mu)
+        slope = self.measurement.manifold(self.reference).slope(np.where(tracked, mu, 0.0))
+        # μ' = μ   (62);  A(κ') = A(κ) A(κ_r), of which (63) is the limit for large κ
         kappa = self.motion.blur(kappa, dt, slope)
-        rho = np.where(carried, self.motion.predict_existence(existence, dt), 0.0)
+        # ρ' = (1 - p_d) ρ + p_a (1 - ρ)   (64)
+        rho = np.where(tracked, self.motion.predict_existence(existence, dt), 0.0)
+        # ρ' = p_a of a component that was not tracked   (65)
         birth = float(self.motion.predict_existence(0.0, dt))
         for i, tracker in enumerate(trackers):
             tracker.kappa, tracker.existence, tracker.birth = kappa[i], rho[i], birth
-            tracker._move_densities(slope[i], dt)
+            tracker._predict_densities(slope[i], dt)
 
-    def _move_densities(self, slope: Float, dt: float) -> None:
-        """Blur whole densities by the exact convolution, and let the second unknown drift."""
+    def _predict_densities(self, slope: Float, dt: float) -> None:
+        """Predict whole densities by the exact convolution, and those of the second unknown."""
         if self.moments.size:
             step = np.broadcast_to(self.motion.blur(np.inf, dt, slope), slope.shape)
             self.moments = self.moments * bessel_ratios(self.moments.shape[1] - 1, step)
         if self.nuisance.shape[1] > 1:
             self.nuisance = drifted(self.nuisance)
 
-    def _expect(self) -> None:
-        self.report(**vars(self._expected(self.measurement.manifold(self.reference))))
-
-    def _absorb(
-        self, manifold: Manifold, fit: ComponentPosterior, heard: ObservedSnapshots
-    ) -> None:
-        """Take in a fit: report and label what is active, carry what is to be remembered."""
-        label = np.full(len(fit.theta), -1)
-        label[: self.carried.sum()] = self.label[self.carried][: len(label)]
-        found = reported(manifold, fit)
-        fresh = found & (label < 0)
-        label[fresh] = self.n_labels + np.arange(fresh.sum())
-        self.n_labels += int(fresh.sum())
-        self.report(**vars(described(manifold, fit, found, label[found])))
-        order = np.concatenate([np.flatnonzero(fit.age == 0), np.flatnonzero(fit.age > 0)])
-        self._carry(
-            fit.theta[order], fit.kappa[order], fit.active[order], label[order], fit.age[order]
+    def report_prior(self) -> None:
+        """Report the components that are expected before a measurement."""
+        manifold = self.measurement.manifold(self.reference)
+        likely = np.flatnonzero(self.tracked & (self.existence >= 0.5) & (self.label >= 0))
+        std = circular_std(bessel_ratio(self.kappa[likely]))
+        real = ~np.isnan(manifold.to_doa(self.mu[likely], 3 * std))
+        likely, std = likely[real], std[real]
+        theta = self.mu[likely]
+        self.report(
+            manifold.to_doa(theta, slack=np.inf),
+            manifold.doa_std(theta, std),
+            existence=self.existence[likely],
+            label=self.label[likely],
         )
-        self._carry_densities(fit, order)
-        self.expected_snr_db = fit.snr_db
-        self.bin_noise = updated(self.bin_noise, heard.bins, fit.bin_noise)
 
-    def _looks(self, z: ArrayLike | None) -> tuple[Complex, ObservedSnapshots] | None:
-        """Return the data, or None also if fewer sensors gave a number than the tracks need."""
-        looks = super()._looks(z)
-        expected = (self.carried & (self.age == 0) & (self.existence >= 0.5)).sum()
-        return None if looks is None or looks[1].sensors.sum() <= expected else looks
+    def observe(self, z: ArrayLike | None) -> Observation | None:
+        """Return the valid data; None also if there are too few sensors for the components."""
+        observed = super().observe(z)
+        expected = np.count_nonzero(self.tracked & (self.age == 0) & (self.existence >= 0.5))
+        return None if observed is None or observed.manifold.n_sensors <= expected else observed
 
-    @property
-    def carried(self) -> Bool:
-        """Which places hold a carried component, (L,)."""
-        return ~np.isnan(self.mu)
-
-    def _prediction(self, heard: ObservedSnapshots | None = None) -> ComponentPrior:
-        on = self.carried
+    def component_prior(self, observed: Observation) -> ComponentPrior:
+        """Return the predicted densities and probabilities of the tracked components, (65)."""
+        on = self.tracked
         return ComponentPrior(
             self.mu[on],
             self.kappa[on],
@@ -244,14 +222,36 @@ class SVALSE(VALSE):
             self.birth,
             self.age[on],
             self.expected_snr_db,
-            noise=None if heard is None or self.snr_db else self.bin_noise[heard.bins],
+            noise=self.bin_noise[observed.bins],
             nuisance=self.nuisance[on],
             moments=self.moments[on] if self.moments.size else None,
+            n_moments=self.moments.shape[1],
         )
 
-    def _carry(
-        self, mu: Float, kappa: Float, existence: Float | Bool, label: Int, age: Int
-    ) -> None:
+    def store(self, posterior: ComponentPosterior, observed: Observation) -> None:
+        """Report and label the active components, and track them and recent ones."""
+        label = np.full(len(posterior.theta), -1)
+        label[: self.tracked.sum()] = self.label[self.tracked][: len(label)]
+        active = detected(observed.manifold, posterior)
+        unlabelled = active & (label < 0)
+        n_new = int(np.count_nonzero(unlabelled))
+        label[unlabelled] = self.n_labels + np.arange(n_new)
+        self.n_labels += n_new
+        self.report_posterior(posterior, observed.manifold, active, label[active])
+        age = posterior.age
+        order = np.concatenate([np.flatnonzero(age == 0), np.flatnonzero(age > 0)])
+        self._keep(
+            posterior.theta[order],
+            posterior.kappa[order],
+            posterior.active[order],
+            label[order],
+            age[order],
+        )
+        self._keep_densities(posterior, order)
+        self.expected_snr_db = posterior.snr_db
+        self.bin_noise = updated(self.bin_noise, observed.bins, posterior.bin_noise)
+
+    def _keep(self, mu: Float, kappa: Float, existence: Float | Bool, label: Int, age: Int) -> None:
         n = self.n_slots
         self.mu = padded(mu, n, np.nan)
         self.kappa = padded(kappa, n, 0.0)
@@ -259,30 +259,16 @@ class SVALSE(VALSE):
         self.label = padded(label, n, -1).astype(np.int64)
         self.age = padded(age, n, 0).astype(np.int64)
 
-    def _carry_densities(self, fit: ComponentPosterior | None, order: Int) -> None:
-        """Keep the whole densities of the carried components, and those of the second unknown."""
+    def _keep_densities(self, posterior: ComponentPosterior | None, order: Int) -> None:
+        """Keep the whole densities of the tracked components, and those of the second unknown."""
         weights = self.measurement.manifold(self.reference).nuisance_weights
         self.nuisance = np.tile(weights, (self.n_slots, 1))
         self.moments = np.zeros((self.n_slots, self.n_moments), dtype=np.complex128)
         order = order[: self.n_slots]
-        if fit is not None and fit.nuisance is not None and fit.moments is not None:
-            self.nuisance[: len(order)] = fit.nuisance[order]
-            self.moments[: len(order)] = fit.moments[order]
-
-    def _expected(self, manifold: Manifold) -> DirectionEstimate:
-        """Return what is likely to be there, before it is measured."""
-        likely = np.flatnonzero(self.carried & (self.existence >= 0.5) & (self.label >= 0))
-        std = circular_std(bessel_ratio(self.kappa[likely]))
-        real = ~np.isnan(manifold.to_doa(self.mu[likely], 3 * std))
-        likely, std = likely[real], std[real]
-        theta = self.mu[likely]
-        return DirectionEstimate(
-            doa=manifold.to_doa(theta, slack=np.inf),
-            std=manifold.doa_std(theta, std),
-            existence=self.existence[likely],
-            amplitude=np.full(len(theta), complex(np.nan, np.nan)),
-            label=self.label[likely],
-        )
+        if posterior is None or posterior.nuisance is None or posterior.moments is None:
+            return
+        self.nuisance[: len(order)] = posterior.nuisance[order]
+        self.moments[: len(order)] = posterior.moments[order]
 
 
 def drifted(nuisance: Float) -> Float:
@@ -297,5 +283,5 @@ def drifted(nuisance: Float) -> Float:
     """
     left, right = nuisance[..., :1], nuisance[..., -1:]
     wide = np.concatenate([left, nuisance, right], axis=-1)
-    moved = 0.9 * nuisance + 0.05 * (wide[..., :-2] + wide[..., 2:])
-    return np.asarray((1 - 1e-4) * moved + 1e-4 / nuisance.shape[-1])
+    shifted = 0.9 * nuisance + 0.05 * (wide[..., :-2] + wide[..., 2:])
+    return np.asarray((1 - 1e-4) * shifted + 1e-4 / nuisance.shape[-1])

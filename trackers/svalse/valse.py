@@ -1,8 +1,10 @@
-"""Directions from one snapshot at a time, gridless, their number unknown."""
+"""Directions of one step at a time, gridless, of an unknown number of sources."""
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -10,74 +12,80 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.manifolds.manifold import Manifold, Reference
-from arrivals.measurement_models.observed import ObservedSnapshots, check_directions, updated
+from arrivals.measurement_models.observed import ObservedSnapshots, updated
 from arrivals.trackers.base import is_missing
 from arrivals.trackers.direction_tracker import BatchDirectionTracker
-from arrivals.trackers.estimates import DirectionEstimate
 from arrivals.trackers.registry import register
-from arrivals.trackers.svalse.components import ComponentPosterior, ComponentPrior, Solver
-from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver, PosteriorName
+from arrivals.trackers.svalse.components import (
+    ComponentPosterior,
+    ComponentPrior,
+    Solver,
+    SolverSettings,
+)
+from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver
 from arrivals.trackers.svalse.newton.solver import NewtonSolver
 from arrivals.typing import Bool, Complex, Float, Int
-from arrivals.validation import count, instance, not_negative, one_of, positive, probability
+from arrivals.validation import instance, not_negative, one_of
 
-EngineName = Literal["fast", "coordinate"]
+Engine = Literal["newton", "fast", "coordinate"]
+DEFAULT_SOLVER = NewtonSolver()
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """Valid data of one step: snapshots without gaps, and the manifold of their sensors and bins.
+
+    Attributes
+    ----------
+    snapshots : ndarray, shape (n_bins, n_sensors, n_snapshots)
+    manifold : Manifold
+    bins : ndarray of bool, shape (n_bins of the measurement,)
+    key : bytes
+        Equal for steps whose valid bins, sensors and snapshots are the same.
+    """
+
+    snapshots: Complex
+    manifold: Manifold
+    bins: Bool
+    key: bytes
 
 
 @register("valse")
 class VALSE(BatchDirectionTracker):
-    """Variational Bayesian line spectral estimation: every snapshot on its own.
+    """Variational Bayesian line spectral estimation: every step on its own.
 
     Parameters
     ----------
     measurement : ArraySnapshot
-        Any array, of as many frequencies and snapshots a step as it says. Its noise is not used:
-        the method estimates it.
-    engine : {"fast", "coordinate"}
-        What maximises the bound: joint Newton steps on all angles, or the paper's coordinate
-        ascent, which takes three to thirty times as long and integrates the angles' densities.
-        The fast one serves every array, with any number of frequencies and snapshots; an unknown
-        slowness or elevation, or a whole posterior that is carried, is for coordinate ascent,
-        which then steps in.
+        Any array, with any number of frequencies and snapshots a step. Its noise is not used: the
+        method estimates it.
+    solver : NewtonSolver or CoordinateSolver
+        Maximization of the bound, with its settings: joint Newton steps on all angles, or the
+        paper's coordinate ascent, which takes three to thirty times as long and integrates the
+        angles' densities. `NewtonSolver` serves every array, with any number of frequencies and
+        snapshots; measurements with an unknown slowness or elevation it passes to coordinate
+        ascent. `CoordinateSolver.paper()` is the published form.
+    engine : {"newton", "fast", "coordinate"}, optional
+        Shorthand for a solver of that kind ("fast" is "newton") with those settings of `solver`
+        that both kinds have; the attribute is None afterwards.
     reference : {"middle", "first"}
-        The sensor at which the amplitudes' phases are counted. "first" is the paper's; with the
+        Sensor at which the amplitudes' phases are counted. "first" is the paper's; with the
         middle one phase and angle are uncorrelated, which saves most of the iterations.
-    posterior : {"quadrature", "mixture"}
-        How coordinate ascent integrates the angles' densities; "mixture" is the paper's
-        Heuristic 1.
-    tolerance : float, optional
-        Where the iteration rests. Fast: change of the bound, nats, 1e-4 if None. Coordinate:
-        relative change of the reconstruction, 1e-4 if None; the paper's is 1e-6.
-    max_iterations : int
-        Iterations at most; a step that needs more is reported as not converged.
-    max_components : int, optional
-        Components that may be used at once; as many as there are sensors if None.
-    kl : float
-        Fast: share of the cost of localising a component, nats, that it must earn to be kept.
-        1 is the exact bound; less finds weaker sources, and more false ones below 10 dB.
-    temper : float
-        Looks of a step that count as one, at least 1: overlapping windows and neighbouring bins
-        of a recording are not independent, and deviate from a plane wave alike.
-    power_floor : float, optional
-        Power, in units of one look's noise after beamforming, below which nothing is a source. If
-        None, 0 for one look a step, which is the paper's model, and 3 for several.
-    max_snr_db : float, optional
-        Signal-to-noise ratio beyond which what is left of the data is laid to the array's model.
-    merge : float
-        Of two active components nearer than this, rad of direction, the later is switched off;
-        0 for never, as in the paper.
 
     Attributes
     ----------
     x, P : ndarray, shapes (L,), (L, L)
-        The directions found, rad, NaN in unused places, and their variances on a diagonal.
+        Estimated directions, rad, NaN in unused slots, and their variances on a diagonal.
     noise : float
         Estimated variance of the noise of one sensor.
+    bin_noise : ndarray, shape (n_bins,)
+        Noise of each bin when it last had valid data; NaN before, and with coordinate ascent on
+        one snapshot of a line.
 
     Notes
     -----
     `existence` of an estimate is the posterior probability of the component if all others are
-    held: it ranks components, but is no calibrated frequency. `std` is the circular standard
+    held: it ranks components, but is not a calibrated frequency. `std` is the circular standard
     deviation of the angle, given the other components; with several sources it is too small, by a
     factor of 1.5 to 2 typically. Below half a wavelength of spacing, components to which no real
     direction belongs are left out of the estimate.
@@ -101,165 +109,153 @@ class VALSE(BatchDirectionTracker):
         self,
         measurement: ArraySnapshot,
         *,
-        engine: EngineName = "fast",
+        solver: Solver = DEFAULT_SOLVER,
+        engine: Engine | None = None,
         reference: Reference = "middle",
-        posterior: PosteriorName = "quadrature",
-        tolerance: float | None = None,
-        max_iterations: int = 500,
-        max_components: int | None = None,
-        kl: float = 0.5,
-        temper: float = 1.0,
-        power_floor: float | None = None,
-        max_snr_db: float | None = None,
-        merge: float = 0.0,
     ) -> None:
-        self.measurement = instance("measurement", measurement, ArraySnapshot)
-        self.engine = one_of("engine", engine, ("fast", "coordinate"))
+        if not hasattr(measurement, "manifold"):
+            raise TypeError(
+                f"measurement must be an ArraySnapshot or have its `manifold`; got {measurement!r}"
+            )
+        self.measurement = measurement
+        self.solver, self.engine = selected_solver(solver, engine), None
         self.reference = one_of("reference", reference, ("middle", "first"))
-        self.posterior = one_of("posterior", posterior, ("quadrature", "mixture"))
-        if engine == "fast" and posterior == "mixture":
-            raise ValueError("posterior='mixture' needs engine='coordinate'; got engine='fast'")
-        self.tolerance = tolerance if tolerance is None else positive("tolerance", tolerance)
-        self.kl = probability("kl", kl)
-        self.max_iterations = count("max_iterations", max_iterations)
-        self.max_components = (
-            None if max_components is None else count("max_components", max_components)
-        )
-        self.temper = positive("temper", temper)
-        if temper < 1:
-            raise ValueError(f"temper must be at least 1; got {temper}")
-        self.power_floor = None if power_floor is None else not_negative("power_floor", power_floor)
-        self.max_snr_db = None if max_snr_db is None else positive("max_snr_db", max_snr_db)
-        self.merge = not_negative("merge", merge)
-        check_directions(measurement, self.reference, mixture=self.posterior == "mixture")
-        self.bin_noise = np.full(measurement.n_bins, np.nan)
+        manifold = measurement.manifold(self.reference)
+        self.solver.check(manifold, getattr(measurement, "n_snapshots", 1), self.n_moments)
+        if manifold.coefficients is not None:
+            warn_of_ambiguity(measurement)
+        self.bin_noise = np.full(manifold.n_bins, np.nan)
         self.reset()
-
-    @property
-    def solver(self) -> Solver:
-        """What maximises the ELBO, with this tracker's settings."""
-        return self._solver(snr_db=None, descending=True)
-
-    def _solver(self, snr_db: float | None, *, descending: bool, n_moments: int = 0) -> Solver:
-        settings: dict[str, Any] = {
-            "max_iterations": self.max_iterations,
-            "merge": self.merge,
-            "snr_db": snr_db,
-            "max_components": self.max_components,
-            "temper": self.temper,
-            "power_floor": self.power_floor,
-            "max_snr_db": self.max_snr_db,
-        }
-        if self.tolerance is not None:
-            settings["tolerance"] = self.tolerance
-        if self.is_fast and n_moments == 0:
-            return NewtonSolver(kl=self.kl, **settings)
-        return CoordinateSolver(
-            self.posterior, descending=descending, n_moments=n_moments, **settings
-        )
-
-    @property
-    def is_fast(self) -> bool:
-        """Whether the fast engine is wanted, and serves this measurement: no second unknown."""
-        if self.engine != "fast":
-            return False
-        return len(self.measurement.manifold(self.reference).nuisance_weights) == 1
 
     @property
     def n_slots(self) -> int:
-        """Number of components that may be used at once."""
-        n_sensors = self.measurement.array.n_sensors
-        return min(n_sensors, self.max_components or n_sensors)
+        """Largest number of components."""
+        n_sensors = self.measurement.manifold(self.reference).n_sensors
+        return min(n_sensors, self.solver.max_components or n_sensors)
+
+    @property
+    def n_moments(self) -> int:
+        """Number of moments of the angles' densities that are kept between steps: 0."""
+        return 0
 
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
-        """Forget: nothing is carried from snapshot to snapshot."""
-        self._move([self], not_negative("dt", dt))
-        self._expect()
+        """Report no direction: nothing is known of the next step."""
+        self.predict_batch([self], dt)
+        self.report_prior()
 
     def update(self, z: ArrayLike | None) -> None:
-        """Fit one measurement, of the model's `shape`; sensors that are NaN are left out."""
-        looks = self._looks(z)
-        if looks is not None:
-            Y, heard = looks
-            manifold = self._manifold(heard)
-            fit = self.solver.fit(Y, manifold, self._prediction(heard))
-            self._absorb(manifold, fit, heard)
+        """Fit one measurement, of the model's `shape`; sensors with NaN are left out."""
+        observed = self.observe(z)
+        if observed is None:
+            return
+        prior = self.component_prior(observed)  # None in VALSE
+        posterior = self.solver.solve(observed.snapshots, observed.manifold, prior)  # (30)-(59)
+        self.store(posterior, observed)  # labels, components, noise per bin
 
     def step_batch(self, trackers: Sequence[Self], step: Sequence[Any], dt: float) -> None:
         """Predict and update copies of this tracker, those with the same sensors in one call."""
-        self._move(trackers, dt)
-        groups: dict[bytes, list[tuple[Self, Complex, ObservedSnapshots]]] = {}
+        self.predict_batch(trackers, dt)
+        groups: dict[bytes, list[tuple[Self, Observation]]] = {}
         for tracker, z in zip(trackers, step, strict=True):
-            looks = tracker._looks(z)
-            if looks is None:
-                tracker._expect()
+            observed = tracker.observe(z)
+            if observed is None:
+                tracker.report_prior()
             else:
-                groups.setdefault(looks[1].key, []).append((tracker, *looks))
+                groups.setdefault(observed.key, []).append((tracker, observed))
         for group in groups.values():
-            heard = group[0][2]
-            manifold = self._manifold(heard)
-            fits = self.solver.fit_batch(
-                [Y for _, Y, _ in group],
-                manifold,
-                [tracker._prediction(heard) for tracker, *_ in group],
+            posteriors = self.solver.solve_batch(
+                [observed.snapshots for _, observed in group],
+                group[0][1].manifold,
+                [tracker.component_prior(observed) for tracker, observed in group],
             )
-            for (tracker, *_), fit in zip(group, fits, strict=True):
-                tracker._absorb(manifold, fit, heard)
+            for (tracker, observed), posterior in zip(group, posteriors, strict=True):
+                tracker.store(posterior, observed)
 
-    def _move(self, trackers: Sequence[Self], dt: float) -> None:
-        """Move the beliefs of copies of this tracker by `dt`: there are none."""
+    def predict_batch(self, trackers: Sequence[Self], dt: float) -> None:
+        """Predict the beliefs of copies of this tracker: there are none."""
+        not_negative("dt", dt)
 
-    def _expect(self) -> None:
-        """Show what is expected before a measurement: nothing."""
-        self.reset()
+    def report_prior(self) -> None:
+        """Report what is expected before a measurement: nothing."""
+        self.report([])
 
-    def _looks(self, z: ArrayLike | None) -> tuple[Complex, ObservedSnapshots] | None:
-        """Return the looks without gaps, and which these are; None for a missed measurement."""
+    def observe(self, z: ArrayLike | None) -> Observation | None:
+        """Return the valid data of a measurement; None if it is missing."""
         if is_missing(z):
             return None
         Y = self.measurement.looks(np.asarray(z))
-        heard = ObservedSnapshots.of(Y)
-        return heard.block(Y), heard
+        valid = ObservedSnapshots.of(Y)
+        manifold = self.measurement.manifold(self.reference).only(np.flatnonzero(valid.bins))
+        manifold = manifold.without(np.flatnonzero(~valid.sensors))
+        return Observation(valid.block(Y), manifold, valid.bins, valid.key)
 
-    def _manifold(self, heard: ObservedSnapshots) -> Manifold:
-        """Return the manifold of the bins and sensors that gave a number."""
-        manifold = self.measurement.manifold(self.reference).only(np.flatnonzero(heard.bins))
-        return manifold.without(np.flatnonzero(~heard.sensors))
-
-    def _prediction(self, heard: ObservedSnapshots | None = None) -> ComponentPrior | None:
-        """Return what is known before the snapshot: nothing."""
+    def component_prior(self, observed: Observation) -> ComponentPrior | None:
+        """Return the prior of the components: None, as nothing is known."""
         return None
 
-    def _absorb(
-        self, manifold: Manifold, fit: ComponentPosterior, heard: ObservedSnapshots
+    def store(self, posterior: ComponentPosterior, observed: Observation) -> None:
+        """Report the active components, and keep the noise of each bin."""
+        self.bin_noise = updated(self.bin_noise, observed.bins, posterior.bin_noise)
+        active = detected(observed.manifold, posterior)
+        self.report_posterior(posterior, observed.manifold, active)
+
+    def report_posterior(
+        self,
+        posterior: ComponentPosterior,
+        manifold: Manifold,
+        active: Bool,
+        label: Int | None = None,
     ) -> None:
-        """Take in a fit."""
-        self.bin_noise = updated(self.bin_noise, heard.bins, fit.bin_noise)
-        found = reported(manifold, fit)
-        self.report(**vars(described(manifold, fit, found, np.full(found.sum(), -1))))
+        """Report the active components of a posterior as directions."""
+        theta, std = posterior.theta[active], circular_std(posterior.resultant[active])
+        self.report(
+            manifold.to_doa(theta, slack=np.inf),
+            manifold.doa_std(theta, std),
+            existence=1 / (1 + np.exp(-np.maximum(posterior.evidence[active], -700))),
+            amplitude=manifold.to_amplitude(posterior.amplitude[active], theta),
+            label=label,
+            converged=posterior.converged,
+            iterations=posterior.iterations,
+            noise=posterior.noise,
+        )
 
 
-def reported(manifold: Manifold, fit: ComponentPosterior) -> Bool:
-    """Tell which components are active and belong, within three std, to a real direction."""
-    doa = manifold.to_doa(fit.theta, slack=3 * circular_std(fit.resultant))
-    return np.asarray(fit.active & ~np.isnan(doa))
+def selected_solver(solver: Solver, engine: Engine | None) -> Solver:
+    """Return the solver, converted to the kind that `engine` names.
+
+    Examples
+    --------
+    >>> selected_solver(NewtonSolver(max_iterations=9), "coordinate").max_iterations
+    9
+    """
+    if not hasattr(solver, "solve_batch"):
+        raise TypeError(f"solver must be a NewtonSolver or a CoordinateSolver; got {solver!r}")
+    if engine is None:
+        return solver
+    one_of("engine", engine, ("newton", "fast", "coordinate"))
+    settings = instance("solver", solver, SolverSettings)
+    if engine == "coordinate":
+        return settings.converted(CoordinateSolver)
+    return settings.converted(NewtonSolver)
 
 
-def described(
-    manifold: Manifold, fit: ComponentPosterior, found: Bool, label: Int
-) -> DirectionEstimate:
-    """Return the found components of a fit as directions."""
-    theta, std = fit.theta[found], circular_std(fit.resultant[found])
-    return DirectionEstimate(
-        doa=manifold.to_doa(theta, slack=np.inf),
-        std=manifold.doa_std(theta, std),
-        existence=1 / (1 + np.exp(-np.maximum(fit.evidence[found], -700))),
-        amplitude=manifold.to_amplitude(fit.amplitude[found], theta),
-        label=label.astype(np.int64),
-        converged=fit.converged,
-        iterations=fit.iterations,
-        noise=fit.noise,
-    )
+def warn_of_ambiguity(measurement: ArraySnapshot) -> None:
+    """Warn if two directions have the same response at every frequency."""
+    pair = measurement.ambiguity() if hasattr(measurement, "ambiguity") else None
+    if pair is not None:
+        one, other = np.rad2deg(pair)
+        warnings.warn(
+            f"directions {one:.1f} and {other:.1f} degrees are ambiguous: they have the same "
+            "response at every frequency, so sources may be reported at either. Several "
+            "frequencies, or a smaller spacing of the sensors, resolve them",
+            stacklevel=4,
+        )
+
+
+def detected(manifold: Manifold, posterior: ComponentPosterior) -> Bool:
+    """Return which components are active and belong, within three std, to a real direction."""
+    doa = manifold.to_doa(posterior.theta, slack=3 * circular_std(posterior.resultant))
+    return np.asarray(posterior.active & ~np.isnan(doa))
 
 
 def circular_std(resultant: ArrayLike) -> Float:

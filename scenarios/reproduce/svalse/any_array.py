@@ -18,13 +18,14 @@ from arrivals.scenarios.metrics.gospa import Gospa, mean_gospa
 from arrivals.scenarios.reproduce.claims import negative, verdict
 from arrivals.scenarios.reproduce.studies import Report
 from arrivals.scenarios.simulations.planar_arrays import Circle
+from arrivals.trackers import NewtonSolver
 from arrivals.trackers.run import Run
 from arrivals.typing import Float
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-MERGED: dict[str, Any] = {"merge": np.deg2rad(1.5)}
+MERGED: dict[str, Any] = {"solver": NewtonSolver(merge=np.deg2rad(1.5))}
 STRICT: dict[str, Any] = {"threshold_db": 3.0}  # of the beam's peaks
 NAMES = {"svalse": "SVALSE", "valse": "VALSE", "cbf": "beamformer",
          "peaks_gnn": "beamformer, tracked"}  # fmt: skip
@@ -72,7 +73,7 @@ def _of_sparse_line() -> list[ArrayExperiment]:
         ("5 bins", {"n_bins": 5}, {}, 0.08, 0.27),
         ("10 bins", {"n_bins": 10}, {}, 0.04, 0.17),
         ("hopping", hop, {}, 2.89, 12.58),
-        ("hopping, whole posterior", hop, {"carry": "posterior"}, 2.77, 6.28),
+        ("hopping, whole posterior", hop, {"memory": "posterior"}, 2.77, 6.28),
     ]
     cases = []
     for told, numbers, params, *figure in figures:
@@ -155,7 +156,9 @@ def _scored(case: ArrayExperiment, seed: int) -> tuple[float, float, float, floa
 
 def _run(trial: Trial, method: str, params: dict[str, Any]) -> Run:
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "directions .* look alike")  # the sparse line is meant to
+        warnings.filterwarnings(
+            "ignore", "directions .* are ambiguous"
+        )  # the sparse line is meant to
         if method == "peaks_gnn":
             params = {"detector": trial.tracker("cbf", **params)}
         return trial.tracker(method, **params).run(trial.measurements)

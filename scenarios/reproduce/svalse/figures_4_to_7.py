@@ -17,10 +17,15 @@ from arrivals.scenarios.reproduce.claims import negative, verdict
 from arrivals.scenarios.reproduce.studies import Report
 from arrivals.scenarios.reproduce.svalse.plots import draw_parts, draw_runs
 from arrivals.scenarios.reproduce.svalse.published_values import ACTIVATION, PAPER, REBUILT
+from arrivals.trackers import CoordinateSolver
 
 FAST = ("cbf", "peaks_gnn", "sbl", "ssbl", "valse", "svalse")
-# The paper's form
-AS_PRINTED: dict[str, Any] = {"engine": "coordinate", "reference": "first", "tolerance": 1e-6}
+
+
+def as_printed(max_iterations: int) -> dict[str, Any]:
+    """Return the parameters of the paper's form."""
+    solver = CoordinateSolver(tolerance=1e-6, max_iterations=max_iterations)
+    return {"solver": solver, "reference": "first"}
 
 
 def svalse_as_printed(label: str, **probabilities: float) -> Method:
@@ -32,11 +37,11 @@ def svalse_as_printed(label: str, **probabilities: float) -> Method:
     148.0
     """
     motion = BernoulliVonMises(**probabilities)
-    return Method("svalse", AS_PRINTED | {"motion": motion, "max_iterations": 1000}, label)
+    return Method("svalse", as_printed(1000) | {"motion": motion}, label)
 
 
 PRINTED = (
-    Method("valse", AS_PRINTED | {"max_iterations": 2000}, "valse as printed"),
+    Method("valse", as_printed(2000), "valse as printed"),
     svalse_as_printed("svalse as printed"),
 )
 SHOWN = ("valse", "svalse", "sbl", "ssbl", "cbf", "peaks_gnn")

@@ -26,7 +26,7 @@ TRACKERS: list[str | Method] = [
     "cbf",
     Method("ssbl", {"n_directions": 91}, "ssbl"),
     "peaks_gnn",
-    Method("svalse", {"tolerance": 0.01}, "svalse"),
+    Method("svalse", {"solver__tolerance": 0.01}, "svalse"),
 ]
 METRICS = ("gospa", "rmse", "nees")
 
@@ -304,11 +304,11 @@ def test_method_without_the_parameter_is_refused() -> None:
 
 
 def test_grid_reaches_into_parts() -> None:
-    made = grid("svalse", {"motion__p_activate": [0.1, 1.0], "merge": [0.0]})
+    made = grid("svalse", {"motion__p_activate": [0.1, 1.0], "solver__merge": [0.0]})
     trial = SHORT["fig6"].sample(np.random.default_rng(0))
     trackers: list[Any] = [one.make(trial, np.random.SeedSequence(0)) for one in made]
     assert [tracker.motion.p_activate for tracker in trackers] == [0.1, 1.0]
-    assert {tracker.merge for tracker in trackers} == {0.0}
+    assert {tracker.solver.merge for tracker in trackers} == {0.0}
     study = monte_carlo(PairsInTurn(n_steps=2), made, 1, metrics=["false"])
     assert study.paired("false", made[1].label, made[0].label).mean > 0
 

@@ -35,6 +35,12 @@ class PublishedAscent(SingleSnapshotAscent):
         return C
 
 
+REPLAYED: dict[str, Any] = {  # also of the first step, which has no prior
+    "tolerance": 1e-6, "max_iterations": 5000, "merge": np.deg2rad(1.5), "snr_db": 20.0,
+    "descending": False,
+}  # fmt: skip
+
+
 class PublishedProgram(CoordinateSolver):
     """The published program: the paper's settings, and the slip."""
 
@@ -58,7 +64,7 @@ def replayed(name: str, n_steps: int, engine: CoordinateSolver) -> tuple[Float, 
             active = np.arange(carried.sum()) < z["svalse_K"][t - 1]
             widened = 1 / (1 / 148 + 1 / kappa[carried])  # (63), the large-κ limit
             known = ComponentPrior(-mu[carried], widened, np.where(active, 0.75, 0.1), 0.1)
-        fit = engine.fit(z["y"].T[t][None, :, None], manifold, known)
+        fit = engine.solve(z["y"].T[t][None, :, None], manifold, known)
         found = np.sort(np.rad2deg(manifold.to_doa(fit.theta[fit.active], slack=np.inf)))
         recorded = np.sort(z["svalse_doa_deg"][t][: z["svalse_K"][t]])
         assert len(found) == len(recorded)
@@ -73,7 +79,7 @@ def replayed(name: str, n_steps: int, engine: CoordinateSolver) -> tuple[Float, 
 def test_heuristic_1_with_the_slip_follows_the_program(
     name: str, n_steps: int, worst: float
 ) -> None:
-    engine = PublishedProgram(posterior="mixture", tolerance=1e-6, max_iterations=5000)
+    engine = PublishedProgram(posterior="mixture", **REPLAYED)
     off, iterations, recorded = replayed(name, n_steps, engine)
     assert off.max() < worst
     assert np.abs(iterations - recorded).max() <= 3
@@ -83,7 +89,7 @@ def test_heuristic_1_with_the_slip_follows_the_program(
     ("name", "n_steps", "shares"), [("fig4_001", 24, (0.70, 0.95)), ("fig6_001", 30, (0.83, 1.0))]
 )
 def test_heuristic_1_without_the_slip(name: str, n_steps: int, shares: tuple[float, float]) -> None:
-    engine = CoordinateSolver(posterior="mixture", tolerance=1e-6, max_iterations=5000)
+    engine = CoordinateSolver(posterior="mixture", **REPLAYED)
     off, _, _ = replayed(name, n_steps, engine)
     assert (off < 0.01).mean() >= shares[0]
     assert (off < 0.5).mean() >= shares[1]
@@ -96,7 +102,7 @@ def test_heuristic_1_without_the_slip(name: str, n_steps: int, shares: tuple[flo
 def test_direct_quadrature(
     name: str, n_steps: int, shares: tuple[float, float], median: float
 ) -> None:
-    engine = CoordinateSolver(tolerance=1e-6, max_iterations=5000)
+    engine = CoordinateSolver(**REPLAYED)
     off, _, _ = replayed(name, n_steps, engine)
     assert (off < 0.1).mean() >= shares[0]
     assert (off < 0.5).mean() >= shares[1]
@@ -110,11 +116,8 @@ def test_free_running_mixture_keeps_the_recorded_number_of_sources(name: str) ->
     tracker = SVALSE(
         LINE,
         BernoulliVonMises(),
-        engine="coordinate",
+        solver=CoordinateSolver(posterior="mixture", tolerance=1e-6, max_iterations=5000),
         reference="first",
-        posterior="mixture",
-        tolerance=1e-6,
-        max_iterations=5000,
     )
     run = tracker.run(z["y"].T)
     assert (run.n_found == z["svalse_K"]).mean() >= 0.85

@@ -53,7 +53,7 @@ def test_scenes_make_table_claims_and_pictures(number: int, tmp_path: Path) -> N
         (path,) = (tmp_path / "runs").glob("study-*.csv")
         params = [method["params"] for method in Study.read(path).config["methods"]]
         assert [one["motion"]["p_activate"] for one in params] == [0.1, 0.1, 0.0, 1.0, 0.1]
-        assert {one["engine"] for one in params} == {"coordinate"}
+        assert all(one["solver"]["type"].endswith(":CoordinateSolver") for one in params)
     page = (tmp_path / f"{name}.md").read_text()
     assert "Holds: " in page or "Does not hold: " in page
     assert list((tmp_path / "runs").glob("study-*.csv"))
@@ -102,7 +102,7 @@ def test_pictures_of_runs_name_their_marks_and_tell_the_paper_s_number(tmp_path:
 def test_what_a_user_would_write_stands_in_every_table_of_directions() -> None:
     for methods in (reproduce_svalse.FAST, reproduce_swellex.METHODS):
         assert set(methods) >= {"cbf", "peaks_gnn", "sbl", "ssbl", "valse", "svalse"}
-    scenes = {case.told for case in reproduce_any_array.CASES if not case.params.get("carry")}
+    scenes = {case.told for case in reproduce_any_array.CASES if not case.params.get("memory")}
     assert {c.told for c in reproduce_any_array.CASES if c.method == "peaks_gnn"} == scenes
 
 

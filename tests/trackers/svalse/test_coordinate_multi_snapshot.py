@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from arrivals.measurement_models import ArraySnapshot, ElementResponse, SensorArray
 from arrivals.measurement_models.observed import ObservedSnapshots
 from arrivals.scenarios import create
-from arrivals.trackers.svalse.components import ComponentPrior
+from arrivals.trackers.svalse.components import MERGE_DISTANCE, ComponentPrior
 from arrivals.trackers.svalse.coordinate.circle_posterior import (
     CirclePrior,
     SeriesPrior,
@@ -161,13 +161,13 @@ def test_a_fresh_component_starts_from_the_exact_marginal_of_the_looks() -> None
 def test_on_a_line_it_is_the_ascent_of_the_paper(reference: Any) -> None:
     """Specification, section 11: equal K and iterations, angles to 1e-14; tolerance 100 times."""
     trial = create("svalse_fig4", n_steps=6).sample(np.random.default_rng(1))
-    settings = CoordinateSolver()
+    settings = CoordinateSolver(merge=MERGE_DISTANCE, snr_db=20.0)
     manifold = trial.measurement.manifold(reference)  # type: ignore[union-attr]
     known = None
     for z in trial.measurements:
         Y = trial.measurement.looks(z)  # type: ignore[union-attr]
-        short = settings.fit(Y, manifold, known)
-        fit = settings.iterate(MultiSnapshotAscent(settings, Y, manifold, known))
+        short = settings.solve(Y, manifold, known)
+        fit = settings.iterate(MultiSnapshotAscent(settings, Y, manifold, known), MERGE_DISTANCE)
         assert fit.iterations == short.iterations
         assert fit.active.tolist() == short.active.tolist()
         on = fit.active

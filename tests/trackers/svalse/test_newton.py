@@ -281,9 +281,9 @@ def test_snapshots_fitted_together_are_those_fitted_alone() -> None:
         known.append(ComponentPrior(mu, kappa, rho, 0.1, age, 15.0 + n) if n % 4 else None)
     Ys[5] = np.zeros((1, 15, 1), dtype=np.complex128)
     engine, manifold = NewtonSolver(), MODEL.manifold()
-    together = engine.fit_batch(Ys, manifold, known)
+    together = engine.solve_batch(Ys, manifold, known)
     for Y, prediction, fit in zip(Ys, known, together, strict=True):
-        alone = engine.fit(Y, manifold, prediction)
+        alone = engine.solve(Y, manifold, prediction)
         np.testing.assert_allclose(fit.theta, alone.theta, atol=1e-9)
         np.testing.assert_allclose(fit.amplitude, alone.amplitude, rtol=1e-8)
         assert fit.age.tolist() == alone.age.tolist()

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from newton_states import MODEL, with_facts
+from newton_states import MODEL, prior_of, with_facts
 from newton_states import scene as of_a_line
 
 from arrivals.measurement_models import ArraySnapshot, ElementResponse, SensorArray
@@ -15,7 +15,7 @@ from arrivals.motion_models import BernoulliVonMises
 from arrivals.motion_models.bessel import log_i0
 from arrivals.scenarios import create, mean_gospa
 from arrivals.trackers import SVALSE, VALSE
-from arrivals.trackers.svalse.components import ComponentPosterior, ComponentPrior
+from arrivals.trackers.svalse.components import MERGE_DISTANCE, ComponentPosterior, ComponentPrior
 from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver
 from arrivals.trackers.svalse.newton.candidates import (
     Grid,
@@ -236,7 +236,7 @@ def wrapped_normal_bound(
             facts[0, ODDS, i] = log_odds(known.existence[k])
     problem = Problem(Y, None, 8)
     assert fit.bin_noise is not None
-    response = moves_on(NewtonSolver(), manifold, Y.shape[2]).response
+    response = moves_on(NewtonSolver(), manifold, Y.shape[2], MERGE_DISTANCE).response
     nu, tau = fit.bin_noise / problem.power, np.full(len(Y), 0.3)
     K = np.array([len(on)])
     state = evaluate(response, problem.Y[None], facts, K, nu[None], tau[None], np.zeros(1))
@@ -266,9 +266,9 @@ def test_the_bound_is_no_lower_than_that_of_coordinate_ascent(numbers: dict[str,
         for t, z in enumerate(trial.measurements):
             tracker.predict()
             if t % 3 == 1:
-                known, Y = tracker._prediction(), model.looks(z)
-                ours = NewtonSolver().fit(Y, manifold, known)
-                other = CoordinateSolver(tolerance=1e-6).fit(Y, manifold, known)
+                known, Y = prior_of(tracker, z), model.looks(z)
+                ours = NewtonSolver().solve(Y, manifold, known)
+                other = CoordinateSolver(tolerance=1e-6).solve(Y, manifold, known)
                 bounds = [wrapped_normal_bound(manifold, Y, known, f, 0.5) for f in (ours, other)]
                 gain.append(bounds[0] - bounds[1])
             tracker.update(z)
@@ -293,7 +293,7 @@ def wrapped(angle: Float) -> Float:
 @pytest.mark.parametrize("model", [CIRCLE, LOOKS, ELEMENTS], ids=NAMES[:3])
 def test_a_circle_turned_by_some_of_its_births_turns_every_angle(model: ArraySnapshot) -> None:
     """By whole steps of the grid on which components are born; see the next for others."""
-    n = len(moves_on(NewtonSolver(), model.manifold(), 1).grid.theta)
+    n = len(moves_on(NewtonSolver(), model.manifold(), 1, MERGE_DISTANCE).grid.theta)
     turn, doa = 2 * np.pi * 5 / n, np.array([[0.3, -2.0, 1.6]] * 4)
     other, z = turned(model, turn), heard(model, doa)
     a, b = SVALSE(model, SLOW).run(z), SVALSE(other, SLOW).run(z)
@@ -380,13 +380,13 @@ def test_a_mirrored_angle_is_reported_and_carried_in_front() -> None:
 
 def test_the_floor_of_the_power_and_of_the_noise_hold() -> None:
     z = heard(LOOKS, [[0.3, -2.0]], noise=1e-4)[0]
-    tracker = VALSE(LOOKS, max_snr_db=10.0)
+    tracker = VALSE(LOOKS, solver=NewtonSolver(max_snr_db=10.0))
     tracker.update(z)
     power = (np.abs(z) ** 2).mean(axis=(1, 2))
     assert (tracker.bin_noise >= 0.1 * power * (1 - 1e-9)).all()
     weak = heard(LOOKS, [[0.3]], noise=3.0, seed=1)[0]
     for floor, found in ((0.0, True), (1e3, False)):
-        tracker = VALSE(LOOKS, power_floor=floor)
+        tracker = VALSE(LOOKS, solver=NewtonSolver(power_floor=floor))
         tracker.update(weak)
         assert (tracker.estimate.n_found > 0) is found
 
@@ -452,6 +452,5 @@ def test_what_is_made_of_an_array_is_made_once_for_each_set_of_sensors() -> None
 @pytest.mark.parametrize("name", ["max_components", "power_floor", "max_snr_db"])
 def test_numbers_are_kept_as_numbers(name: str) -> None:
     model = ArraySnapshot(SensorArray.ula(8, 0.5), 1.0)
-    given: dict[str, Any] = {name: np.int64(3)}
-    tracker = SVALSE(model, **given)
-    assert type(getattr(tracker, name)) is (int if name == "max_components" else float)
+    tracker = SVALSE(model).set_params(**{f"solver__{name}": np.int64(3)})
+    assert type(getattr(tracker.solver, name)) is (int if name == "max_components" else float)

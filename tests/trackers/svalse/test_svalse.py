@@ -12,18 +12,16 @@ from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.measurement_models.manifolds.manifold import Reference
 from arrivals.motion_models import BernoulliVonMises, VonMisesWalk
 from arrivals.scenarios import Trial, create, mean_gospa
-from arrivals.trackers import SVALSE, VALSE, Run
+from arrivals.trackers import SVALSE, VALSE, CoordinateSolver, NewtonSolver, Run
 from arrivals.typing import Complex
 
 LINE = ArraySnapshot(SensorArray.ula(15, spacing=0.5), wavelength=1.0)
 PAPER: dict[str, Any] = {
-    "engine": "coordinate",
+    "solver": CoordinateSolver(tolerance=1e-6, max_iterations=5000),
     "reference": "first",
-    "tolerance": 1e-6,
-    "max_iterations": 5000,
 }
 COORDINATE: dict[str, Any] = {"engine": "coordinate"}
-MIXTURE: dict[str, Any] = {"engine": "coordinate", "posterior": "mixture"}
+MIXTURE: dict[str, Any] = {"solver": CoordinateSolver(posterior="mixture")}
 
 
 def short(seed: int = 0, n_steps: int = 4, name: str = "svalse_fig4") -> Trial:
@@ -101,7 +99,7 @@ def test_a_silent_sensor_equals_the_array_without_it(dead: list[int]) -> None:
 def test_amplitudes_rebuild_the_snapshot(reference: Reference) -> None:
     model = LINE.replace(array=SensorArray.ula(14, 0.5, missing=[2]))
     y = tone([-0.6, 0.1, 0.9], noise=1e-8, model=model)[0]
-    tracker = VALSE(model, reference=reference, tolerance=1e-8)
+    tracker = VALSE(model, reference=reference, solver=NewtonSolver(tolerance=1e-8))
     tracker.update(y)
     found = tracker.estimate
     a = model.array.steering_vector(found.doa, 1.0)
@@ -175,7 +173,7 @@ def test_below_half_a_wavelength_nothing_unphysical_is_reported() -> None:
     for z in noise:
         tracker.predict()
         tracker.update(z)
-        theta = tracker.mu[tracker.carried]
+        theta = tracker.mu[tracker.tracked]
         beyond += (np.abs(theta) > 2 * np.pi * 0.2 + 0.5).sum()
         doa = tracker.estimate.doa
         assert np.isfinite(doa).all()
@@ -230,7 +228,7 @@ def test_prediction_is_the_motion_model_s() -> None:
     tracker = SVALSE(LINE, motion)
     tracker.predict()
     tracker.update(tone([0.3], 1e-3)[0])
-    kappa, on = tracker.kappa[0], tracker.carried
+    kappa, on = tracker.kappa[0], tracker.tracked
     tracker.predict()
     assert tracker.kappa[0] == pytest.approx(VonMisesWalk(200.0).blur(kappa))
     assert set(tracker.existence[on]) <= {0.7, 0.2}
@@ -267,7 +265,9 @@ def test_certain_births_and_deaths_are_allowed(
     """Fig. 7: ρ of 0 and 1 force a component off and on."""
     motion = BernoulliVonMises(p_deactivate=p[0], p_activate=p[1])
     trial = short(5, 5, "svalse_fig6")
-    run = SVALSE(LINE, motion, max_iterations=60, **form).run(trial.measurements)
+    run = SVALSE(LINE, motion, solver=NewtonSolver(max_iterations=60), **form).run(
+        trial.measurements
+    )
     if p[1] == 1.0:  # four are there; the fast engine merges what is forced on and finds nothing
         assert run.n_found[1:].min() > (4 if form else 3)
     if p[1] == 0.0:
@@ -280,7 +280,11 @@ def test_certain_birth_is_the_limit_of_one_that_is_nearly_so() -> None:
     """Coordinate ascent, the paper's form; Fig. 7 (d) has a probability of 1."""
     trial = short(5, 5, "svalse_fig6")
     found = [
-        SVALSE(LINE, BernoulliVonMises(p_activate=p), max_iterations=100, **COORDINATE)
+        SVALSE(
+            LINE,
+            BernoulliVonMises(p_activate=p),
+            solver=CoordinateSolver(max_iterations=100),
+        )
         .run(trial.measurements[:3]).doa
         for p in (1.0, 1 - 1e-12)
     ]  # fmt: skip
@@ -289,7 +293,7 @@ def test_certain_birth_is_the_limit_of_one_that_is_nearly_so() -> None:
 
 def test_crossing_sources_are_merged_into_one_while_they_are_too_near() -> None:
     z = tone([[0.0, np.deg2rad(1.0)]], noise=1e-7)
-    apart = SVALSE(LINE, merge=0.0).run(z)
+    apart = SVALSE(LINE, solver=NewtonSolver(merge=0.0)).run(z)
     merged = SVALSE(LINE).run(z)
     near = np.abs(np.subtract.outer(merged.doa[0], merged.doa[0]))
     assert apart.n_found[0] >= 2
@@ -317,7 +321,7 @@ def test_for_a_single_source_the_standard_deviation_is_right() -> None:
     errors = {}
     references: list[Reference] = ["middle", "first"]
     for reference in references:
-        tracker = VALSE(LINE, reference=reference, tolerance=1e-6)
+        tracker = VALSE(LINE, reference=reference, solver=NewtonSolver(tolerance=1e-6))
         run = tracker.run(tone([[0.4]] * 200, noise=0.02))
         best = np.nanargmin(np.abs(run.doa - 0.4), axis=1)[:, None]
         error = np.take_along_axis(run.doa - 0.4, best, axis=1)
@@ -329,7 +333,7 @@ def test_for_a_single_source_the_standard_deviation_is_right() -> None:
 
 def test_a_step_that_does_not_converge_says_so() -> None:
     z = short(0, 1).measurements
-    run = SVALSE(LINE, max_iterations=3).run(z)
+    run = SVALSE(LINE, solver=NewtonSolver(max_iterations=3)).run(z)
     assert run.converged.tolist() == [False]
     assert run.iterations.tolist() == [3]
     assert SVALSE(LINE).run(z).converged.all()
@@ -352,7 +356,9 @@ def test_at_0_db_ghosts_starve_without_dying_and_the_step_is_reported() -> None:
     """
     trial = create("svalse_scenario2", snr_db=0.0, n_steps=20).sample(np.random.default_rng(4))
     tracker = trial.tracker("svalse", motion=BernoulliVonMises(), **COORDINATE)
-    runs = [tracker.set_params(merge=m).run_batch([trial.measurements])[0] for m in (0.0, 0.026)]
+    runs = [
+        tracker.set_params(solver__merge=m).run_batch([trial.measurements])[0] for m in (0.0, 0.026)
+    ]
     for run in runs:
         starved = ~run.converged
         assert starved.sum() >= 3
@@ -395,7 +401,7 @@ def test_coordinate_ascent_on_figures_4_to_6(
 
 
 def test_a_grid_wider_than_half_a_wavelength_warns_of_the_first_two_directions_alike() -> None:
-    with pytest.warns(UserWarning, match=r"directions -90\.0 and 53\.1 degrees look alike"):
+    with pytest.warns(UserWarning, match=r"directions -90\.0 and 53\.1 degrees are ambiguous"):
         SVALSE(LINE.replace(wavelength=0.9))
 
 
@@ -403,16 +409,10 @@ def test_a_grid_wider_than_half_a_wavelength_warns_of_the_first_two_directions_a
     ("params", "message"),
     [
         ({"motion": VonMisesWalk(100.0)}, "motion must be a BernoulliVonMises"),
-        ({"measurement": LINE.array}, "measurement must be an ArraySnapshot"),
+        ({"measurement": LINE.array}, "measurement must be an ArraySnapshot or have"),
         ({"reference": "last"}, "reference must be one of 'middle', 'first'"),
-        ({"posterior": "laplace"}, "posterior must be one of 'quadrature', 'mixture'"),
-        ({"tolerance": 0.0}, "tolerance must be finite and positive"),
-        ({"max_iterations": 2.5}, "max_iterations must be a whole number"),
-        ({"merge": -1.0}, "merge must be finite and not negative"),
-        ({"max_components": 0}, "max_components must be at least 1"),
-        ({"engine": "slow"}, "engine must be one of 'fast', 'coordinate'"),
-        ({"posterior": "mixture"}, "posterior='mixture' needs engine='coordinate'"),
-        ({"kl": 1.5}, r"kl must lie in \[0, 1\]"),
+        ({"engine": "slow"}, "engine must be one of 'newton', 'fast', 'coordinate'"),
+        ({"solver": "fast"}, "solver must be a NewtonSolver or a CoordinateSolver; got 'fast'"),
     ],
 )
 def test_parts_and_numbers_that_do_not_fit_are_refused(
@@ -420,6 +420,43 @@ def test_parts_and_numbers_that_do_not_fit_are_refused(
 ) -> None:
     with pytest.raises((ValueError, TypeError), match=message):
         SVALSE(**{"measurement": LINE} | params)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"tolerance": 0.0}, "tolerance must be finite and positive"),
+        ({"max_iterations": 2.5}, "max_iterations must be a whole number"),
+        ({"merge": -1.0}, "merge must be finite and not negative"),
+        ({"max_components": 0}, "max_components must be at least 1"),
+        ({"tempering": 0.5}, "tempering must be at least 1; got 0.5"),
+        ({"power_floor": -1.0}, "power_floor must be finite and not negative"),
+        ({"max_snr_db": 0.0}, "max_snr_db must be finite and positive"),
+        ({"snr_db": -3.0}, "snr_db must be finite and positive"),
+    ],
+)
+def test_settings_of_solvers_outside_their_range_are_rejected(
+    settings: dict[str, Any], message: str
+) -> None:
+    for kind in (NewtonSolver, CoordinateSolver):
+        with pytest.raises((ValueError, TypeError), match=message):
+            kind(**settings)
+
+
+def test_settings_of_one_solver_outside_their_range_are_rejected() -> None:
+    with pytest.raises(ValueError, match=r"kl_weight must lie in \[0, 1\]"):
+        NewtonSolver(kl_weight=1.5)
+    with pytest.raises(ValueError, match="posterior must be one of 'quadrature', 'mixture'"):
+        CoordinateSolver(posterior="laplace")  # type: ignore[arg-type]
+
+
+def test_engine_selects_a_solver_with_the_shared_settings() -> None:
+    tracker = SVALSE(LINE, engine="coordinate", solver=NewtonSolver(tolerance=1e-3, kl_weight=1.0))
+    assert tracker.solver == CoordinateSolver(tolerance=1e-3)
+    assert tracker.engine is None
+    tracker.set_params(solver__posterior="mixture", engine="coordinate")
+    assert tracker.solver == CoordinateSolver(tolerance=1e-3, posterior="mixture")
+    assert tracker.set_params(engine="fast").solver == NewtonSolver(tolerance=1e-3)
 
 
 def test_snapshots_of_the_wrong_shape_or_kind_leave_the_belief_as_it_was() -> None:

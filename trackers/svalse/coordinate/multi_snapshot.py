@@ -58,11 +58,12 @@ class MultiSnapshotAscent(MultiSnapshotAmplitudes):
         self.settings, self.manifold = settings, manifold
         self._read_manifold()
         places = InitialSupport.of(prediction, L)
+        self.n_moments = 0 if prediction is None else prediction.n_moments
         power = (Y.real**2 + Y.imag**2).sum(axis=(1, 2)) / (M * Y.shape[2])
         nu = self._first_noise(power, places.known)
         left = np.maximum(power - nu, NOISE_FLOOR * power)
         tau = left / places.n_expected * M / self.norms[:, 0]
-        super().__init__(Y, places.rho, nu, tau, self.norms[:, 0], settings.temper)
+        super().__init__(Y, places.rho, nu, tau, self.norms[:, 0], settings.tempering)
         self.begin(places)
         self._read_prediction(places.known, L)
         self.power_floor = power_floor(settings.power_floor, self.n_looks)
@@ -106,12 +107,12 @@ class MultiSnapshotAscent(MultiSnapshotAmplitudes):
         if prediction.nuisance is not None:
             self.nuisance[:n] = prediction.nuisance[:n]
         self.prior_nuisance = self.nuisance.copy()
-        self.moments = np.zeros((L, self.settings.n_moments), dtype=np.complex128)
+        self.moments = np.zeros((L, self.n_moments), dtype=np.complex128)
         self.priors: list[CirclePrior] = [VonMisesPrior(complex(each), mirror) for each in eta]
         if prediction.moments is not None:
-            step = (max(self.settings.n_moments - 8, 1) / 7) ** 2
+            step = (max(self.n_moments - 8, 1) / 7) ** 2
             self.priors[:n] = [SeriesPrior(each, step) for each in prediction.moments[:n]]
-        self.plain = len(weights) == 1 and not mirror and self.settings.n_moments == 0
+        self.plain = len(weights) == 1 and not mirror and self.n_moments == 0
 
     # -- start (sec. 7) ---------------------------------------------------------------------------
 
@@ -227,12 +228,12 @@ class MultiSnapshotAscent(MultiSnapshotAmplitudes):
             moments, self.mean[k] = quadrature(c[0])
             self.place(k, moments[None])
             return
-        n = max(self.degree + 1, self.settings.n_moments)
+        n = max(self.degree + 1, self.n_moments)
         moments, self.mean[k] = grid_moments(
             c, prior, self.prior_nuisance[k], n, mirror=self.manifold.mirror
         )
         self.nuisance[k] = moments[:, 0].real
-        self.moments[k] = moments[:, : self.settings.n_moments].sum(axis=0)
+        self.moments[k] = moments[:, : self.n_moments].sum(axis=0)
         self.place(k, moments)
 
     def place(self, k: int, moments: Complex) -> None:

@@ -15,7 +15,11 @@ import numpy as np
 
 from arrivals.measurement_models.manifolds.manifold import Manifold
 from arrivals.motion_models.bessel import inverse_bessel_ratio
-from arrivals.trackers.svalse.components import ComponentPosterior, ComponentPrior
+from arrivals.trackers.svalse.components import (
+    ComponentPosterior,
+    ComponentPrior,
+    SolverSettings,
+)
 from arrivals.trackers.svalse.coordinate.angle_posterior import (
     AnglePosterior,
     fold,
@@ -30,73 +34,89 @@ from arrivals.trackers.svalse.coordinate.single_snapshot import Amplitudes
 from arrivals.trackers.svalse.coordinate.support import InitialSupport
 from arrivals.trackers.svalse.noise_initialization import NOISE_FLOOR, autocorrelation, first_noise
 from arrivals.typing import Complex, Int
+from arrivals.validation import one_of
 
 PosteriorName = Literal["quadrature", "mixture"]
 
 
 @dataclass(frozen=True)
-class CoordinateSolver:
-    """Settings of the ascent.
+class CoordinateSolver(SolverSettings):
+    """Coordinate ascent on the ELBO: one angle after the other, as in the papers.
 
     Parameters
     ----------
-    posterior : {"quadrature", "mixture"}
-        How the moments of an angle are integrated; "mixture" is the papers' heuristic.
     tolerance : float
-        Relative change of the reconstruction at which it rests.
+        Relative change of the reconstruction at which the iteration stops; the paper's is 1e-6.
     max_iterations : int
-    merge : float
-        Two active components nearer than this, rad of direction, become one; 0 for never.
-    snr_db : float or None
-        Signal-to-noise ratio from which the noise starts. None estimates it from the lags of a
-        line; elsewhere it is the noise of the last step for several looks, if it is known, or
-        that of 20 dB.
-    max_components : int or None
-        As many as there are sensors if None.
-    descending : bool
-        Order of the mixture's factors.
-    temper : float
-        Looks of a step that count as one.
-    power_floor : float or None
-        Power, in units of one look's noise after beamforming, below which nothing is a source;
-        None is 0 for one look and 3 for several.
-    max_snr_db : float or None
-        Signal-to-noise ratio beyond which what is left of the data is laid to the model.
-    n_moments : int
-        Moments of the angles' densities to carry; 0 for von Mises densities.
+        Largest number of iterations of a step; one that needs more is reported as not converged.
+    max_components : int, optional
+        Largest number of components; that of the sensors if None.
+    merge : float, optional
+        Distance, rad of direction, below which the later of two active components is removed; 0
+        for never. None is 1.5 degrees for tracked components (SVALSE) and 0 for independent
+        snapshots (VALSE).
+    snr_db : float, optional
+        Signal-to-noise ratio from which the noise starts in every step. None is 20, or the noise
+        of the previous step if a step has several snapshots; for one snapshot of a line without a
+        prior (VALSE) it is estimated from the lags.
+    tempering : float
+        Number of snapshots that count as one, at least 1.
+    power_floor : float, optional
+        Smallest power of a source, in units of the noise of one snapshot after beamforming. None
+        is 0 for one snapshot a step and 3 for several.
+    max_snr_db : float, optional
+        Signal-to-noise ratio that bounds the noise from below: model errors count as noise.
+    posterior : {"quadrature", "mixture"}
+        Integration of the densities of the angles; "mixture" is the papers' Heuristic 1.
+    descending : bool, optional
+        Order of the mixture's factors. None is descending without a prior (VALSE) and ascending
+        with one (SVALSE).
     """
 
     posterior: PosteriorName = "quadrature"
-    tolerance: float = 1e-4
-    max_iterations: int = 500
-    merge: float = np.deg2rad(1.5)
-    snr_db: float | None = 20.0
-    max_components: int | None = None
-    descending: bool = False
-    temper: float = 1.0
-    power_floor: float | None = None
-    max_snr_db: float | None = None
-    n_moments: int = 0
+    descending: bool | None = None
 
-    def fit(
-        self, Y: Complex, manifold: Manifold, prediction: ComponentPrior | None
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        one_of("posterior", self.posterior, ("quadrature", "mixture"))
+
+    def check(self, manifold: Manifold, n_snapshots: int, n_moments: int) -> None:
+        """Raise ValueError if the mixture does not support such measurements."""
+        if self.posterior == "quadrature":
+            return
+        if n_moments:
+            raise ValueError(
+                'memory="posterior" requires posterior="quadrature"; got posterior="mixture"'
+            )
+        if manifold.coefficients is not None:
+            raise ValueError(
+                'posterior="mixture" requires a line on a uniform grid, at one wavelength'
+            )
+        if n_snapshots > 1 or len(manifold.nuisance_weights) > 1:
+            raise ValueError('posterior="mixture" requires one snapshot a step')
+
+    def solve(
+        self, snapshots: Complex, manifold: Manifold, prior: ComponentPrior | None
     ) -> ComponentPosterior:
-        """Fit the looks of one step: start, then iterate (sections III and IV, Fig. 3).
+        """Fit the snapshots of one step: start, then iterate (sections III and IV, Fig. 3).
 
         Parameters
         ----------
-        Y : ndarray, shape (n_bins, n_sensors, n_snapshots)
+        snapshots : ndarray, shape (n_bins, n_sensors, n_snapshots)
         manifold : Manifold
-        prediction : Prediction or None
-            None in a first step and in VALSE: nothing is known.
+        prior : ComponentPrior or None
+            None in VALSE.
         """
-        if not Y.any():
+        if not snapshots.any():
             return SILENCE
-        if self._for_a_line(Y, manifold):
-            return self.iterate(self.step(Y[0, :, 0], manifold, prediction))
-        return self.iterate(MultiSnapshotAscent(self, Y, manifold, prediction))
+        merge = self.merge_distance(prior)
+        if self._for_a_line(snapshots, manifold, prior):
+            return self.iterate(self.step(snapshots[0, :, 0], manifold, prior), merge)
+        return self.iterate(MultiSnapshotAscent(self, snapshots, manifold, prior), merge)
 
-    def iterate(self, step: SingleSnapshotAscent | MultiSnapshotAscent) -> ComponentPosterior:
+    def iterate(
+        self, step: SingleSnapshotAscent | MultiSnapshotAscent, merge: float
+    ) -> ComponentPosterior:
         """Improve support, variances and angles in turn until the reconstruction rests."""
         x, converged, most = step.start(), False, self.max_iterations
         while not converged and step.iterations < most and not step.cycles(most):
@@ -105,31 +125,32 @@ class CoordinateSolver:
             step.learn_variances()
             step.learn_odds()
             step.refine_angles()
-            step.merge(self.merge)
+            step.merge(merge)
             x_old, x = x, step.reconstruction()
             converged = step.rests(x, x_old)
         return step.result(converged)
 
-    def fit_batch(
+    def solve_batch(
         self,
-        Ys: Sequence[Complex],
+        snapshots: Sequence[Complex],
         manifold: Manifold,
-        predictions: Sequence[ComponentPrior | None],
+        priors: Sequence[ComponentPrior | None],
     ) -> list[ComponentPosterior]:
         """Fit independent snapshots of one array, one after the other."""
-        return [self.fit(Y, manifold, known) for Y, known in zip(Ys, predictions, strict=True)]
+        return [self.solve(Y, manifold, prior) for Y, prior in zip(snapshots, priors, strict=True)]
 
-    def _for_a_line(self, Y: Complex, manifold: Manifold) -> bool:
+    def _for_a_line(self, Y: Complex, manifold: Manifold, prior: ComponentPrior | None) -> bool:
         """Tell whether the short form for one look of a line on a grid serves."""
-        plain = not self.power_floor and self.max_snr_db is None and self.n_moments == 0
+        plain = not self.power_floor and self.max_snr_db is None
+        whole = prior is not None and prior.n_moments > 0
         line = manifold.coefficients is None and Y.shape[0] == Y.shape[2] == 1
-        return plain and line and self.temper == 1
+        return plain and not whole and line and self.tempering == 1
 
     def step(
-        self, y: Complex, manifold: Manifold, prediction: ComponentPrior | None
+        self, y: Complex, manifold: Manifold, prior: ComponentPrior | None
     ) -> SingleSnapshotAscent:
         """Return the working state for one snapshot."""
-        return SingleSnapshotAscent(self, y, manifold, prediction)
+        return SingleSnapshotAscent(self, y, manifold, prior)
 
 
 class SingleSnapshotAscent(Amplitudes):
@@ -157,7 +178,7 @@ class SingleSnapshotAscent(Amplitudes):
         places = InitialSupport.of(prediction, L)
         known, n = places.known, places.n_carried
         power = float(np.vdot(y, y).real) / M
-        nu = first_noise(y, self.k, settings.snr_db)
+        nu = first_noise(y, self.k, settings.initial_snr_db(prediction))
         tau = max(power - nu, NOISE_FLOOR * power) / places.n_expected
         super().__init__(y, places.rho, nu, tau)
         self.begin(places)
@@ -166,7 +187,9 @@ class SingleSnapshotAscent(Amplitudes):
         self.integrate: AnglePosterior = quadrature
         self.first_mode: AnglePosterior = top_mode
         if settings.posterior == "mixture":
-            self.integrate = partial(mixture, descending=settings.descending)
+            descending = settings.descending
+            descending = prediction is None if descending is None else descending
+            self.integrate = partial(mixture, descending=descending)
             self.first_mode = nearest_modes
 
     def start(self) -> Complex:

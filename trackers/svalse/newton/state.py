@@ -9,7 +9,11 @@ import numpy as np
 
 from arrivals.measurement_models.manifolds.manifold import Manifold
 from arrivals.motion_models.bessel import bessel_ratio, log_i0
-from arrivals.trackers.svalse.components import ComponentPosterior, ComponentPrior
+from arrivals.trackers.svalse.components import (
+    ComponentPosterior,
+    ComponentPrior,
+    SolverSettings,
+)
 from arrivals.trackers.svalse.newton.batch import BatchRecord
 from arrivals.trackers.svalse.newton.candidates import LOG_2PI
 from arrivals.trackers.svalse.newton.elbo import (
@@ -69,20 +73,20 @@ class Problem:
         age = self.known.age
         self.age = np.zeros(self.n, dtype=np.int64) if age is None else age[: self.n]
 
-    def snr_db(self, manifold: Manifold, temper: float, otherwise: float | None) -> float:
+    def snr_db(self, manifold: Manifold, settings: SolverSettings) -> float:
         """Return the signal-to-noise ratio at which the noise starts.
 
-        That of the steps before, else `otherwise`; if that is None, by the covariance of many
-        snapshots or the lags of one look of a line, else 20.
+        That of the steps before, else that of the settings; if that is None, by the covariance of
+        many snapshots or, without a prior, the lags of one snapshot of a line, else 20.
         """
         if self.known.snr_db is not None:
             return self.known.snr_db
-        if otherwise is not None:
-            return otherwise
+        if settings.snr_db is not None:
+            return settings.snr_db
         M, N = self.Y.shape[1:]
-        if M * temper <= N:  # looks enough for a covariance
+        if M * settings.tempering <= N:  # snapshots enough for a covariance
             return -10 * float(np.log10(quiet_noise(self.Y)).mean())
-        if manifold.coefficients is not None or N > 1:
+        if self.known is not NOTHING or manifold.coefficients is not None or N > 1:
             return 20.0
         return -10 * float(np.log10(first_noise(self.Y[0, :, 0], manifold.harmonics, None)))
 
@@ -151,7 +155,7 @@ class SolverState(BatchRecord):
 def start(
     problems: Sequence[Problem],
     response: ExpectedResponse,
-    snr_db: float | None,
+    settings: SolverSettings,
     n_angles: int,
     most: int,
 ) -> SolverState:
@@ -160,7 +164,7 @@ def start(
     facts = carried(problems, response.extent)
     K = np.array([p.n for p in problems])
     free = K == 0
-    snr = np.array([p.snr_db(response.manifold, response.temper, snr_db) for p in problems])
+    snr = np.array([p.snr_db(response.manifold, settings) for p in problems])
     nu = np.maximum(10 ** (-snr / 10), response.noise_floor)
     K_active = np.array([np.count_nonzero(p.age == 0) for p in problems])
     share = np.where(free, max(most // 2, 1), np.maximum(K_active, 1))

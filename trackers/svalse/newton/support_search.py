@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from arrivals.parameters import FrozenModel
 from arrivals.trackers.svalse.newton.batch import enlarged, some
 from arrivals.trackers.svalse.newton.candidates import (
     Grid,
@@ -25,15 +26,32 @@ MARGIN = 1e-3  # nats by which an addition must raise the record
 
 
 @dataclass(frozen=True)
-class IterationLimits:
-    """How many Newton steps follow a move, and the change of F, nats, at which they rest."""
+class IterationLimits(FrozenModel):
+    """Numbers of Newton steps after a change of the support, and of such changes.
 
-    inner: int
-    removal: int
-    fill_inner: int
-    final: int
-    inner_tolerance: float
-    tolerance: float
+    Parameters
+    ----------
+    inner, removal, fill, final : int
+        Newton steps after an addition, after a removal, after an addition of the fill stage, and
+        at the end.
+    inner_tolerance : float
+        Change of the ELBO, nats, at which those before the end stop.
+    large_gain : float
+        Gain of a Newton step, nats, after which another follows in any case.
+    max_changes : int
+        Largest number of changes of the support.
+    """
+
+    inner: int = 3
+    removal: int = 1
+    fill: int = 2
+    final: int = 12
+    inner_tolerance: float = 1e-2
+    large_gain: float = 10.0
+    max_changes: int = 60
+
+
+DEFAULT_LIMITS = IterationLimits()
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +69,9 @@ class SupportSearch:
         Components whose activity is in question.
     most, fill_to : int
         Active ones at most, and in the fill stage.
-    max_moves, max_iterations : int
+    max_iterations : int
+    tolerance : float
+        Change of F, nats, at which the final Newton steps stop.
     relearn : bool
         Whether a removal counts what the noise gains by being learned again.
     """
@@ -63,14 +83,14 @@ class SupportSearch:
     places: int
     most: int
     fill_to: int
-    max_moves: int
     max_iterations: int
+    tolerance: float
     relearn: bool = False
 
     def choose(self, work: SolverState) -> None:
         """Judge what is on trial, and choose the next burst of each problem: one pass 1-4."""
         exhausted = self.judge(work)
-        stop = (work.moves >= self.max_moves) | (work.iterations >= self.max_iterations)
+        stop = (work.moves >= self.bursts.max_changes) | (work.iterations >= self.max_iterations)
         open_ = ~(exhausted | stop)
         if some(open_):
             self.merge(work, open_)
@@ -158,7 +178,7 @@ class SupportSearch:
             work.before = np.where(found, state.criterion(self.kl), work.before)
             facts, K = joined(part.state.facts, part.state.K, new)
             self.evaluated(work, found, facts[new.n > 0], K[new.n > 0])
-            n = np.where(work.filling, self.bursts.fill_inner, self.bursts.inner)
+            n = np.where(work.filling, self.bursts.fill, self.bursts.inner)
             self.burst(work, found, n, self.bursts.inner_tolerance)
         return found
 
@@ -180,7 +200,7 @@ class SupportSearch:
         final = idle & ~filled
         if some(final):
             work.finished = work.finished | final
-            self.burst(work, final, self.bursts.final, self.bursts.tolerance)
+            self.burst(work, final, self.bursts.final, self.tolerance)
 
     def burst(self, work: SolverState, rows: Bool, n: Int | int, tolerance: float) -> None:
         """Set the number of Newton steps that follow."""
