@@ -22,9 +22,9 @@ from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.measurement_models.manifolds.manifold import UniformLineManifold
 from arrivals.scenarios import ar_signals, best_assignment_rmse
 from arrivals.trackers import MUSIC, PAST
-from arrivals.trackers.subspace.base import Subspaces, on_grid
+from arrivals.trackers.subspace.base import Subspaces, uniform_line
 from arrivals.trackers.subspace.esprit import esprit_angles
-from arrivals.trackers.subspace.music import Scan
+from arrivals.trackers.subspace.music import SpectrumSearch
 from arrivals.trackers.subspace.past import past_step
 from arrivals.trackers.subspace.root_music import root_music_angles
 from arrivals.typing import Complex, Float
@@ -95,7 +95,7 @@ def snapshots(
     model = ArraySnapshot(SensorArray.symmetric(case.distances), wavelength=1.0, noise=noise)
     s = ar_signals(COEFFICIENTS, NOISE, INTERVALS * case.length, rng, (runs,))
     y = model.simulate(np.deg2rad(case.truth()), s, rng)
-    return on_grid(model), y.reshape(runs, INTERVALS, case.length, -1)
+    return uniform_line(model), y.reshape(runs, INTERVALS, case.length, -1)
 
 
 def eigenvectors(y: Complex, forgetting: float) -> Complex:
@@ -213,7 +213,7 @@ def music_speed(n_snapshots: int = 50) -> None:
     spectra = np.zeros((15, n_fft // 2 + 1, n_snapshots), dtype=complex)
     bin_ = round(frequency * n_fft / rate)
     spectra[:, bin_] = y.T
-    scan = Scan(array, c / frequency, 361)
+    scan = SpectrumSearch(array, c / frequency, 361)
     tracker = MUSIC(model, n_sources=2)
     tracker.run(y)
 

@@ -61,7 +61,7 @@ def test_taken_name_is_an_error_and_no_overwrite(animals: Registry[Animal]) -> N
 
 @pytest.mark.parametrize("stranger", [int, Dog(), lambda: Dog()])
 def test_only_what_derives_from_the_base_enters(animals: Registry[Animal], stranger: Any) -> None:
-    with pytest.raises(TypeError, match="is no animal: derive it from Animal"):
+    with pytest.raises(TypeError, match="is not an animal: derive it from Animal"):
         animals.register("stranger")(stranger)
     assert animals.available() == ["dog"]
 
@@ -159,7 +159,7 @@ def test_foreign_thing_of_the_wrong_kind_is_refused(
     animals: Registry[Animal], foreign: list[EntryPoint]
 ) -> None:
     foreign.append(point("rock", "farm:Rock"))
-    with pytest.raises(TypeError, match=r"Rock.* is no animal: derive it from Animal"):
+    with pytest.raises(TypeError, match=r"Rock.* is not an animal: derive it from Animal"):
         animals.find("rock")
 
 
@@ -176,5 +176,5 @@ def test_a_tracker_that_cannot_be_imported_says_so(
     monkeypatch.setattr("arrivals.registry.entry_points", lambda group: [point])
     with pytest.raises(ValueError, match="tracker 'broken', no_such_package_here:Thing, cannot"):
         find("broken")
-    with pytest.raises(TypeError, match="named by a string; got 3"):
+    with pytest.raises(TypeError, match="name of a tracker must be a string; got 3"):
         find(3)  # type: ignore[arg-type]

@@ -90,17 +90,18 @@ class Tracker(Configurable, ABC):
         ValueError, TypeError
             If there is no such parameter or its value is refused; nothing has changed then.
         """
-        changed = self._changed(params)
+        changed = self.changed_params(params)
         checked = type(self)(**changed)
         for name in changed:
             setattr(self, name, getattr(checked, name))
         return self
 
     @classmethod
-    def _type_name(cls) -> str:
+    def type_name(cls) -> str:
+        """Return the registered name, or "module:Class" of a class that is not registered."""
         from arrivals.trackers.registry import TRACKERS
 
-        return TRACKERS.name_of(cls) or super()._type_name()
+        return TRACKERS.name_of(cls) or super().type_name()
 
 
 def is_missing(z: ArrayLike | None) -> bool:

@@ -1,10 +1,10 @@
-"""Trackers by name: ours, and those of other packages."""
+"""Registry of trackers, including those of other packages."""
 
 from arrivals.parameters import FINDERS
 from arrivals.registry import Registry
 from arrivals.trackers.base import Tracker
 
-TRACKERS: Registry[Tracker] = Registry(Tracker, "arrivals.trackers", "tracker")  # type: ignore[type-abstract]  # only its subclasses are made
+TRACKERS: Registry[Tracker] = Registry(Tracker, "arrivals.trackers", "tracker")  # type: ignore[type-abstract]  # only subclasses are instantiated
 FINDERS.append(TRACKERS.find)
 available, create, find, register = (
     TRACKERS.available,

@@ -99,7 +99,7 @@ class ElementResponse(FrozenModel):
 
     def to_dict(self) -> dict[str, object]:
         """Return the configuration, complex numbers as text."""
-        return {"type": self._type_name(), "gains": _texts(self.gains)}
+        return {"type": self.type_name(), "gains": _texts(self.gains)}
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, ElementResponse):

@@ -1,4 +1,4 @@
-"""Classes by name, those of other packages through entry points included."""
+"""Registry of named classes, including those of other packages through entry points."""
 
 from __future__ import annotations
 
@@ -7,22 +7,32 @@ from collections.abc import Callable
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Generic, TypeVar
 
+from arrivals.validation import with_article
+
 Base = TypeVar("Base")
 Kind = TypeVar("Kind", bound=type)
 
 
 class Registry(Generic[Base]):
-    """Classes by name, only ever added to.
+    """Named classes; entries are added, never removed or replaced.
 
     Parameters
     ----------
     base : type
-        What every entry derives from.
+        Base class of all entries.
     group : str
-        Group of entry points through which other packages add theirs; they are imported when
-        they are asked for.
+        Group of entry points of other packages; they are imported on demand.
     noun : str
-        What an entry is called in messages.
+        Noun for an entry in messages.
+
+    Examples
+    --------
+    >>> registry = Registry(dict, "example.group", "mapping")
+    >>> @registry.register("plain")
+    ... class Plain(dict):
+    ...     pass
+    >>> registry.available(), registry.create("plain", a=1)
+    (['plain'], {'a': 1})
     """
 
     def __init__(self, base: type[Base], group: str, noun: str) -> None:
@@ -30,20 +40,31 @@ class Registry(Generic[Base]):
         self._classes: dict[str, type[Base]] = {}
 
     def register(self, name: str) -> Callable[[Kind], Kind]:
-        """Return a class decorator that enters the class under a name.
+        """Return a class decorator that registers the class under a name.
+
+        Parameters
+        ----------
+        name : str
+            Name of the class.
+
+        Returns
+        -------
+        callable
+            Returns the class unchanged.
 
         Raises
         ------
         ValueError
-            If the name is taken.
+            If the name is registered for another class.
         TypeError
             If the class does not derive from the base.
         """
 
         def enter(kind: Kind) -> Kind:
-            fits = isinstance(kind, type) and issubclass(kind, self.base)
-            if not fits:
-                raise TypeError(f"{kind!r} is no {self.noun}: derive it from {self.base.__name__}")
+            is_subclass = isinstance(kind, type) and issubclass(kind, self.base)
+            if not is_subclass:
+                noun, base = with_article(self.noun), self.base.__name__
+                raise TypeError(f"{kind!r} is not {noun}: derive it from {base}")
             known = self._classes.get(name)
             if known not in (None, kind):
                 raise ValueError(
@@ -56,30 +77,46 @@ class Registry(Generic[Base]):
         return enter
 
     def _entry_points(self) -> dict[str, list[EntryPoint]]:
-        found: dict[str, list[EntryPoint]] = {}
+        by_name: dict[str, list[EntryPoint]] = {}
         for point in entry_points(group=self.group):
-            same = found.setdefault(point.name, [])
-            if point.value not in [other.value for other in same]:
-                same.append(point)
-        return found
+            points = by_name.setdefault(point.name, [])
+            if point.value not in [other.value for other in points]:
+                points.append(point)
+        return by_name
 
     def available(self) -> list[str]:
-        """Return the names of all, installed entry points included, in alphabetical order."""
+        """Return the names of all classes, including installed entry points, in alphabetical order.
+
+        Returns
+        -------
+        list of str
+            Names.
+        """
         return sorted({*self._classes, *self._entry_points()})
 
     def find(self, name: str) -> type[Base]:
-        """Return the class of that name, imported now if another package brings it.
+        """Return the class of a name; import it if it belongs to another package.
+
+        Parameters
+        ----------
+        name : str
+            Name of the class.
+
+        Returns
+        -------
+        type
+            The class.
 
         Raises
         ------
         ValueError
-            If there is none, with the names that come near; or if two packages claim the name.
+            If the name is unknown, with similar names; or if two packages claim it.
         """
         if not isinstance(name, str):
-            raise TypeError(f"a {self.noun} is named by a string; got {name!r}")
+            raise TypeError(f"name of {with_article(self.noun)} must be a string; got {name!r}")
         points = self._entry_points().get(name, [])
         ours = self._classes.get(name)
-        if ours is not None:  # a package may name its class by another path than the class does
+        if ours is not None:  # an entry point may name the same class by another path
             points = [point for point in points if self._load(point) is not ours]
         claims = [point.value for point in points]
         if ours is not None:
@@ -99,7 +136,7 @@ class Registry(Generic[Base]):
         raise ValueError(f"there is no {self.noun} {name!r}; {hint}")
 
     def _load(self, point: EntryPoint) -> type[Base]:
-        """Import what an entry point names; whatever goes wrong in it is somebody else's."""
+        """Import the class of an entry point; any error becomes a ValueError with its name."""
         try:
             loaded: type[Base] = point.load()
         except Exception as error:
@@ -109,9 +146,22 @@ class Registry(Generic[Base]):
         return loaded
 
     def create(self, name: str, **params: Any) -> Base:
-        """Make the one of that name from its constructor's arguments."""
+        """Make an object of the named class.
+
+        Parameters
+        ----------
+        name : str
+            Name of the class.
+        **params : object
+            Arguments of its constructor.
+
+        Returns
+        -------
+        object
+            The new object.
+        """
         return self.find(name)(**params)
 
     def name_of(self, kind: type) -> str | None:
-        """Return the name that a class is entered under, or None."""
+        """Return the registered name of a class, or None."""
         return next((name for name, known in self._classes.items() if known is kind), None)

@@ -1,4 +1,4 @@
-"""Checks of arguments; each says what was given and what is wanted."""
+"""Argument checks with uniform messages: "<argument> must be <wanted>; got <value>"."""
 
 import operator
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ def number(name: str, value: Any) -> float:
     if isinstance(value, bool | str | bytes) or not np.isscalar(value) or not np.isrealobj(value):
         raise TypeError(f"{name} must be a number; got {value!r}")
     try:
-        return float(value)  # type: ignore[arg-type]  # anything scalar that float() understands
+        return float(value)  # type: ignore[arg-type]  # any scalar with __float__
     except (TypeError, ValueError):
         raise TypeError(f"{name} must be a number; got {value!r}") from None
 
@@ -44,7 +44,7 @@ def positive(name: str, value: Any) -> float:
 
 
 def not_negative(name: str, value: Any) -> float:
-    """Return a finite number that is zero or above.
+    """Return a finite number that is zero or positive.
 
     Examples
     --------
@@ -58,7 +58,7 @@ def not_negative(name: str, value: Any) -> float:
 
 
 def probability(name: str, value: Any) -> float:
-    """Return a number in [0, 1].
+    """Return a number in the interval [0, 1].
 
     Examples
     --------
@@ -92,7 +92,7 @@ def count(name: str, value: Any, least: int = 1) -> int:
 
 
 def one_of(name: str, value: T, choices: tuple[T, ...]) -> T:
-    """Return a value that is among `choices`.
+    """Return a value that is one of `choices`.
 
     Examples
     --------
@@ -106,7 +106,7 @@ def one_of(name: str, value: T, choices: tuple[T, ...]) -> T:
 
 
 def instance(name: str, value: Any, kind: type[T]) -> T:
-    """Return a part that is of the wanted kind.
+    """Return a value that is an instance of a class.
 
     Examples
     --------
@@ -115,12 +115,19 @@ def instance(name: str, value: Any, kind: type[T]) -> T:
     TypeError: motion must be a str; got 3, an int
     """
     if not isinstance(value, kind):
-        wanted, given = _with_article(kind.__name__), _with_article(type(value).__name__)
-        raise TypeError(f"{name} must be {wanted}; got {value!r}, {given}")
+        expected, given = with_article(kind.__name__), with_article(type(value).__name__)
+        raise TypeError(f"{name} must be {expected}; got {value!r}, {given}")
     return value
 
 
-def _with_article(noun: str) -> str:
+def with_article(noun: str) -> str:
+    """Return a noun with its indefinite article.
+
+    Examples
+    --------
+    >>> with_article("animal"), with_article("tracker")
+    ('an animal', 'a tracker')
+    """
     return f"an {noun}" if noun[0].lower() in "aeiou" else f"a {noun}"
 
 
@@ -191,7 +198,7 @@ def entry_names(name: str, value: Sequence[str], n: int) -> tuple[str, ...]:
 
 
 def constant(name: str, value: ArrayLike) -> Float:
-    """Return a finite matrix as a copy that cannot be written to.
+    """Return a finite matrix as a read-only copy.
 
     Examples
     --------
@@ -209,7 +216,7 @@ def constant(name: str, value: ArrayLike) -> Float:
 
 
 def covariance(name: str, value: ArrayLike, n: int) -> Float:
-    """Return a finite symmetric (n, n) matrix without negative eigenvalues, up to rounding.
+    """Return a finite, symmetric, positive semidefinite (n, n) matrix, up to rounding.
 
     Examples
     --------
@@ -219,7 +226,7 @@ def covariance(name: str, value: ArrayLike, n: int) -> Float:
     """
     matrix = shaped(name, value, n, n)
     if (matrix == matrix.T).all() and _has_factor(matrix):
-        return matrix  # the usual case, in a third of the time of what follows
+        return matrix  # the usual case, three times faster than the general one
     size = np.abs(matrix).max()
     if not size < np.inf:
         raise ValueError(f"{name} must be finite; got {matrix.tolist()}")

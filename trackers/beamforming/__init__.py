@@ -1,1 +1,34 @@
-"""Beamformers."""
+"""Beamformers and the kernels of spatial spectra."""
+
+from arrivals.trackers.beamforming.cbf import CBF
+from arrivals.trackers.beamforming.covariance import (
+    RunningCovariance,
+    diagonal_loading,
+    spatial_smoothing,
+)
+from arrivals.trackers.beamforming.mvdr import MVDR, capon_power
+from arrivals.trackers.beamforming.spectrum import (
+    bartlett_power,
+    find_peaks,
+    mean_beam_power,
+    parabolic_peak,
+    refine_peaks,
+    scan_directions,
+    scan_steering_matrix,
+)
+
+__all__ = [
+    "CBF",
+    "MVDR",
+    "RunningCovariance",
+    "bartlett_power",
+    "capon_power",
+    "diagonal_loading",
+    "find_peaks",
+    "mean_beam_power",
+    "parabolic_peak",
+    "refine_peaks",
+    "scan_directions",
+    "scan_steering_matrix",
+    "spatial_smoothing",
+]

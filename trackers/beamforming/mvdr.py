@@ -1,4 +1,4 @@
-"""Capon's beamformer: minimum variance without distortion, on a running covariance."""
+"""Capon's minimum-variance distortionless beamformer on a running covariance."""
 
 from __future__ import annotations
 
@@ -7,28 +7,26 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.trackers.beamforming.cbf import CBF
-from arrivals.trackers.beamforming.covariance import RunningCovariance
+from arrivals.trackers.beamforming.covariance import RunningCovariance, diagonal_loading
 from arrivals.trackers.registry import register
 from arrivals.typing import Complex, Float
 from arrivals.validation import instance, positive, probability
 
 
-def loaded(R: Complex | Float, loading: float) -> Complex | Float:
-    """Return covariances (..., N, N) with `loading` times their mean power on the diagonal.
-
-    Examples
-    --------
-    >>> loaded(np.ones((2, 2)), 0.5)
-    array([[1.5, 1. ],
-           [1. , 1.5]])
-    """
-    n = R.shape[-1]
-    power = np.trace(R, axis1=-2, axis2=-1).real / n
-    return np.asarray(R + loading * power[..., None, None] * np.eye(n))
-
-
 def capon_power(A: Complex, R: Complex) -> Float:
-    """Return 1 / aᴴR⁻¹a of steering vectors A, (n_directions, n_sensors).
+    """Return Capon's spectrum 1 / aᴴR⁻¹a.
+
+    Parameters
+    ----------
+    A : ndarray, shape (n_directions, n_sensors)
+        Rows a(β).
+    R : ndarray, shape (n_sensors, n_sensors)
+        Covariance, not singular.
+
+    Returns
+    -------
+    ndarray, shape (n_directions,)
+        A plane wave of amplitude w without noise has |w|² in its direction.
 
     References
     ----------
@@ -45,32 +43,37 @@ def capon_power(A: Complex, R: Complex) -> Float:
 
 @register("mvdr")
 class MVDR(RunningCovariance, CBF):
-    """Peaks of Capon's spectrum, of a covariance that forgets.
+    """Peaks of Capon's spectrum of a covariance with exponential forgetting.
 
     Parameters
     ----------
     measurement : ArraySnapshot
-        Any array of isotropic sensors, one look a step; its noise is not used.
+        Any array of isotropic sensors, one bin and one snapshot per step; its noise is not used.
     loading : float
-        Added to the diagonal of the covariance, in mean powers of a sensor.
+        Added to the diagonal of the covariance, relative to the mean power of a sensor.
     forgetting : float
-        Weight that the past keeps from step to step; the covariance is that of the last
-        1 / (1 - forgetting) snapshots or so.
-    n_directions, threshold_db, max_sources
-        As in `CBF`.
+        Weight of the past after one unit of time; the covariance averages about
+        1 / (1 - forgetting) snapshots.
+    n_directions : int
+        Scan directions: over ±90° for a line (361: every half degree), else over the circle.
+    threshold_db : float
+        Peaks more than this below the highest are not reported, dB.
+    max_sources : int, optional
+        Maximum number of peaks; the number of sensors if None.
 
     Attributes
     ----------
     covariance : ndarray, shape (n_sensors, n_sensors)
         Weighted sum of the snapshots' outer products.
-    doa_grid, power
-        As in `CBF`; `power` is Capon's, of a wave of amplitude w nearly |w|².
+    doa_grid, power : ndarray, shape (n_directions,)
+        Scan directions, rad, and Capon's spectrum of the last step, NaN before the first; a wave
+        of amplitude w has nearly |w|².
 
     Notes
     -----
-    Labels are -1, `std` and `existence` NaN. The refined peak is what has a variance: the zero
-    variance that the paper found is that of peaks on a grid that held the truth. Each pair of
-    sensors is averaged over the snapshots in which both were heard.
+    Labels are -1, `std` and `existence` NaN. The refined peak has a variance above zero; the zero
+    variance of the paper is that of peaks on a grid that contained the true directions. Each pair
+    of sensors is averaged over the snapshots in which both have valid data.
 
     References
     ----------
@@ -98,7 +101,6 @@ class MVDR(RunningCovariance, CBF):
         self.loading = positive("loading", loading)
         self.forgetting = probability("forgetting", forgetting)
         instance("measurement", measurement, ArraySnapshot).plain_wavelength("mvdr")
-        self._know_nothing(measurement.array.n_sensors)
         super().__init__(
             measurement,
             n_directions=n_directions,
@@ -106,25 +108,31 @@ class MVDR(RunningCovariance, CBF):
             max_sources=max_sources,
         )
 
+    def reset(self) -> None:
+        """Return to the state after construction: no snapshot, no direction."""
+        self.reset_covariance(self.measurement.array.n_sensors)
+        super().reset()
+
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
-        """Let the past fade; report nothing until something is heard."""
+        """Apply forgetting; report no direction until the next measurement."""
         super().predict(u, dt=dt)
-        self._fade(dt)
+        self.apply_forgetting(dt)
 
     def spectrum(self, A: Complex, z: Complex) -> Float:
         """Add a snapshot to the covariance, and return Capon's spectrum."""
-        self._add(z)
+        self.add_snapshot(z)
         if not self.covariance.any():
             return np.zeros(len(A))
-        return capon_power(A, self._loaded())
+        return capon_power(A, self._loaded_covariance())
 
-    def beam(self, A: Complex, z: Complex) -> Complex:
-        """Return wᴴz, w = R⁻¹a / aᴴR⁻¹a over the sensors that were heard."""
+    def amplitudes(self, A: Complex, z: Complex) -> Complex:
+        """Return wᴴz, w = R⁻¹a / aᴴR⁻¹a over the sensors with valid data."""
         if len(A) == 0:
             return np.zeros(0, dtype=np.complex128)
-        heard = ~np.isnan(z)
-        R, A = self._loaded()[np.ix_(heard, heard)], A[:, heard]
-        return np.asarray(A.conj() @ np.linalg.solve(R, z[heard]) * capon_power(A, R))
+        valid = ~np.isnan(z)
+        R, A = self._loaded_covariance()[np.ix_(valid, valid)], A[:, valid]
+        return np.asarray(A.conj() @ np.linalg.solve(R, z[valid]) * capon_power(A, R))
 
-    def _loaded(self) -> Complex:
-        return np.asarray(loaded(self._mean(), self.loading), dtype=np.complex128)
+    def _loaded_covariance(self) -> Complex:
+        R = diagonal_loading(self.mean_covariance(), self.loading)
+        return np.asarray(R, dtype=np.complex128)

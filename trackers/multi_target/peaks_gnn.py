@@ -1,9 +1,10 @@
-"""Peaks of a spectrum, joined to tracks by a bank of Kalman filters: what one would write today."""
+"""Peak detection with global nearest-neighbour association and a bank of Kalman filters."""
 
 from __future__ import annotations
 
 import copy
 import inspect
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,38 +24,38 @@ from arrivals.validation import count, instance, not_negative, positive
 
 @register("peaks_gnn")
 class PeaksGNN(DirectionTracker):
-    """Peaks, frame by frame, and a global nearest-neighbour bank of Kalman filters behind them.
+    """Peak detection, global nearest-neighbour association and a bank of Kalman filters.
 
     Parameters
     ----------
     measurement : ArraySnapshot
         Any array.
     detector : str or Tracker
-        What finds directions in a snapshot: a registered tracker that a measurement alone makes
-        ("cbf", "mvdr", "music", "sbl"), or one with settings of its own.
-    walk : MotionModel
-        How a direction moves, linear; its entry 0 is the direction, rad.
+        Method that detects directions in a snapshot: a registered tracker whose only required
+        argument is a measurement ("cbf", "mvdr", "music", "sbl"), or an instance with settings.
+    motion : MotionModel
+        Linear motion of a direction; entry 0 of its state is the direction, rad.
     std : float
         Standard deviation of a detected direction, rad.
     speed_std : float
-        Of the other entries of a new track, rad per unit of time.
+        Standard deviation of the other entries of a new track, rad per unit of time.
     gate : float
-        Standard deviations beyond which a detection belongs to no track.
-    confirm : int
-        Detections in a row that a new track wants before it is reported.
+        Maximum distance of a detection from its track, in standard deviations.
+    confirm_steps : int
+        Consecutive detections after which a new track is reported.
     patience : int
-        Steps without a detection that a reported track survives.
+        Maximum number of steps without a detection before a reported track ends.
     max_sources : int, optional
-        Tracks at most, reported or not; twice as many as there are sensors if None.
+        Maximum number of tracks, reported or not; twice the number of sensors if None.
 
     Attributes
     ----------
-    bank : Bank
+    bank : TrackBank
         The tracks.
-    scan : Tracker
-        The detector at work.
+    active_detector : Tracker
+        The detector and its state.
     x, P : ndarray, shapes (n_slots,), (n_slots, n_slots)
-        The directions reported, rad, NaN in unused places, and their variances on a diagonal.
+        Reported directions, rad, NaN in unused slots, and their variances on a diagonal.
 
     Notes
     -----
@@ -74,110 +75,119 @@ class PeaksGNN(DirectionTracker):
     (array([ nan, 0.51, 0.51]), array([-1,  0,  0]))
     """
 
+    renamed: ClassVar[dict[str, str]] = {"walk": "motion", "confirm": "confirm_steps"}
+
     def __init__(
         self,
         measurement: ArraySnapshot,
         *,
         detector: str | Tracker = "cbf",
-        walk: MotionModel = ConstantVelocity(q=1e-5, n_dims=1),  # noqa: B008  (models are immutable)
+        motion: MotionModel = ConstantVelocity(q=1e-5, n_dims=1),  # noqa: B008  (models are immutable)
         std: float = np.deg2rad(3.0),
         speed_std: float = np.deg2rad(1.0),
         gate: float = 3.0,
-        confirm: int = 2,
+        confirm_steps: int = 2,
         patience: int = 4,
         max_sources: int | None = None,
     ) -> None:
         self.measurement = instance("measurement", measurement, ArraySnapshot)
         self.detector = detector
-        self.walk = instance("walk", walk, MotionModel)  # type: ignore[type-abstract]  # any
+        self.motion = instance("motion", motion, MotionModel)  # type: ignore[type-abstract]  # any
         self.std, self.speed_std = positive("std", std), positive("speed_std", speed_std)
         self.gate = positive("gate", gate)
-        self.confirm, self.patience = count("confirm", confirm), count("patience", patience, 0)
+        self.confirm_steps = count("confirm_steps", confirm_steps)
+        self.patience = count("patience", patience, 0)
         self.max_sources = max_sources
         if max_sources is not None:
             count("max_sources", max_sources)
-        self.scan = self._fresh_scan()
-        self.bank = TrackBank.empty(self.n_slots, walk.dim_x)
-        self._report(np.full(self.n_slots, complex(np.nan, np.nan)))
+        self.reset()
+
+    def reset(self) -> None:
+        """Return to the state after construction: no track, the detector as it was given."""
+        self.active_detector = self._new_detector()
+        self.bank = TrackBank.empty(self.n_slots, self.motion.dim_x)
+        self._report_confirmed(self._no_amplitude())
 
     @property
     def n_slots(self) -> int:
-        """Number of tracks that there may be at once."""
+        """Maximum number of tracks."""
         return self.max_sources or 2 * self.measurement.array.n_sensors
 
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
-        """Move the tracks."""
+        """Predict the tracks, and end those that leave a line's ±90°."""
         not_negative("dt", dt)
-        self._settle()
-        self.scan.predict(dt=dt)
-        self.bank = self.bank.predicted(self.walk, dt)
-        self.bank = self.bank.without(self.bank.used & self._outside(self.bank.mean[:, 0]))
-        self._report(np.full(self.n_slots, complex(np.nan, np.nan)))
+        self._apply_changed_parameters()
+        self.active_detector.predict(dt=dt)
+        bank = self.bank.predict(self.motion, dt)
+        self.bank = bank.remove(bank.used & self._is_outside(bank.mean[:, 0]))
+        self._report_confirmed(self._no_amplitude())
 
     def update(self, z: ArrayLike | None) -> None:
-        """Find peaks, give each to the nearest track, start tracks with what is left."""
+        """Detect peaks, assign them to tracks, and initiate tracks from the others."""
         if is_missing(z):
             return
-        self._settle()
-        self.scan.update(z)
-        found = instance("detector's estimate", self.scan.estimate, DirectionEstimate)
+        self._apply_changed_parameters()
+        self.active_detector.update(z)
+        detected = instance("detector's estimate", self.active_detector.estimate, DirectionEstimate)
         bank, tracks = self.bank, np.flatnonzero(self.bank.used)
-        residual = self._difference(found.doa, bank.mean[tracks, :1])
-        S = bank.covariance[tracks, 0, 0] + self.std**2
+        residual = self._difference(detected.doa, bank.mean[tracks, :1])
+        S = bank.covariance[tracks, 0, 0] + self.std**2  # S = H P H' + R
         pair, detection = nearest(residual, S, self.gate)
-        bank = bank.corrected(tracks[pair], residual[pair, detection], self.std**2)
-        bank = bank.without(bank.misses > np.where(bank.hits < self.confirm, 0, self.patience))
-        amplitude = np.full(self.n_slots, complex(np.nan, np.nan))
-        amplitude[tracks[pair]] = found.amplitude[detection]
-        free = np.delete(np.arange(found.n_found), detection)
-        older = bank.used
-        self.bank = bank.with_births(found.doa[free], self._new_covariance())
-        born = self.bank.used & ~older
-        amplitude[born] = found.amplitude[free][: born.sum()]
-        self._report(amplitude)
+        bank = bank.update(tracks[pair], residual[pair, detection], self.std**2)
+        allowed_misses = np.where(bank.hits < self.confirm_steps, 0, self.patience)
+        bank = bank.remove(bank.misses > allowed_misses)
+        amplitude = self._no_amplitude()
+        amplitude[tracks[pair]] = detected.amplitude[detection]
+        unassigned = np.delete(np.arange(detected.n_found), detection)
+        self.bank = bank.add(detected.doa[unassigned], self._initial_covariance())
+        is_new = self.bank.used & ~bank.used
+        amplitude[is_new] = detected.amplitude[unassigned][: is_new.sum()]
+        self._report_confirmed(amplitude)
 
-    def _settle(self) -> None:
-        """Begin anew with what depends on parameters that were changed."""
-        if self._made_for != (self.detector, self.measurement):
-            self.scan = self._fresh_scan()
-        if self.bank.mean.shape != (self.n_slots, self.walk.dim_x):
-            self.bank = TrackBank.empty(self.n_slots, self.walk.dim_x)
+    def _apply_changed_parameters(self) -> None:
+        """Reset the parts that depend on parameters that `set_params` changed."""
+        if self._detector_parameters != (self.detector, self.measurement):
+            self.active_detector = self._new_detector()
+        if self.bank.mean.shape != (self.n_slots, self.motion.dim_x):
+            self.bank = TrackBank.empty(self.n_slots, self.motion.dim_x)
 
-    def _fresh_scan(self) -> Tracker:
-        self._made_for = (self.detector, self.measurement)
+    def _new_detector(self) -> Tracker:
+        self._detector_parameters = (self.detector, self.measurement)
         if isinstance(self.detector, Tracker):
             return copy.deepcopy(self.detector)
         kind = find(self.detector)
-        needs = [name for name, p in inspect.signature(kind).parameters.items()
-                 if p.default is p.empty]  # fmt: skip
-        if needs != ["measurement"]:
+        required = [name for name, p in inspect.signature(kind).parameters.items()
+                    if p.default is p.empty]  # fmt: skip
+        if required != ["measurement"]:
             raise ValueError(
-                f"the detector must be made from a measurement alone; {self.detector!r} is made "
-                f"from {', '.join(needs)}"
+                f"detector must require no argument but measurement; {self.detector!r} requires "
+                f"{', '.join(required)}"
             )
-        return kind(measurement=self.measurement)  # type: ignore[call-arg]  # looked at above
+        return kind(measurement=self.measurement)  # type: ignore[call-arg]  # checked above
+
+    def _no_amplitude(self) -> Complex:
+        return np.full(self.n_slots, complex(np.nan, np.nan))
 
     def _difference(self, doa: Float, mean: Float) -> Float:
         return wrap(doa - mean) if self.measurement.array.dim > 1 else doa - mean
 
-    def _outside(self, doa: Float) -> Bool:
+    def _is_outside(self, doa: Float) -> Bool:
         line = self.measurement.array.dim == 1
         return np.asarray(line & (np.abs(doa) > np.pi / 2))
 
-    def _new_covariance(self) -> Float:
-        variances = np.full(self.walk.dim_x, self.speed_std**2)
+    def _initial_covariance(self) -> Float:
+        variances = np.full(self.motion.dim_x, self.speed_std**2)
         variances[0] = self.std**2
         return np.diag(variances)
 
-    def _report(self, amplitude: Complex) -> None:
-        """Report the tracks that were confirmed."""
+    def _report_confirmed(self, amplitude: Complex) -> None:
+        """Report the confirmed tracks."""
         bank = self.bank
-        on = bank.used & (bank.hits >= self.confirm)
-        doa = bank.mean[on, 0]
+        confirmed = bank.used & (bank.hits >= self.confirm_steps)
+        doa = bank.mean[confirmed, 0]
         self.report(
-            doa=wrap(doa) if self.measurement.array.dim > 1 else doa,
-            std=np.sqrt(bank.covariance[on, 0, 0]),
-            existence=np.full(on.sum(), np.nan),
-            amplitude=amplitude[on],
-            label=bank.label[on],
+            wrap(doa) if self.measurement.array.dim > 1 else doa,
+            np.sqrt(bank.covariance[confirmed, 0, 0]),
+            amplitude=amplitude[confirmed],
+            label=bank.label[confirmed],
         )

@@ -1,4 +1,4 @@
-"""A bank of Kalman filters, one a track, as arrays: births, deaths and nearest neighbours."""
+"""Bank of Kalman filters as arrays, and gated nearest-neighbour assignment."""
 
 from __future__ import annotations
 
@@ -14,19 +14,22 @@ from arrivals.typing import Bool, Float, Int
 
 @dataclass(frozen=True, eq=False)
 class TrackBank:
-    """Tracks in places of which some are free.
+    """Tracks in slots, some of which are free.
 
     Parameters
     ----------
-    mean : ndarray, shape (n_places, n)
-        What is measured is entry 0. NaN in free places.
-    covariance : ndarray, shape (n_places, n, n)
-    label : ndarray of int, shape (n_places,)
-        -1 in free places.
-    hits, misses : ndarray of int, shape (n_places,)
-        Measurements that a track had, and steps since the last.
+    mean : ndarray, shape (n_slots, n)
+        State; entry 0 is measured. NaN in free slots.
+    covariance : ndarray, shape (n_slots, n, n)
+        Covariance of the state; 0 in free slots.
+    label : ndarray of int, shape (n_slots,)
+        -1 in free slots.
+    hits : ndarray of int, shape (n_slots,)
+        Number of assigned measurements.
+    misses : ndarray of int, shape (n_slots,)
+        Number of steps since the last measurement.
     n_labels : int
-        Labels given so far.
+        Number of labels assigned so far.
     """
 
     mean: Float
@@ -37,65 +40,69 @@ class TrackBank:
     n_labels: int = 0
 
     @classmethod
-    def empty(cls, n_places: int, n: int) -> TrackBank:
+    def empty(cls, n_slots: int, n: int) -> TrackBank:
         """Return a bank without tracks."""
-        none, zero = np.full(n_places, -1), np.zeros(n_places, dtype=np.int64)
-        return cls(np.full((n_places, n), np.nan), np.zeros((n_places, n, n)), none, zero, zero)
+        none, zero = np.full(n_slots, -1), np.zeros(n_slots, dtype=np.int64)
+        return cls(np.full((n_slots, n), np.nan), np.zeros((n_slots, n, n)), none, zero, zero)
 
     @property
     def used(self) -> Bool:
-        """Which places hold a track."""
+        """Mask of the slots that hold a track."""
         return np.asarray(self.label >= 0)
 
-    def predicted(self, motion: MotionModel, dt: float) -> TrackBank:
-        """Return the bank after a step of the motion, which is linear."""
-        F, on = motion.F(np.zeros(motion.dim_x), dt), self.used
-        P = predict_gaussian(self.covariance[on], F, motion.Q(dt))
-        return self._with(on, mean=self.mean[on] @ F.T, covariance=P)
+    def predict(self, motion: MotionModel, dt: float) -> TrackBank:
+        """Return the bank after a step of a linear motion."""
+        F, used = motion.F(np.zeros(motion.dim_x), dt), self.used
+        P = predict_gaussian(self.covariance[used], F, motion.Q(dt))
+        return self._replace_slots(used, mean=self.mean[used] @ F.T, covariance=P)
 
-    def corrected(self, place: Int, residual: Float, variance: float) -> TrackBank:
-        """Return the bank in which some tracks had a measurement, and the others had none."""
+    def update(self, slots: Int, residual: Float, variance: float) -> TrackBank:
+        """Return the bank after a measurement of some tracks and a miss of all others."""
         H, R = np.eye(1, self.mean.shape[1]), np.full((1, 1), variance)
-        found = update_gaussian(self.mean[place], self.covariance[place], residual[:, None], H, R)
+        updated = update_gaussian(self.mean[slots], self.covariance[slots], residual[:, None], H, R)
         missed = replace(self, misses=self.misses + self.used)
-        return missed._with(
-            place, mean=found.x, covariance=found.P, hits=self.hits[place] + 1, misses=0
+        return missed._replace_slots(
+            slots, mean=updated.x, covariance=updated.P, hits=self.hits[slots] + 1, misses=0
         )
 
-    def with_births(self, z: Float, covariance: Float) -> TrackBank:
-        """Return the bank with a new track for each measurement, as long as there are places."""
+    def add(self, z: Float, covariance: Float) -> TrackBank:
+        """Return the bank with a new track for each measurement, while slots are free."""
         free = np.flatnonzero(~self.used)[: len(z)]
         mean = np.zeros((len(free), self.mean.shape[1]))
         mean[:, 0] = z[: len(free)]
         label = self.n_labels + np.arange(len(free))
-        born = self._with(free, mean=mean, covariance=covariance, label=label, hits=1, misses=0)
-        return replace(born, n_labels=self.n_labels + len(free))
+        bank = self._replace_slots(
+            free, mean=mean, covariance=covariance, label=label, hits=1, misses=0
+        )
+        return replace(bank, n_labels=self.n_labels + len(free))
 
-    def without(self, gone: Bool) -> TrackBank:
-        """Return the bank less some tracks."""
-        return self._with(gone, mean=np.nan, covariance=0.0, label=-1, hits=0, misses=0)
+    def remove(self, slots: Bool) -> TrackBank:
+        """Return the bank without some tracks."""
+        return self._replace_slots(slots, mean=np.nan, covariance=0.0, label=-1, hits=0, misses=0)
 
-    def _with(self, place: Int | Bool, **changes: Any) -> TrackBank:
+    def _replace_slots(self, slots: Int | Bool, **changes: Any) -> TrackBank:
         arrays = {name: getattr(self, name).copy() for name in changes}
         for name, values in changes.items():
-            arrays[name][place] = values
+            arrays[name][slots] = values
         return replace(self, **arrays)
 
 
 def nearest(residual: Float, variance: Float, gate: float) -> tuple[Int, Int]:
-    """Assign measurements to tracks: most of those within the gate, then the nearest.
+    """Assign measurements to tracks: first the most pairs within the gate, then the nearest.
 
     Parameters
     ----------
     residual : ndarray, shape (n_tracks, n_measurements)
+        Measurements minus predictions.
     variance : ndarray, shape (n_tracks,)
-        Of the residuals.
+        Variance of the residuals.
     gate : float
-        Standard deviations beyond which nothing is assigned.
+        Maximum distance of a pair, in standard deviations.
 
     Returns
     -------
     track, measurement : ndarray of int, shape (n_pairs,)
+        Indices of the pairs.
 
     References
     ----------
@@ -108,9 +115,9 @@ def nearest(residual: Float, variance: Float, gate: float) -> tuple[Int, Int]:
     """
     from scipy.optimize import linear_sum_assignment
 
-    square = residual**2 / variance[:, None]
-    within = square <= gate**2
-    outside = gate**2 * (1 + min(square.shape))  # no assignment gains by leaving the gate
-    track, measurement = linear_sum_assignment(np.where(within, square, outside))
-    kept = within[track, measurement]
-    return track[kept], measurement[kept]
+    distance = residual**2 / variance[:, None]
+    is_within = distance <= gate**2
+    outside = gate**2 * (1 + min(distance.shape))  # above the cost of all pairs within the gate
+    track, measurement = linear_sum_assignment(np.where(is_within, distance, outside))
+    is_pair = is_within[track, measurement]
+    return track[is_pair], measurement[is_pair]

@@ -1,63 +1,73 @@
-"""Sparse Bayesian learning on a grid, step by step."""
+"""Sparse Bayesian learning on a scan grid, each step on its own."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.trackers.base import is_missing
-from arrivals.trackers.beamforming.cbf import look_directions
+from arrivals.trackers.beamforming.spectrum import scan_directions
 from arrivals.trackers.direction_tracker import BatchDirectionTracker
 from arrivals.trackers.registry import register
-from arrivals.trackers.sparse_bayes.fixed_point import Powers, SparseBayes, highest
+from arrivals.trackers.sparse_bayes.fixed_point import (
+    FixedPointSolver,
+    PowerEstimate,
+    highest_peaks,
+)
 from arrivals.typing import Bool, Complex, Float
 from arrivals.validation import count, instance, not_negative, positive, probability
 
-Heard = tuple[Complex, Bool]
+
+class ValidSnapshots(NamedTuple):
+    """Snapshots Y, (n_valid, n_snapshots), of the valid sensors, and their mask (n_sensors,)."""
+
+    Y: Complex
+    valid_sensors: Bool
 
 
 @register("sbl")
 class SBL(BatchDirectionTracker):
-    """Sparse Bayesian learning: the peaks of a sparse power spectrum, every step on its own.
+    """Sparse Bayesian learning: peaks of a sparse power spectrum, each step on its own.
 
     Parameters
     ----------
     measurement : ArraySnapshot
-        Any array; its noise is not used: the method estimates it.
+        Any array; its noise is not used, since the method estimates it.
     n_directions : int
-        Grid: over ±90° for a line (361: every half degree), else over the circle.
+        Scan grid: over ±90° for a line (361: every half degree), else over the circle.
     threshold : float
-        Peaks below this share of the highest are not reported.
-    start_power, start_noise : float
-        Where the powers and the noise start. They are absolute: unlike `VALSE`, the method is not
-        quite indifferent to the scale of the snapshots.
-    tolerance : float
-        Relative change of the powers at which the iteration rests.
-    max_iterations : int
+        Peaks below this fraction of the highest are not reported.
+    initial_power : float
+        Initial powers. Initial values are absolute: unlike those of `VALSE`, the results depend
+        slightly on the scale of the snapshots.
+    initial_noise : float
+        Initial noise variance.
     max_sources : int, optional
-        Peaks at most; as many as there are sensors if None.
+        Maximum number of peaks; the number of sensors if None.
+    solver : FixedPointSolver
+        The iteration: its tolerance and limits.
 
     Attributes
     ----------
     doa_grid, gamma : ndarray, shape (n_directions,)
-        Grid, rad, and the powers of the last step heard; NaN before there was one.
+        Scan grid, rad, and the powers of the last step with data; NaN before the first.
     start : ndarray, shape (n_directions,)
-        Where the powers of the next update start.
+        Initial powers of the next update.
     noise : float
-        Estimated variance of the noise of one sensor.
+        Estimated noise variance of one sensor.
     x, P : ndarray, shapes (n_slots,), (n_slots, n_slots)
-        The directions found, rad, NaN in unused places; zeros: they have no variances.
+        Reported directions, rad, NaN in unused slots; zeros: they have no variances.
 
     Notes
     -----
-    A step is one snapshot (n_sensors,), or several (n_snapshots, n_sensors) that share their
+    A step is one snapshot (n_sensors,), or several (n_snapshots, n_sensors) with the same
     directions. Sensors that are NaN in one of them are left out of the step. Directions are grid
-    points; `std` and `existence` are NaN, labels -1. Amplitudes are those of the plane waves of
-    the peaks that fit the last snapshot of the step best, in least squares.
+    points; `std` and `existence` are NaN, labels -1. Amplitudes are the least-squares fit of the
+    plane waves of the peaks to the last snapshot of the step.
 
     References
     ----------
@@ -75,118 +85,122 @@ class SBL(BatchDirectionTracker):
     array([-20. ,  30.5])
     """
 
+    renamed: ClassVar[dict[str, str]] = {
+        "start_power": "initial_power",
+        "start_noise": "initial_noise",
+        "tolerance": "solver__tolerance",
+        "max_iterations": "solver__max_iterations",
+    }
+
     def __init__(
         self,
         measurement: ArraySnapshot,
         *,
         n_directions: int = 361,
         threshold: float = 0.01,
-        start_power: float = 1.0,
-        start_noise: float = 0.1,
-        tolerance: float = 1e-3,
-        max_iterations: int = 1000,
+        initial_power: float = 1.0,
+        initial_noise: float = 0.1,
         max_sources: int | None = None,
+        solver: FixedPointSolver = FixedPointSolver(),  # noqa: B008  (models are immutable)
     ) -> None:
         self.measurement = instance("measurement", measurement, ArraySnapshot)
         measurement.plain_wavelength("sbl")
         self.n_directions = count("n_directions", n_directions, least=3)
         self.threshold = probability("threshold", threshold)
-        self.start_power = positive("start_power", start_power)
-        self.start_noise = positive("start_noise", start_noise)
-        self.tolerance = positive("tolerance", tolerance)
-        self.max_iterations = count("max_iterations", max_iterations)
+        self.initial_power = positive("initial_power", initial_power)
+        self.initial_noise = positive("initial_noise", initial_noise)
         self.max_sources = max_sources
         if max_sources is not None:
             count("max_sources", max_sources)
-        self.doa_grid = look_directions(measurement.array, n_directions)
-        self.gamma = np.full(n_directions, np.nan)
+        self.solver = instance("solver", solver, FixedPointSolver)
+        self.reset()
+
+    def reset(self) -> None:
+        """Return to the state after construction: no powers, no direction."""
+        self.doa_grid = scan_directions(self.measurement.array, self.n_directions)
+        self.gamma = np.full(self.n_directions, np.nan)
         self.predict()
 
     @property
     def n_slots(self) -> int:
-        """Number of peaks that may be reported at once."""
+        """Maximum number of reported peaks."""
         return self.max_sources or self.measurement.array.n_sensors
 
     @property
     def circular(self) -> bool:
-        """Whether the first direction of the grid follows the last."""
+        """True if the first direction of the grid follows the last."""
         return self.measurement.array.dim > 1
 
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
-        """Set where the powers start; report nothing until something is heard."""
+        """Set the initial powers; report no direction until the next measurement."""
         not_negative("dt", dt)
         self.start = self.next_start()
         self.report([])
 
     def next_start(self) -> Float:
-        """Return where the powers of the next update start: all alike."""
-        return np.full(self.n_directions, self.start_power)
+        """Return the initial powers of the next update, (n_directions,)."""
+        return np.full(self.n_directions, self.initial_power)
 
     def update(self, z: ArrayLike | None) -> None:
-        """Fit one snapshot, (n_sensors,), or several that share their directions, one a row."""
-        heard = None if is_missing(z) else self._heard(np.asarray(z))
-        if heard is not None:
-            Y, sensors = heard
-            self._take(self._fit(Y[None], sensors, self._from()[None]), 0, heard)
+        """Fit one snapshot, (n_sensors,), or several with the same directions, one a row."""
+        block = self._valid_snapshots(z)
+        if block is None:
+            return
+        powers = self._solve(block.Y[None], block.valid_sensors, self._start_on_grid()[None])
+        self._report_peaks(powers, 0, block)
 
     def step_batch(self, trackers: Sequence[Self], step: Sequence[Any], dt: float) -> None:
-        """Fit, as one batch each, the steps in which the same sensors gave as many snapshots."""
-        groups: dict[tuple[int, bytes], list[tuple[Self, Heard]]] = {}
+        """Fit the steps with the same valid sensors and number of snapshots as one batch."""
+        groups: dict[tuple[int, bytes], list[tuple[Self, ValidSnapshots]]] = {}
         for tracker, z in zip(trackers, step, strict=True):
             tracker.predict(dt=dt)
-            heard = None if is_missing(z) else tracker._heard(np.asarray(z))
-            if heard is not None:
-                key = heard[0].shape[1], heard[1].tobytes()
-                groups.setdefault(key, []).append((tracker, heard))
+            block = tracker._valid_snapshots(z)
+            if block is not None:
+                key = block.Y.shape[1], block.valid_sensors.tobytes()
+                groups.setdefault(key, []).append((tracker, block))
         for group in groups.values():
-            Y = np.stack([heard[0] for _, heard in group])
-            starts = np.stack([tracker._from() for tracker, _ in group])
-            powers = self._fit(Y, group[0][1][1], starts)
-            for n, (tracker, heard) in enumerate(group):
-                tracker._take(powers, n, heard)
+            Y = np.stack([block.Y for _, block in group])
+            starts = np.stack([tracker._start_on_grid() for tracker, _ in group])
+            powers = self._solve(Y, group[0][1].valid_sensors, starts)
+            for index, (tracker, block) in enumerate(group):
+                tracker._report_peaks(powers, index, block)
 
-    def _heard(self, z: Complex) -> Heard | None:
-        """Return the snapshots (n_sensors, n_snapshots) of the sensors heard; None for silence."""
-        if z.ndim == 2 and z.dtype.kind in "fc":
-            z = z[~np.isnan(z).all(axis=1)]
-        rows = z if z.ndim == 2 else z[None]
+    def _valid_snapshots(self, z: ArrayLike | None) -> ValidSnapshots | None:
+        """Return the snapshots of the sensors with valid data; None if missing or zero."""
+        if is_missing(z):
+            return None
+        array = np.asarray(z)
+        if array.ndim == 2 and array.dtype.kind in "fc":
+            array = array[~np.isnan(array).all(axis=1)]
+        rows = array if array.ndim == 2 else array[None]
         Y = np.stack([self.measurement.snapshot(row) for row in rows], axis=1)
-        sensors: Bool = np.asarray(~np.isnan(Y).any(axis=1))
-        return (Y[sensors], sensors) if sensors.sum() > 1 and Y[sensors].any() else None
+        valid: Bool = np.asarray(~np.isnan(Y).any(axis=1))
+        return ValidSnapshots(Y[valid], valid) if valid.sum() > 1 and Y[valid].any() else None
 
-    def _from(self) -> Float:
+    def _start_on_grid(self) -> Float:
+        """Return `start`, or equal powers if the number of directions was changed."""
         fits = self.start.shape == (self.n_directions,)
-        return self.start if fits else np.full(self.n_directions, self.start_power)
+        return self.start if fits else np.full(self.n_directions, self.initial_power)
 
-    def _waves(self, doa: Float, sensors: Bool) -> Complex:
-        return self.measurement.steering_vector(doa)[:, sensors]
+    def _steering_matrix(self, doa: Float, valid_sensors: Bool) -> Complex:
+        return self.measurement.steering_vector(doa)[:, valid_sensors]
 
-    def _fit(self, Y: Complex, sensors: Bool, start: Float) -> Powers:
-        grid = look_directions(self.measurement.array, self.n_directions)
-        A = self._waves(grid, sensors) / np.sqrt(sensors.sum())
-        rule = SparseBayes(
-            tolerance=self.tolerance, max_iterations=self.max_iterations, circular=self.circular
-        )
-        return rule.fit(A, Y, start, self.start_noise)
+    def _solve(self, Y: Complex, valid_sensors: Bool, start: Float) -> PowerEstimate:
+        grid = scan_directions(self.measurement.array, self.n_directions)
+        A = self._steering_matrix(grid, valid_sensors) / np.sqrt(valid_sensors.sum())
+        return self.solver.solve(A, Y, start, self.initial_noise, circular=self.circular)
 
-    def _take(self, powers: Powers, n: int, heard: Heard) -> None:
-        """Report the peaks of the nth fit."""
-        gamma = powers.gamma[n]
-        grid = look_directions(self.measurement.array, self.n_directions)
-        top, there = highest(gamma, min(self.n_slots, len(grid)), self.circular)
-        top = top[there & (gamma[top] > self.threshold * gamma[top[0]])]
-        nan = np.full(len(top), np.nan)
-        self.doa_grid, self.gamma = grid, gamma
+    def _report_peaks(self, powers: PowerEstimate, index: int, block: ValidSnapshots) -> None:
+        """Report the peaks of one solution of a batch."""
+        self.gamma = gamma = powers.gamma[index]
+        self.doa_grid = grid = scan_directions(self.measurement.array, self.n_directions)
+        peaks, exists = highest_peaks(gamma, min(self.n_slots, len(grid)), self.circular)
+        doa = grid[peaks[exists & (gamma[peaks] > self.threshold * gamma[peaks[0]])]]
+        A = self._steering_matrix(doa, block.valid_sensors)
         self.report(
-            doa=grid[top],
-            std=nan,
-            existence=nan,
-            amplitude=self._amplitudes(grid[top], *heard),
-            label=np.full(len(top), -1),
-            converged=bool(powers.converged[n]),
-            iterations=int(powers.iterations[n]),
-            noise=float(powers.noise[n]),
+            doa,
+            amplitude=np.linalg.lstsq(A.T, block.Y[:, -1], rcond=None)[0],
+            converged=bool(powers.converged[index]),
+            iterations=int(powers.iterations[index]),
+            noise=float(powers.noise[index]),
         )
-
-    def _amplitudes(self, doa: Float, Y: Complex, sensors: Bool) -> Complex:
-        return np.asarray(np.linalg.lstsq(self._waves(doa, sensors).T, Y[:, -1], rcond=None)[0])

@@ -1,10 +1,12 @@
-"""Sparse Bayesian learning that starts where the last step ended."""
+"""Sequential sparse Bayesian learning: initial powers from the last step."""
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.trackers.registry import register
-from arrivals.trackers.sparse_bayes.fixed_point import widened
+from arrivals.trackers.sparse_bayes.fixed_point import FixedPointSolver, spread_powers
 from arrivals.trackers.sparse_bayes.sbl import SBL
 from arrivals.typing import Float
 from arrivals.validation import count, positive
@@ -12,22 +14,33 @@ from arrivals.validation import count, positive
 
 @register("ssbl")
 class SSBL(SBL):
-    """Sequential SBL: the powers start from those of the last step, widened.
+    """Sequential SBL: initial powers are those of the last step, spread over neighbours.
 
-    Its start is its only memory: the iteration may leave it, and the noise starts anew.
+    The initial powers are its only memory: the iteration may leave them, and the noise variance
+    starts from `initial_noise` at each step.
 
     Parameters
     ----------
-    measurement, n_directions, threshold, start_power, start_noise, tolerance, max_iterations
+    measurement : ArraySnapshot
+        As in `SBL`.
+    n_directions : int
+        As in `SBL`.
+    threshold : float
+        As in `SBL`.
+    initial_power : float
+        As in `SBL`.
+    initial_noise : float
         As in `SBL`.
     max_sources : int, optional
         As in `SBL`.
-    reach : int
-        Neighbours on the grid, to either side, over which a power spreads from step to step.
-    share : float
-        What each of them gets of it; the paper's is 1/25.
+    solver : FixedPointSolver
+        As in `SBL`.
+    n_neighbours : int
+        Neighbours on the grid, on either side, over which a power spreads from step to step.
+    leakage : float
+        Fraction of a power that each of them receives; 1/25 in the paper.
     floor : float
-        Lowest start, in shares of the highest, so that a source may appear anywhere.
+        Minimum initial power, relative to the highest, so that a source may appear anywhere.
 
     Attributes
     ----------
@@ -36,8 +49,8 @@ class SSBL(SBL):
 
     Notes
     -----
-    A step that was missed, or in which all was silent, leaves the memory as it was. The time
-    between steps is not used. Otherwise as `SBL`.
+    A step that is missing, or zero, does not change the memory. The time between steps is not
+    used. Otherwise as `SBL`.
 
     References
     ----------
@@ -55,37 +68,37 @@ class SSBL(SBL):
     array([30. , 30.5, 31.5])
     """
 
+    renamed: ClassVar[dict[str, str]] = {"reach": "n_neighbours", "share": "leakage"}
+
     def __init__(
         self,
         measurement: ArraySnapshot,
         *,
         n_directions: int = 361,
         threshold: float = 0.01,
-        start_power: float = 1.0,
-        start_noise: float = 0.1,
-        tolerance: float = 1e-3,
-        max_iterations: int = 1000,
+        initial_power: float = 1.0,
+        initial_noise: float = 0.1,
         max_sources: int | None = None,
-        reach: int = 2,
-        share: float = 0.04,
+        solver: FixedPointSolver = FixedPointSolver(),  # noqa: B008  (models are immutable)
+        n_neighbours: int = 2,
+        leakage: float = 0.04,
         floor: float = 1e-3,
     ) -> None:
-        self.reach = count("reach", reach, least=0)
-        self.share = positive("share", share)
+        self.n_neighbours = count("n_neighbours", n_neighbours, least=0)
+        self.leakage = positive("leakage", leakage)
         self.floor = positive("floor", floor)
         super().__init__(
             measurement,
             n_directions=n_directions,
             threshold=threshold,
-            start_power=start_power,
-            start_noise=start_noise,
-            tolerance=tolerance,
-            max_iterations=max_iterations,
+            initial_power=initial_power,
+            initial_noise=initial_noise,
             max_sources=max_sources,
+            solver=solver,
         )
 
     def next_start(self) -> Float:
-        """Return the powers of the last step heard, widened; all alike before the first."""
+        """Return the powers of the last step with data, spread; equal ones before the first."""
         if self.gamma.shape != (self.n_directions,) or not self.gamma.sum() > 0:
             return super().next_start()
-        return widened(self.gamma, self.reach, self.share, self.floor, self.circular)
+        return spread_powers(self.gamma, self.n_neighbours, self.leakage, self.floor, self.circular)

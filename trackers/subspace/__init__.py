@@ -1,1 +1,22 @@
 """Subspace methods."""
+
+from arrivals.trackers.subspace.base import CovarianceSubspace, Subspaces, SubspaceTracker
+from arrivals.trackers.subspace.esprit import ESPRIT
+from arrivals.trackers.subspace.music import MUSIC, music_spectrum
+from arrivals.trackers.subspace.past import PAST
+from arrivals.trackers.subspace.root_music import RootMUSIC
+from arrivals.trackers.subspace.source_number import aic, mdl, number_of_sources
+
+__all__ = [
+    "ESPRIT",
+    "MUSIC",
+    "PAST",
+    "CovarianceSubspace",
+    "RootMUSIC",
+    "SubspaceTracker",
+    "Subspaces",
+    "aic",
+    "mdl",
+    "music_spectrum",
+    "number_of_sources",
+]

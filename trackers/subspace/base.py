@@ -1,9 +1,9 @@
-"""What the subspace methods share: how many sources, which subspace, which directions."""
+"""Base classes of the subspace methods: number of sources, subspace, directions."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Any, Generic, Literal, NamedTuple, Protocol, TypeAlias, TypeVar
+from typing import Generic, Literal, NamedTuple, Protocol, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,212 +12,257 @@ from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.arrays.sensor_array import SensorArray
 from arrivals.measurement_models.manifolds.manifold import UniformLineManifold
 from arrivals.trackers.base import is_missing
-from arrivals.trackers.beamforming.covariance import RunningCovariance, smoothed
+from arrivals.trackers.beamforming.covariance import RunningCovariance, spatial_smoothing
 from arrivals.trackers.direction_tracker import DirectionTracker
-from arrivals.trackers.estimates import DirectionEstimate
 from arrivals.trackers.subspace.source_number import number_of_sources
 from arrivals.typing import Bool, Complex, Float
 from arrivals.validation import count, instance, not_negative, one_of, probability
 
 NumberOfSources: TypeAlias = int | Literal["aic", "mdl"] | None
-FADED = 1e-3  # a sensor of less weight, relative to the best, counts as not heard
+MIN_RELATIVE_WEIGHT = 1e-3  # sensors of less weight, relative to the largest, are left out
 
 
 class Subspaces(NamedTuple):
-    """Orthonormal bases of what the sources span, (..., n, K), and of the rest, (..., n, n - K)."""
+    """Orthonormal bases of the signal subspace, (..., n, K), and the noise, (..., n, n - K)."""
 
     signal: Complex
     noise: Complex
 
 
-class Finder(Protocol):
-    """Finds directions from subspaces."""
+class DirectionFinder(Protocol):
+    """Method that computes directions from subspaces."""
 
     @property
-    def limit(self) -> int:
-        """Number of sources that can be found at most."""
+    def max_sources(self) -> int:
+        """Maximum number of directions."""
 
-    def directions(self, found: Subspaces) -> Float:
-        """Return directions, rad, of as many sources as the signal subspace has dimensions."""
-
-
-F = TypeVar("F", bound=Finder)
+    def directions(self, subspaces: Subspaces) -> Float:
+        """Return directions, rad, at most as many as the signal subspace has dimensions."""
 
 
-def on_grid(model: ArraySnapshot) -> UniformLineManifold:
-    """Return the array as a line on a uniform grid.
+F = TypeVar("F", bound=DirectionFinder)
+
+
+def uniform_line(model: ArraySnapshot) -> UniformLineManifold:
+    """Return the array of a measurement model as a line on a uniform grid.
 
     Raises
     ------
     ValueError
-        If it is none, or its grid is wider than half the wavelength.
+        If it is not such a line, or its grid is wider than half the wavelength.
     """
     line, limit = model.manifold(), model.array.alias_limit
     if limit is not None and model.wavelengths[0] < limit * (1 - 1e-6):
         raise ValueError(
-            f"the wavelength, {model.wavelengths[0]:.6g} m, is below the array's alias limit of "
-            f"two grid spacings, {limit:.6g} m: this method would be ambiguous"
+            f"wavelength must be at least {limit:.6g} m, two grid spacings, for unambiguous "
+            f"directions; got {model.wavelengths[0]:.6g} m"
         )
     if not isinstance(line, UniformLineManifold):
         raise ValueError(
-            "this method needs a line of sensors on a uniform grid (gaps are allowed); "
-            f"this array has {model.array.n_sensors} sensors in {model.array.dim} dimension(s)"
+            "this method requires a line of sensors on a uniform grid (gaps are allowed); "
+            f"got {model.array.n_sensors} sensors in {model.array.dim} dimension(s)"
         )
     return line
 
 
-def fitted(A: Complex, z: Complex) -> Complex:
-    """Return the least-squares amplitudes of steering vectors, rows of A, in a snapshot.
+def least_squares_amplitudes(A: Complex, z: Complex) -> Complex:
+    """Return the least-squares amplitudes of plane waves in a snapshot.
 
-    Sensors that are NaN are left out; waves that cannot be told apart share alike.
+    Sensors that are NaN are left out; equal steering vectors have equal amplitudes.
+
+    Parameters
+    ----------
+    A : ndarray, shape (n_sources, n_sensors)
+        Steering vectors.
+    z : ndarray, shape (n_sensors,)
+        Snapshot.
+
+    Returns
+    -------
+    ndarray, shape (n_sources,)
+        Complex amplitudes.
 
     Examples
     --------
-    >>> fitted(np.array([[1.0, 1.0, 1.0], [1.0, -1.0, 1.0]]), np.array([5.0, 1.0, np.nan])).real
+    >>> A, z = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, 1.0]]), np.array([5.0, 1.0, np.nan])
+    >>> least_squares_amplitudes(A, z).real
     array([3., 2.])
     """
-    heard = ~np.isnan(z)
-    A, y = (A, z) if heard.all() else (A[:, heard], z[heard])
+    valid = ~np.isnan(z)
+    A, y = (A, z) if valid.all() else (A[:, valid], z[valid])
     G = A.conj() @ A.T
     G.flat[:: len(A) + 1] += 1e-12 * len(y)
     return np.linalg.solve(G, A.conj() @ y).astype(np.complex128)
 
 
 class SubspaceTracker(DirectionTracker, Generic[F]):
-    """Directions of sources that span less than all sensors could hear.
+    """Base of trackers of fewer sources than sensors, by their signal subspace.
 
-    Subclasses say how a subspace is learned (`_learn`, `_decomposed`) and how directions are
-    found from it (`_finder`).
+    A subclass implements `update_subspace`, `sensor_weights`, `eigendecomposition` and
+    `direction_finder`, and extends `predict` and `reset`.
+
+    Parameters
+    ----------
+    measurement : ArraySnapshot
+        Any array of isotropic sensors, one bin and one snapshot per step.
+    n_sources : int, "mdl" or "aic"
+        Number of sources, or the criterion that estimates it.
+    max_sources : int, optional
+        Maximum number that a criterion may find.
+    forgetting : float
+        Weight of the past after one unit of time.
+    interval : int
+        Directions are computed at every `interval`-th snapshot.
 
     Attributes
     ----------
-    total, squares : float
-        Sum of the weights of the snapshots heard, and of their squares.
-    n_heard : int
-        Snapshots heard.
+    total_weight, total_squared_weight : float
+        Sum of the weights of the snapshots, and of their squares.
+    n_snapshots : int
+        Number of snapshots with valid data.
     """
 
-    measurement: ArraySnapshot
-    n_sources: NumberOfSources
-    max_sources: int | None
-    forgetting: float
-    interval: int
+    def __init__(
+        self,
+        measurement: ArraySnapshot,
+        n_sources: NumberOfSources = "mdl",
+        *,
+        max_sources: int | None = None,
+        forgetting: float = 0.96,
+        interval: int = 1,
+    ) -> None:
+        self.measurement = instance("measurement", measurement, ArraySnapshot)
+        measurement.plain_wavelength("a subspace method")
+        self.n_sources: NumberOfSources = n_sources
+        self.max_sources = max_sources
+        self.forgetting = probability("forgetting", forgetting)
+        self.interval = count("interval", interval)
+        if max_sources is not None:
+            count("max_sources", max_sources)
+        if isinstance(n_sources, str):
+            one_of("n_sources", n_sources, ("aic", "mdl"))
+        elif n_sources is not None:
+            self.n_sources = count("n_sources", n_sources)
+        self._check_number_of_sources()
+        self.reset()
 
-    def _set_up(self, **params: Any) -> None:
-        """Keep the parameters under their names, checked; know nothing."""
-        for name, value in params.items():
-            setattr(self, name, value)
-        model = instance("measurement", self.measurement, ArraySnapshot)
-        model.plain_wavelength("a subspace method")
-        self.forgetting = probability("forgetting", self.forgetting)
-        count("interval", self.interval)
-        if self.max_sources is not None:
-            count("max_sources", self.max_sources)
-        if isinstance(self.n_sources, str):
-            one_of("n_sources", self.n_sources, ("aic", "mdl"))
-        elif self.n_sources is not None:
-            self.n_sources = count("n_sources", self.n_sources)
-        self._check_limit()
-        self.total, self.squares, self.n_heard = 0.0, 0.0, 0
-        self.report([])
-
-    def _check_limit(self) -> None:
-        limit, n = self._limit(), self.measurement.array.n_sensors
-        wanted = self.n_sources if isinstance(self.n_sources, int) else 1
-        if wanted > limit:
+    def _check_number_of_sources(self) -> None:
+        model = self.measurement
+        limit = self.direction_finder(self.subarray_model(model)).max_sources
+        n_sources = self.n_sources if isinstance(self.n_sources, int) else 1
+        if n_sources > limit:
             raise ValueError(
-                f"n_sources must be at most {limit}: a subspace method finds fewer sources than "
-                f"it has sensors, and {type(self).__name__} no more than {limit} on this array of "
-                f"{n}; got {wanted}"
+                f"n_sources must be at most {limit} for {type(self).__name__} on this array of "
+                f"{model.array.n_sensors} sensors; got {n_sources}"
             )
 
-    def _limit(self) -> int:
-        return self._finder(self._seen_by(self.measurement)).limit
+    def reset(self) -> None:
+        """Return to the state after construction: no snapshot, no direction."""
+        self.total_weight, self.total_squared_weight, self.n_snapshots = 0.0, 0.0, 0
+        self.report([])
 
     @property
     def n_slots(self) -> int:
-        """Number of sources that may be reported at once."""
+        """Maximum number of reported sources."""
         if isinstance(self.n_sources, int):
             return self.n_sources
-        most = self.measurement.array.n_sensors - 1
-        return min(self.max_sources or most, most)
+        limit = self.measurement.array.n_sensors - 1
+        return min(self.max_sources or limit, limit)
 
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
-        """Let the past fade; what is believed of the directions stays."""
+        """Apply forgetting to the weights; reported directions do not change."""
         not_negative("dt", dt)
-        fading = self.forgetting**dt
-        self.total, self.squares = fading * self.total, fading**2 * self.squares
+        factor = self.forgetting**dt
+        self.total_weight = factor * self.total_weight
+        self.total_squared_weight = factor**2 * self.total_squared_weight
 
     def update(self, z: ArrayLike | None) -> None:
-        """Learn from one snapshot, (n_sensors,); each `interval`-th time, look for directions."""
+        """Add one snapshot, (n_sensors,); compute directions at every `interval`-th one."""
         if is_missing(z):
             return
         z = self.measurement.snapshot(np.asarray(z))
-        self._learn(z)
-        self.total, self.squares = self.total + 1, self.squares + 1
-        self.n_heard = self.n_heard + 1
-        if self.n_heard % self.interval == 0:
-            self.report(**vars(self._described(self._directions(), z)))
+        self.update_subspace(z)
+        self.total_weight = self.total_weight + 1
+        self.total_squared_weight = self.total_squared_weight + 1
+        self.n_snapshots = self.n_snapshots + 1
+        if self.n_snapshots % self.interval == 0:
+            doa = self._directions()
+            A = self.measurement.steering_vector(doa)
+            self.report(doa, amplitude=least_squares_amplitudes(A, z))
 
     @abstractmethod
-    def _learn(self, z: Complex) -> None:
-        """Take in one snapshot, NaN where a sensor was not heard."""
+    def update_subspace(self, z: Complex) -> None:
+        """Add one snapshot, NaN where a sensor has no valid data."""
 
     @abstractmethod
-    def _weights(self) -> Float:
-        """Return how much each sensor was heard, (n_sensors,)."""
+    def sensor_weights(self) -> Float:
+        """Return the sum of weights of the valid data of each sensor, (n_sensors,)."""
 
     @abstractmethod
-    def _decomposed(self, live: Bool) -> tuple[Float, Complex]:
-        """Return the eigenvalues of the covariance of some sensors, falling, and their vectors."""
+    def eigendecomposition(self, valid_sensors: Bool) -> tuple[Float, Complex]:
+        """Return eigenvalues, falling, and eigenvectors of the covariance of valid sensors."""
 
     @abstractmethod
-    def _finder(self, model: ArraySnapshot) -> F:
-        """Return what finds directions with the sensors of the model."""
+    def direction_finder(self, model: ArraySnapshot) -> F:
+        """Return the method that computes directions with the sensors of the model."""
 
-    def _seen_by(self, model: ArraySnapshot) -> ArraySnapshot:
-        """Return the model of the sensors that the eigenvectors belong to."""
+    def subarray_model(self, model: ArraySnapshot) -> ArraySnapshot:
+        """Return the model of the sensors of the eigenvectors: all, unless a method smooths."""
         return model
 
-    def _looked(self) -> tuple[F, Subspaces] | None:
-        """Return the subspaces of the sensors heard, and what finds directions from them."""
-        if self.squares == 0:  # nothing was heard, or all has faded
+    def current_subspaces(self) -> tuple[F, Subspaces] | None:
+        """Return the direction finder and the subspaces of the valid sensors.
+
+        Returns
+        -------
+        tuple of DirectionFinder and Subspaces, or None
+            None if there are no data, too few sensors for the method, or no source.
+        """
+        if self.total_squared_weight == 0:
             return None
-        weights = self._weights()
-        live = weights > FADED * weights.max()
+        weights = self.sensor_weights()
+        valid_sensors = weights > MIN_RELATIVE_WEIGHT * weights.max()
         model = self.measurement
-        if not live.all():
-            model = model.replace(array=model.array.without(np.flatnonzero(~live)))
+        if not valid_sensors.all():
+            model = model.replace(array=model.array.without(np.flatnonzero(~valid_sensors)))
         try:
-            finder = self._finder(self._seen_by(model))
+            finder = self.direction_finder(self.subarray_model(model))
         except ValueError:  # too few sensors are left for the method
             return None
-        values, vectors = self._decomposed(live)
-        K = min(self._number(values), finder.limit) if values[:1].any() else 0
+        values, vectors = self.eigendecomposition(valid_sensors)
+        K = min(self._number_of_sources(values), finder.max_sources) if values[:1].any() else 0
         return (finder, Subspaces(vectors[:, :K], vectors[:, K:])) if K > 0 else None
 
     def _directions(self) -> Float:
         """Return the directions, rad, in rising order."""
-        looked = self._looked()
-        return np.zeros(0) if looked is None else np.sort(looked[0].directions(looked[1]))
+        current = self.current_subspaces()
+        if current is None:
+            return np.zeros(0)
+        finder, subspaces = current
+        return np.sort(finder.directions(subspaces))
 
-    def _number(self, values: Float) -> int:
-        """Return the number of sources, given or found."""
+    def _number_of_sources(self, eigenvalues: Float) -> int:
+        """Return the number of sources, given or estimated."""
         if isinstance(self.n_sources, int):
             return self.n_sources
-        n_snapshots = self.total**2 / self.squares  # equal weights would tell as much
-        found = number_of_sources(values, n_snapshots, self.n_sources or "mdl")
-        return min(int(found), self.n_slots)
-
-    def _described(self, doa: Float, z: Complex) -> DirectionEstimate:
-        unknown = np.full(len(doa), np.nan)
-        a = self.measurement.steering_vector(doa)
-        label = np.full(len(doa), -1)
-        return DirectionEstimate(doa, unknown, unknown, fitted(a, z), label)
+        # the number of snapshots of equal weight with the same variance of the mean
+        n_effective = self.total_weight**2 / self.total_squared_weight
+        estimate = number_of_sources(eigenvalues, n_effective, self.n_sources or "mdl")
+        return min(int(estimate), self.n_slots)
 
 
 class CovarianceSubspace(RunningCovariance, SubspaceTracker[F]):
-    """Subspaces by the eigenvectors of a running covariance, smoothed for coherent sources."""
+    """Base of trackers by the eigenvectors of a running covariance, smoothed on request.
+
+    Parameters
+    ----------
+    measurement, n_sources, max_sources, forgetting, interval
+        As in `SubspaceTracker`.
+    smoothing : int, optional
+        Sensors of the subarrays of `spatial_smoothing`; None: no smoothing.
+    backward : bool
+        Average with the reversed line.
+    """
 
     def __init__(
         self,
@@ -231,54 +276,63 @@ class CovarianceSubspace(RunningCovariance, SubspaceTracker[F]):
         interval: int = 1,
     ) -> None:
         self.smoothing, self.backward = smoothing, instance("backward", backward, bool)
-        self._set_up(
-            measurement=measurement,
-            n_sources=n_sources,
+        super().__init__(
+            measurement,
+            n_sources,
             max_sources=max_sources,
             forgetting=forgetting,
             interval=interval,
         )
-        self._know_nothing(measurement.array.n_sensors)
+
+    def reset(self) -> None:
+        """Return to the state after construction: no snapshot, no direction."""
+        self.reset_covariance(self.measurement.array.n_sensors)
+        super().reset()
 
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
-        """Let the past fade; what is believed of the directions stays."""
+        """Apply forgetting to the covariance; reported directions do not change."""
         super().predict(u, dt=dt)
-        self._fade(dt)
+        self.apply_forgetting(dt)
 
-    def _learn(self, z: Complex) -> None:
-        self._add(z)
+    def update_subspace(self, z: Complex) -> None:
+        """Add one snapshot to the covariance."""
+        self.add_snapshot(z)
 
-    def _weights(self) -> Float:
+    def sensor_weights(self) -> Float:
+        """Return the sum of weights of the valid data of each sensor, (n_sensors,)."""
         return self.weight.diagonal()
 
+    @property
     def _is_smoothed(self) -> bool:
         return self.smoothing is not None or self.backward
 
-    def _subarray(self, n_sensors: int) -> int:
+    def _subarray_length(self, n_sensors: int) -> int:
         return n_sensors if self.smoothing is None else self.smoothing
 
-    def _decomposed(self, live: Bool) -> tuple[Float, Complex]:
-        R = self._mean()
-        if not live.all():
-            R = R[np.ix_(live, live)]
-        if self._is_smoothed():
-            order = np.argsort(self.measurement.array.positions[live, 0])
-            R = smoothed(R[np.ix_(order, order)], self._subarray(len(R)), backward=self.backward)
+    def eigendecomposition(self, valid_sensors: Bool) -> tuple[Float, Complex]:
+        """Return eigenvalues, falling, and eigenvectors of the (smoothed) mean covariance."""
+        R = self.mean_covariance()
+        if not valid_sensors.all():
+            R = R[np.ix_(valid_sensors, valid_sensors)]
+        if self._is_smoothed:
+            order = np.argsort(self.measurement.array.positions[valid_sensors, 0])
+            length = self._subarray_length(len(R))
+            R = spatial_smoothing(R[np.ix_(order, order)], length, backward=self.backward)
         values, vectors = np.linalg.eigh(R)
         return values[::-1], vectors[:, ::-1]
 
-    def _seen_by(self, model: ArraySnapshot) -> ArraySnapshot:
+    def subarray_model(self, model: ArraySnapshot) -> ArraySnapshot:
         """Return the model of the first subarray, or of all sensors without smoothing."""
-        if not self._is_smoothed():
+        if not self._is_smoothed:
             return model
-        places, n = np.sort(model.array.positions[:, 0]), model.array.n_sensors
-        length = count("smoothing", self._subarray(n))
+        positions, n = np.sort(model.array.positions[:, 0]), model.array.n_sensors
+        length = count("smoothing", self._subarray_length(n))
         spacing = model.array.spacing
-        uniform = spacing is not None and round((places[-1] - places[0]) / spacing) == n - 1
+        uniform = spacing is not None and round((positions[-1] - positions[0]) / spacing) == n - 1
         if not uniform or length > n:
             raise ValueError(
-                f"spatial smoothing needs a uniform line without gaps of at least {length} "
-                f"sensors; this array has {n} sensors in {model.array.dim} dimension(s)"
+                f"spatial smoothing requires a uniform line without gaps of at least {length} "
+                f"sensors; got {n} sensors in {model.array.dim} dimension(s)"
                 + ("" if uniform else ", not a uniform line")
             )
-        return model.replace(array=SensorArray(places[:length]))
+        return model.replace(array=SensorArray(positions[:length]))

@@ -1,4 +1,4 @@
-"""ESPRIT: by how much the phases turn from a subarray to its shifted copy."""
+"""ESPRIT: phase steps between a subarray and its shifted copy."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ import numpy as np
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.manifolds.manifold import UniformLineManifold
 from arrivals.trackers.registry import register
-from arrivals.trackers.subspace.base import CovarianceSubspace, Subspaces, on_grid
-from arrivals.trackers.subspace.root_music import ENDFIRE
+from arrivals.trackers.subspace.base import CovarianceSubspace, Subspaces, uniform_line
+from arrivals.trackers.subspace.root_music import ENDFIRE_TOLERANCE
 from arrivals.typing import Complex, Float, Int
 
 
 def esprit_angles(signal_subspace: Complex, first: Int, second: Int) -> Float:
-    """Return the phases, rad, by which plane waves turn from subarray `first` to `second`.
+    """Return the phase steps, rad, of plane waves from subarray `first` to `second`.
 
     Parameters
     ----------
     signal_subspace : ndarray, shape (..., n_sensors, n_sources)
-        Any basis U of it.
+        Any basis U of the signal subspace.
     first, second : ndarray of int, shape (n_pairs,)
         Sensors of the two subarrays, in the same order; at least n_sources.
 
@@ -40,28 +40,40 @@ def esprit_angles(signal_subspace: Complex, first: Int, second: Int) -> Float:
     >>> np.sort(esprit_angles(a, np.arange(3), np.arange(1, 4))).round(9)
     array([-1. ,  0.5])
     """
-    turn = np.linalg.pinv(signal_subspace[..., first, :]) @ signal_subspace[..., second, :]
-    return np.asarray(np.angle(np.linalg.eigvals(turn)))
+    # Ψ = U₁⁺U₂   (36)
+    rotation = np.linalg.pinv(signal_subspace[..., first, :]) @ signal_subspace[..., second, :]
+    return np.asarray(np.angle(np.linalg.eigvals(rotation)))
 
 
-def shifted_pairs(places: Int, shift: int) -> tuple[Int, Int]:
-    """Return the sensors, (n_pairs,) and (n_pairs,), that lie `shift` grid points apart.
+def shifted_pairs(grid_index: Int, shift: int) -> tuple[Int, Int]:
+    """Return the pairs of sensors that lie `shift` grid points apart.
+
+    Parameters
+    ----------
+    grid_index : ndarray of int, shape (n_sensors,)
+        Grid points of the sensors.
+    shift : int
+        Distance in grid points.
+
+    Returns
+    -------
+    first, second : ndarray of int, shape (n_pairs,)
+        Sensors of the two subarrays.
 
     Examples
     --------
     >>> shifted_pairs(np.array([0, 1, 3, 4]), 1)
     (array([0, 2]), array([1, 3]))
     """
-    first, second = np.nonzero(places[None, :] - places[:, None] == shift)
+    first, second = np.nonzero(grid_index[None, :] - grid_index[:, None] == shift)
     return first, second
 
 
 @dataclass(frozen=True, eq=False)
-class Shift:
-    """Directions by ESPRIT, of the sensors of a line that have a neighbour.
+class ShiftInvariance:
+    """Direction finder by ESPRIT, with the sensors of a line that have a shifted partner.
 
-    The shift is the one that most pairs have, of those up to half a wavelength; the larger one
-    of equals.
+    The shift is the one with most pairs, of those up to half a wavelength; of equals the largest.
     """
 
     line: UniformLineManifold
@@ -74,28 +86,38 @@ class Shift:
         return max(range(1, widest + 1), key=lambda s: (pairs[s - 1], s))
 
     @property
-    def limit(self) -> int:
-        """One source for each pair of sensors."""
+    def max_sources(self) -> int:
+        """Number of pairs of sensors."""
         return len(shifted_pairs(self.line.places, self.shift)[0])
 
-    def directions(self, found: Subspaces) -> Float:
+    def directions(self, subspaces: Subspaces) -> Float:
         """Return directions, rad."""
         shift = self.shift
-        turn = esprit_angles(found.signal, *shifted_pairs(self.line.places, shift))
-        doa = self.line.to_doa(turn / shift, ENDFIRE * self.line.step)
+        phase = esprit_angles(subspaces.signal, *shifted_pairs(self.line.places, shift))
+        doa = self.line.to_doa(phase / shift, ENDFIRE_TOLERANCE * self.line.step)
         return doa[~np.isnan(doa)]
 
 
 @register("esprit")
-class ESPRIT(CovarianceSubspace[Shift]):
-    """Eigenvalues of the turn between two subarrays that differ by a shift: no search at all.
+class ESPRIT(CovarianceSubspace[ShiftInvariance]):
+    """Eigenvalues of the rotation between two shifted subarrays, without a search.
 
     Parameters
     ----------
     measurement : ArraySnapshot
         A line on a uniform grid of at most half the wavelength. Sensors may be missing, but as
         many pairs as there are sources must lie equally far apart, half a wavelength at most.
-    n_sources, max_sources, forgetting, smoothing, backward, interval
+    n_sources : int, "mdl" or "aic"
+        As in `MUSIC`.
+    max_sources : int, optional
+        As in `MUSIC`.
+    forgetting : float
+        As in `MUSIC`.
+    smoothing : int, optional
+        As in `MUSIC`.
+    backward : bool
+        As in `MUSIC`.
+    interval : int
         As in `MUSIC`.
 
     Attributes
@@ -106,7 +128,7 @@ class ESPRIT(CovarianceSubspace[Shift]):
     Raises
     ------
     ValueError
-        If the array is no such line, or has fewer such pairs than `n_sources`.
+        If the array is not such a line, or has fewer such pairs than `n_sources`.
 
     Notes
     -----
@@ -126,5 +148,6 @@ class ESPRIT(CovarianceSubspace[Shift]):
     array([0.5])
     """
 
-    def _finder(self, model: ArraySnapshot) -> Shift:
-        return Shift(on_grid(model))
+    def direction_finder(self, model: ArraySnapshot) -> ShiftInvariance:
+        """Return ESPRIT on the line of the model."""
+        return ShiftInvariance(uniform_line(model))

@@ -1,4 +1,4 @@
-"""MUSIC: directions whose steering vectors are orthogonal to what holds noise alone."""
+"""MUSIC: peaks of the inverse projection of steering vectors onto the noise subspace."""
 
 from __future__ import annotations
 
@@ -9,17 +9,22 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.arrays.sensor_array import SensorArray
-from arrivals.trackers.beamforming.cbf import look_directions, look_vectors, parabolic, peaks
+from arrivals.trackers.beamforming.spectrum import (
+    find_peaks,
+    parabolic_peak,
+    scan_directions,
+    scan_steering_matrix,
+)
 from arrivals.trackers.registry import register
 from arrivals.trackers.subspace.base import CovarianceSubspace, NumberOfSources, Subspaces
 from arrivals.typing import Complex, Float
 from arrivals.validation import count
 
-HIGHEST = 1e10  # of the spectrum, which without noise would be infinite
+MAX_SPECTRUM = 1e10  # without noise the spectrum is infinite at the sources
 
 
 def music_spectrum(A: ArrayLike, noise_subspace: Complex) -> Float:
-    """Return ‖a‖² / ‖Eᴴa‖² of steering vectors: 1 in the noise, large at the sources.
+    """Return MUSIC's spectrum ‖a‖² / ‖Eᴴa‖²: 1 in the noise subspace, large at the sources.
 
     Parameters
     ----------
@@ -45,53 +50,66 @@ def music_spectrum(A: ArrayLike, noise_subspace: Complex) -> Float:
     """
     A = np.asarray(A)
     norm = (A.real**2 + A.imag**2).sum(axis=-1)
-    return np.asarray(norm / np.maximum(power_inside(A, noise_subspace), norm / HIGHEST))
+    # P(β) = aᴴa / aᴴE Eᴴa   (6)
+    return np.asarray(norm / np.maximum(projected_power(A, noise_subspace), norm / MAX_SPECTRUM))
 
 
-def power_inside(A: ArrayLike, basis: Complex) -> Float:
-    """Return ‖Eᴴa‖² of rows a, (n_directions, n), for orthonormal columns E, (..., n, n_basis).
+def projected_power(A: ArrayLike, basis: Complex) -> Float:
+    """Return the power ‖Eᴴa‖² of the projections of rows a onto a subspace.
+
+    Parameters
+    ----------
+    A : array_like, shape (n_directions, n_sensors)
+        Rows a(β).
+    basis : ndarray, shape (..., n_sensors, n_basis)
+        E, orthonormal columns.
+
+    Returns
+    -------
+    ndarray, shape (..., n_directions)
+        Powers.
 
     Examples
     --------
-    >>> power_inside([[1.0, 1.0], [1.0, 0.0]], np.array([[0.0], [1.0]]))
+    >>> projected_power([[1.0, 1.0], [1.0, 0.0]], np.array([[0.0], [1.0]]))
     array([1., 0.])
     """
-    inside = np.asarray(A) @ basis.conj()
-    return np.asarray((inside.real**2 + inside.imag**2).sum(axis=-1))
+    projection = np.asarray(A) @ basis.conj()
+    return np.asarray((projection.real**2 + projection.imag**2).sum(axis=-1))
 
 
 @dataclass(frozen=True, eq=False)
-class Scan:
-    """Directions by the peaks of MUSIC's spectrum, of any array."""
+class SpectrumSearch:
+    """Direction finder by the peaks of MUSIC's spectrum, for any array."""
 
     array: SensorArray
     wavelength: float
     n_directions: int
 
     @property
-    def limit(self) -> int:
-        """One source less than sensors."""
+    def max_sources(self) -> int:
+        """Number of sensors minus one."""
         return self.array.n_sensors - 1
 
-    def spectrum(self, found: Subspaces) -> tuple[Float, Float]:
-        """Return look directions, and `music_spectrum` in them, by the smaller of the subspaces."""
-        doa_grid, A = look_vectors(self.array, self.wavelength, self.n_directions)
-        n, K = found.signal.shape
+    def spectrum(self, subspaces: Subspaces) -> tuple[Float, Float]:
+        """Return scan directions and `music_spectrum` there, by the smaller of the subspaces."""
+        doa_grid, A = scan_steering_matrix(self.array, self.wavelength, self.n_directions)
+        n, K = subspaces.signal.shape
         if n < 2 * K:
-            return doa_grid, music_spectrum(A, found.noise)
-        null = n - power_inside(A, found.signal)  # ‖a‖² = n
-        return doa_grid, n / np.maximum(null, n / HIGHEST)
+            return doa_grid, music_spectrum(A, subspaces.noise)
+        null = n - projected_power(A, subspaces.signal)  # ‖a‖² = n, null = ‖Eᴴa‖²
+        return doa_grid, n / np.maximum(null, n / MAX_SPECTRUM)
 
-    def directions(self, found: Subspaces) -> Float:
+    def directions(self, subspaces: Subspaces) -> Float:
         """Return the highest peaks, rad, each refined by a parabola through the null spectrum."""
-        doa_grid, power = self.spectrum(found)
-        top = peaks(power, circular=self.array.dim > 1)[: found.signal.shape[-1]]
-        return parabolic(doa_grid, -1 / power, top)
+        doa_grid, power = self.spectrum(subspaces)
+        peaks = find_peaks(power, circular=self.array.dim > 1)[: subspaces.signal.shape[-1]]
+        return parabolic_peak(doa_grid, -1 / power, peaks)
 
 
 @register("music")
-class MUSIC(CovarianceSubspace[Scan]):
-    """Peaks of MUSIC's spectrum, on any array.
+class MUSIC(CovarianceSubspace[SpectrumSearch]):
+    """Peaks of MUSIC's spectrum, for any array.
 
     Parameters
     ----------
@@ -99,41 +117,41 @@ class MUSIC(CovarianceSubspace[Scan]):
         Any array: a line, or sensors in a plane, where directions are azimuths on the full
         circle. Its noise is not used.
     n_sources : int, "mdl" or "aic"
-        How many sources there are, fewer than sensors; or the criterion by which the number is
-        found anew each time. None is "mdl".
+        Number of sources, below the number of sensors; or the criterion that estimates it at each
+        step. None is "mdl".
     max_sources : int, optional
-        The most that a criterion may find; as many as the method can if None.
+        Maximum number that a criterion may find; the maximum of the method if None.
     forgetting : float
-        Weight that the past keeps from step to step; the covariance is that of the last
-        1 / (1 - forgetting) snapshots or so.
+        Weight of the past after one unit of time; the covariance averages about
+        1 / (1 - forgetting) snapshots.
     smoothing : int, optional
-        Sensors of the subarrays that the covariance is averaged over, so that echoes of one
-        source are told apart; for uniform lines without gaps. None: no smoothing.
+        Sensors of the subarrays that the covariance is averaged over, which resolves coherent
+        echoes of one source; for uniform lines without gaps. None: no smoothing.
     backward : bool
-        Average the line read from its other end too; for uniform lines without gaps.
+        Average with the covariance of the reversed line; for uniform lines without gaps.
     interval : int
-        Directions are looked for each `interval`-th snapshot, and stay until then.
+        Directions are computed at every `interval`-th snapshot and do not change in between.
     n_directions : int
-        Look directions: over ±90° for a line (361: every half degree), else over the circle.
+        Scan directions: over ±90° for a line (361: every half degree), else over the circle.
 
     Attributes
     ----------
     covariance : ndarray, shape (n_sensors, n_sensors)
         Weighted sum of the snapshots' outer products.
     doa_grid, power : ndarray, shape (n_directions,)
-        Look directions, rad, and the spectrum; NaN while there is no source.
+        Scan directions, rad, and the spectrum; NaN while there is no source.
 
     Raises
     ------
     ValueError
         If `n_sources` is not below the number of sensors (of a subarray, with smoothing), or
-        smoothing is asked for an array that is no uniform line.
+        smoothing is requested for an array that is not a uniform line.
 
     Notes
     -----
     Labels are -1, `std` and `existence` NaN. Directions stand in rising order; `amplitude` is the
-    least-squares fit to the last snapshot. Sensors that have not been heard for long are left
-    out; with smoothing, nothing is found then.
+    least-squares fit to the last snapshot. Sensors without valid data for a long time are left
+    out; with smoothing, no source is detected then.
 
     References
     ----------
@@ -172,17 +190,20 @@ class MUSIC(CovarianceSubspace[Scan]):
             interval=interval,
         )
 
-    def _finder(self, model: ArraySnapshot) -> Scan:
-        return Scan(model.array, model.plain_wavelength("music"), self.n_directions)
+    def direction_finder(self, model: ArraySnapshot) -> SpectrumSearch:
+        """Return the peak search on the scan grid."""
+        return SpectrumSearch(model.array, model.plain_wavelength("music"), self.n_directions)
 
     @property
     def doa_grid(self) -> Float:
-        """Look directions, rad, (n_directions,)."""
-        return look_directions(self.measurement.array, self.n_directions)
+        """Scan directions, rad, (n_directions,)."""
+        return scan_directions(self.measurement.array, self.n_directions)
 
     @property
     def power(self) -> Float:
-        """The spectrum as of now, (n_directions,); NaN while there is no source."""
-        looked = self._looked()
-        nothing = np.full(self.n_directions, np.nan)
-        return nothing if looked is None else looked[0].spectrum(looked[1])[1]
+        """Present spectrum, (n_directions,); NaN while there is no source."""
+        current = self.current_subspaces()
+        if current is None:
+            return np.full(self.n_directions, np.nan)
+        finder, subspaces = current
+        return finder.spectrum(subspaces)[1]

@@ -1,4 +1,4 @@
-"""PAST: the signal subspace by recursive least squares, without a covariance or its eigenvectors.
+"""PAST: signal subspace by recursive least squares, without a covariance or eigenvectors.
 
 Equation numbers are those of Yang, "Projection approximation subspace tracking", IEEE Trans.
 Signal Process. 43(1), 1995.
@@ -11,19 +11,24 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.trackers.registry import register
-from arrivals.trackers.subspace.base import Finder, NumberOfSources, SubspaceTracker, on_grid
-from arrivals.trackers.subspace.esprit import Shift
-from arrivals.trackers.subspace.music import Scan
-from arrivals.trackers.subspace.root_music import Roots
+from arrivals.trackers.subspace.base import (
+    DirectionFinder,
+    NumberOfSources,
+    SubspaceTracker,
+    uniform_line,
+)
+from arrivals.trackers.subspace.esprit import ShiftInvariance
+from arrivals.trackers.subspace.music import SpectrumSearch
+from arrivals.trackers.subspace.root_music import PolynomialRooting
 from arrivals.typing import Bool, Complex, Float
 from arrivals.validation import count, one_of
 
-LONGEST = 1e-6  # what has faded to a millionth is gone: bounds P after a silence
-WIDEST = 1e12  # of P, relative to the power: a direction that nothing excites winds up no further
+MIN_FORGETTING = 1e-6  # bounds P after a long gap: the weight of older data is at least this
+MAX_RELATIVE_TRACE = 1e12  # of P relative to the power: bounds wind-up along unexcited directions
 
 
 def past_step(W: Complex, P: Complex, y: Complex, beta: ArrayLike) -> tuple[Complex, Complex]:
-    """Return W and P after one snapshot: the algorithm PAST as printed.
+    """Return W and P after one snapshot: algorithm PAST, Table I.
 
     Parameters
     ----------
@@ -34,7 +39,14 @@ def past_step(W: Complex, P: Complex, y: Complex, beta: ArrayLike) -> tuple[Comp
     y : ndarray, shape (..., n_sensors)
         Snapshot.
     beta : float or array_like, shape (...)
-        Weight that the past keeps.
+        Weight of the past.
+
+    Returns
+    -------
+    W : ndarray, shape (..., n_sensors, n_sources)
+        Updated basis.
+    P : ndarray, shape (..., n_sources, n_sources)
+        Updated inverse.
 
     References
     ----------
@@ -50,31 +62,42 @@ def past_step(W: Complex, P: Complex, y: Complex, beta: ArrayLike) -> tuple[Comp
     """
     beta = np.asarray(beta)[..., None, None]
     y = y[..., None]
+    # z = Wᴴ y
     z = W.conj().swapaxes(-1, -2) @ y
+    # h = P z
     h = P @ z
     hH = h.conj().swapaxes(-1, -2)
+    # g = h / (β + zᴴh)
     gH = hH / (beta + (hH @ z).real)
+    # P = Tri{P - g hᴴ} / β; the Hermitian part, since rounding would grow as β⁻ⁿ
     P = (P - h * gH) / (2 * beta)
-    P = P + P.conj().swapaxes(-1, -2)  # the Hermitian part: rounding would grow as β⁻ⁿ
+    P = P + P.conj().swapaxes(-1, -2)
+    # W = W + (y - W z) gᴴ
     return W + (y - W @ z) * gH, P
 
 
 @register("past")
-class PAST(SubspaceTracker[Finder]):
-    """Directions from a signal subspace that is tracked snapshot by snapshot.
+class PAST(SubspaceTracker[DirectionFinder]):
+    """Directions from a signal subspace tracked by recursive least squares.
 
     Parameters
     ----------
     measurement : ArraySnapshot
-        What `method` asks for: a line on a uniform grid, or any array for "music".
-    n_sources, max_sources, forgetting, interval
-        As in `MUSIC`. Where a criterion finds the number, a subspace of `max_sources` dimensions
-        is tracked, and the power outside it is taken to be noise. That wants room: `max_sources`
-        is below half the sensors if None; with more, false sources are found at first.
+        A line on a uniform grid, or any array with the method "music".
+    n_sources : int, "mdl" or "aic"
+        As in `MUSIC`. If a criterion estimates the number, a subspace of `max_sources` dimensions
+        is tracked, and the power outside it is noise.
+    max_sources : int, optional
+        As in `MUSIC`, but below half the sensors if None: with more dimensions, false sources are
+        detected at first.
+    forgetting : float
+        As in `MUSIC`.
+    interval : int
+        As in `MUSIC`.
     method : {"esprit", "root_music", "music"}
-        How directions are found from the subspace.
+        Method that computes directions from the subspace.
     n_directions : int
-        Look directions of the method "music".
+        Scan directions of the method "music".
 
     Attributes
     ----------
@@ -84,20 +107,20 @@ class PAST(SubspaceTracker[Finder]):
         P of the paper: the inverse of the weighted sum of z zᴴ, z = Wᴴy.
     energy : float
         Weighted sum of ‖y‖².
-    heard : ndarray, shape (n_sensors,)
-        Sum of the weights of the snapshots in which each sensor was heard.
+    weight : ndarray, shape (n_sensors,)
+        Sum of the weights of the valid data of each sensor.
     age : float
-        Time since the last snapshot that held anything.
+        Time since the last snapshot with power.
 
     Raises
     ------
     ValueError
-        If the array does not suit the method, or `n_sources` is beyond what it can find.
+        If the array does not suit the method, or `n_sources` is above its maximum.
 
     Notes
     -----
     Labels are -1, `std` and `existence` NaN. Directions stand in rising order. A sensor that is
-    missing is filled in by the subspace: by W z, z fitted to the others. P starts at the inverse
+    missing is imputed from the subspace: W z, z fitted to the others. P starts at the inverse
     power of the first snapshot, so that the unit of the samples does not matter.
 
     References
@@ -127,80 +150,102 @@ class PAST(SubspaceTracker[Finder]):
     ) -> None:
         self.method = one_of("method", method, ("esprit", "root_music", "music"))
         self.n_directions = count("n_directions", n_directions, least=3)
-        self._set_up(
-            measurement=measurement,
-            n_sources=n_sources,
+        super().__init__(
+            measurement,
+            n_sources,
             max_sources=max_sources,
             forgetting=forgetting,
             interval=interval,
         )
-        self.age, self.heard = 0.0, np.zeros(measurement.array.n_sensors)
-        self._start()
 
-    def _start(self) -> None:
+    def reset(self) -> None:
+        """Return to the state after construction: no snapshot, no direction."""
+        self.age, self.weight = 0.0, np.zeros(self.measurement.array.n_sensors)
+        self._reset_subspace()
+        super().reset()
+
+    def _reset_subspace(self) -> None:
         self.W = np.eye(self.measurement.array.n_sensors, self.n_slots, dtype=np.complex128)
         self.inverse, self.energy = np.eye(self.n_slots, dtype=np.complex128), 0.0
 
     @property
     def n_slots(self) -> int:
-        """Number of sources that may be reported at once: the dimensions tracked."""
+        """Maximum number of reported sources: the dimension of the tracked subspace."""
         if isinstance(self.n_sources, int):
             return self.n_sources
         n = self.measurement.array.n_sensors
         return min(self.max_sources or max(1, (n - 1) // 2), n - 1)
 
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
-        """Let the past fade; what is believed of the directions stays."""
+        """Apply forgetting to the weights; reported directions do not change."""
         super().predict(u, dt=dt)
-        self.heard = self.forgetting**dt * self.heard
+        self.weight = self.forgetting**dt * self.weight
         self.age = self.age + dt
 
-    def _learn(self, z: Complex) -> None:
+    def update_subspace(self, z: Complex) -> None:
+        """Make one step of PAST; missing sensors are imputed from the subspace."""
         if self.W.shape[1] != self.n_slots:  # the number of sources was changed
-            self._start()
-        heard = ~np.isnan(z)
-        self.heard = self.heard + heard
-        y = z if heard.all() else filled(self.W, z)
+            self._reset_subspace()
+        valid = ~np.isnan(z)
+        self.weight = self.weight + valid
+        y = z if valid.all() else impute_missing(self.W, z)
         power = float(np.vdot(y, y).real)
         if power == 0:
             return
         if self.energy == 0:
             self.inverse = np.eye(len(self.inverse), dtype=np.complex128) * (len(y) / power)
-        beta = max(self.forgetting**self.age, LONGEST)
+        beta = max(self.forgetting**self.age, MIN_FORGETTING)
         self.W, P = past_step(self.W, self.inverse, y, beta)
         self.energy, self.age = beta * self.energy + power, 0.0
-        width = self.energy * float(P.trace().real)
-        self.inverse = P if width < WIDEST else P * (WIDEST / width)
+        trace = self.energy * float(P.trace().real)
+        self.inverse = P if trace < MAX_RELATIVE_TRACE else P * (MAX_RELATIVE_TRACE / trace)
 
-    def _weights(self) -> Float:
-        return self.heard
+    def sensor_weights(self) -> Float:
+        """Return the sum of weights of the valid data of each sensor, (n_sensors,)."""
+        return self.weight
 
-    def _decomposed(self, live: Bool) -> tuple[Float, Complex]:
-        """Return eigenvectors and eigenvalues of W P⁻¹Wᴴ, the rest of the power spread evenly."""
-        n, L = int(live.sum()), min(int(live.sum()), self.W.shape[1])
+    def eigendecomposition(self, valid_sensors: Bool) -> tuple[Float, Complex]:
+        """Return eigenvalues, falling, and eigenvectors of W P⁻¹Wᴴ plus white noise."""
+        n = int(valid_sensors.sum())
+        L = min(n, self.W.shape[1])
         if self.energy == 0:
             return np.zeros(n), np.eye(n, dtype=np.complex128)
-        Q, R = np.linalg.qr(self.W[live], mode="complete")
+        Q, R = np.linalg.qr(self.W[valid_sensors], mode="complete")
         S = R[:L] @ np.linalg.solve(self.inverse, R[:L].conj().T)
-        values, turn = np.linalg.eigh((S + S.conj().T) / 2)
-        noise = (self.energy - values.sum()) / max(n - L, 1)
+        values, rotation = np.linalg.eigh((S + S.conj().T) / 2)
+        noise = (self.energy - values.sum()) / max(n - L, 1)  # the power outside, spread evenly
         values = np.concatenate([values[::-1], np.full(n - L, max(noise, 0.0))])
-        return values, np.concatenate([Q[:, :L] @ turn[:, ::-1], Q[:, L:]], axis=1)
+        return values, np.concatenate([Q[:, :L] @ rotation[:, ::-1], Q[:, L:]], axis=1)
 
-    def _finder(self, model: ArraySnapshot) -> Finder:
+    def direction_finder(self, model: ArraySnapshot) -> DirectionFinder:
+        """Return the direction finder of `method`."""
         if self.method == "music":
-            return Scan(model.array, model.plain_wavelength("past"), self.n_directions)
-        return Roots(on_grid(model)) if self.method == "root_music" else Shift(on_grid(model))
+            wavelength = model.plain_wavelength("past")
+            return SpectrumSearch(model.array, wavelength, self.n_directions)
+        line = uniform_line(model)
+        return PolynomialRooting(line) if self.method == "root_music" else ShiftInvariance(line)
 
 
-def filled(W: Complex, y: Complex) -> Complex:
-    """Return a snapshot whose missing sensors, NaN, hear what the others make likely: W z.
+def impute_missing(W: Complex, y: Complex) -> Complex:
+    """Return a snapshot whose missing sensors are predicted by the subspace: W z.
+
+    Parameters
+    ----------
+    W : ndarray, shape (n_sensors, n_sources)
+        Basis of the subspace.
+    y : ndarray, shape (n_sensors,)
+        Snapshot; NaN where a sensor has no valid data.
+
+    Returns
+    -------
+    ndarray, shape (n_sensors,)
+        y, and W z at the missing sensors, with z fitted to the others.
 
     Examples
     --------
-    >>> filled(np.array([[0.6], [0.8]]), np.array([3.0, np.nan])).round(6)
+    >>> impute_missing(np.array([[0.6], [0.8]]), np.array([3.0, np.nan])).round(6)
     array([3., 4.])
     """
-    heard = ~np.isnan(y)
-    z = np.linalg.lstsq(W[heard], y[heard], rcond=None)[0]
-    return np.where(heard, y, W @ z)
+    valid = ~np.isnan(y)
+    z = np.linalg.lstsq(W[valid], y[valid], rcond=None)[0]
+    return np.where(valid, y, W @ z)

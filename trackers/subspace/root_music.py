@@ -1,4 +1,4 @@
-"""Root-MUSIC: the zeros of MUSIC's null spectrum, which on a grid is a polynomial."""
+"""Root-MUSIC: zeros of MUSIC's null spectrum, a polynomial on a uniform grid."""
 
 from __future__ import annotations
 
@@ -10,25 +10,26 @@ from numpy.typing import ArrayLike
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.manifolds.manifold import UniformLineManifold
 from arrivals.trackers.registry import register
-from arrivals.trackers.subspace.base import CovarianceSubspace, Subspaces, on_grid
+from arrivals.trackers.subspace.base import CovarianceSubspace, Subspaces, uniform_line
 from arrivals.typing import Complex, Float
 
-ENDFIRE = 0.1  # an angle beyond endfire by less, relative to endfire's, is noise of one there
+ENDFIRE_TOLERANCE = 0.1  # electrical angles up to this fraction beyond endfire count as endfire
 
 
-def null_polynomial(noise_subspace: Complex, places: ArrayLike) -> Complex:
+def null_polynomial(noise_subspace: Complex, grid_index: ArrayLike) -> Complex:
     """Return the coefficients, highest power first, of z^S aᴴ(z) E Eᴴ a(z), z = exp(jθ).
 
     Parameters
     ----------
     noise_subspace : ndarray, shape (..., n_sensors, n)
         E, orthonormal columns.
-    places : array_like of int, shape (n_sensors,)
-        Grid points of the sensors; S is their span. Sensors may be missing.
+    grid_index : array_like of int, shape (n_sensors,)
+        Grid points of the sensors; S is their span. Grid points without a sensor are allowed.
 
     Returns
     -------
     ndarray, shape (..., 2 S + 1)
+        Coefficients.
 
     References
     ----------
@@ -41,37 +42,39 @@ def null_polynomial(noise_subspace: Complex, places: ArrayLike) -> Complex:
     >>> null_polynomial(np.array([[1.0], [-1.0]]) / np.sqrt(2), [0, 1]).real.round(3)
     array([-0.5,  1. , -0.5])
     """
-    places = np.asarray(places)
+    grid_index = np.asarray(grid_index)
     C = noise_subspace @ np.swapaxes(noise_subspace.conj(), -1, -2)
-    lag = places[None, :] - places[:, None]
+    lag = grid_index[None, :] - grid_index[:, None]
     span = int(lag.max())
-    # which pairs of sensors have which lag, from S down to -S
+    # indicator of the pairs of sensors of each lag, from S down to -S
     pairs = lag.ravel()[:, None] == np.arange(span, -span - 1, -1)
+    # coefficient of z^l: the sum of C over the pairs of lag l   (8)
     return np.asarray(C.reshape(*C.shape[:-2], -1) @ pairs.astype(np.complex128))
 
 
 def root_music_angles(
-    noise_subspace: Complex, places: ArrayLike, n_sources: int, largest: float = np.pi
+    noise_subspace: Complex, grid_index: ArrayLike, n_sources: int, max_angle: float = np.pi
 ) -> Float:
-    """Return the electrical angles θ of the zeros that lie nearest to the unit circle.
+    """Return the electrical angles θ of the zeros nearest to the unit circle.
 
-    Zeros come in pairs z, 1/z*. Of each pair one is taken, and its angle from both: without noise
-    they coincide on the circle, and rounding parts them.
+    Zeros come in pairs z, 1/z*. Each pair gives one angle, the mean of both: without noise they
+    coincide on the circle up to rounding.
 
     Parameters
     ----------
     noise_subspace : ndarray, shape (..., n_sensors, n)
         Orthonormal columns.
-    places : array_like of int, shape (n_sensors,)
+    grid_index : array_like of int, shape (n_sensors,)
         Grid points of the sensors.
     n_sources : int
-    largest : float
-        Zeros whose angle is larger are not those of plane waves, and are passed over.
+        Number of angles.
+    max_angle : float
+        Zeros of larger angle, rad, do not belong to plane waves and are left out.
 
     Returns
     -------
     ndarray, shape (..., n_sources)
-        Angles between neighbouring grid points, rad; NaN where there are not so many.
+        Phase steps between neighbouring grid points, rad; NaN where there are fewer zeros.
 
     References
     ----------
@@ -85,10 +88,10 @@ def root_music_angles(
     >>> np.sort(root_music_angles(noise_subspace, range(4), 2)).round(9)
     array([-1. ,  0.5])
     """
-    z = polynomial_roots(null_polynomial(noise_subspace, places))
-    found = np.full((*z.shape[:-1], n_sources), np.nan)
+    z = polynomial_roots(null_polynomial(noise_subspace, grid_index))
+    theta = np.full((*z.shape[:-1], n_sources), np.nan)
     distance = np.abs(np.log(np.maximum(np.abs(z), np.finfo(float).tiny)))
-    distance = np.where(np.abs(np.angle(z)) <= largest, distance, np.inf)
+    distance = np.where(np.abs(np.angle(z)) <= max_angle, distance, np.inf)
     for k in range(n_sources):
         best = distance.argmin(axis=-1, keepdims=True)
         one = np.take_along_axis(z, best, axis=-1)
@@ -98,14 +101,24 @@ def root_music_angles(
         other = np.take_along_axis(z, partner, axis=-1)
         is_zero = np.isfinite(np.take_along_axis(distance, best, axis=-1))
         middle = one / np.abs(one) + other / np.maximum(np.abs(other), np.finfo(float).tiny)
-        found[..., k] = np.where(is_zero, np.angle(middle), np.nan)[..., 0]
+        theta[..., k] = np.where(is_zero, np.angle(middle), np.nan)[..., 0]
         for taken in (best, partner):
             np.put_along_axis(distance, taken, np.inf, axis=-1)
-    return found
+    return theta
 
 
 def polynomial_roots(c: Complex) -> Complex:
-    """Return the roots of polynomials (..., n + 1), highest power first: (..., n).
+    """Return the roots of polynomials.
+
+    Parameters
+    ----------
+    c : ndarray, shape (..., n + 1)
+        Coefficients, highest power first.
+
+    Returns
+    -------
+    ndarray, shape (..., n)
+        Eigenvalues of the companion matrix, sorted.
 
     Examples
     --------
@@ -115,7 +128,8 @@ def polynomial_roots(c: Complex) -> Complex:
     size = np.abs(c).max(axis=-1, keepdims=True)
     lead = c[..., :1]
     tiny = np.finfo(float).eps * np.where(size > 0, size, 1.0)
-    lead = np.where(np.abs(lead) < tiny, tiny, lead)  # a root far out, in place of one less
+    # a vanishing leading coefficient gives a root at a large radius, not a lower degree
+    lead = np.where(np.abs(lead) < tiny, tiny, lead)
     n = c.shape[-1] - 1
     companion = np.zeros((*c.shape[:-1], n, n), dtype=np.complex128)
     companion[..., np.arange(1, n), np.arange(n - 1)] = 1.0
@@ -124,34 +138,44 @@ def polynomial_roots(c: Complex) -> Complex:
 
 
 @dataclass(frozen=True, eq=False)
-class Roots:
-    """Directions by root-MUSIC, of a line on a uniform grid."""
+class PolynomialRooting:
+    """Direction finder by root-MUSIC, for a line on a uniform grid."""
 
     line: UniformLineManifold
 
     @property
-    def limit(self) -> int:
-        """One source less than sensors."""
+    def max_sources(self) -> int:
+        """Number of sensors minus one."""
         return self.line.n_sensors - 1
 
-    def directions(self, found: Subspaces) -> Float:
+    def directions(self, subspaces: Subspaces) -> Float:
         """Return directions, rad."""
-        slack = ENDFIRE * self.line.step
-        n_sources, largest = found.signal.shape[-1], self.line.step + slack
-        theta = root_music_angles(found.noise, self.line.places, n_sources, largest)
-        doa = self.line.to_doa(theta, slack)
+        tolerance = ENDFIRE_TOLERANCE * self.line.step
+        n_sources, max_angle = subspaces.signal.shape[-1], self.line.step + tolerance
+        theta = root_music_angles(subspaces.noise, self.line.places, n_sources, max_angle)
+        doa = self.line.to_doa(theta, tolerance)
         return doa[~np.isnan(doa)]
 
 
 @register("root_music")
-class RootMUSIC(CovarianceSubspace[Roots]):
-    """Zeros of MUSIC's null spectrum: no grid of directions, on lines only.
+class RootMUSIC(CovarianceSubspace[PolynomialRooting]):
+    """Zeros of MUSIC's null spectrum, without a scan grid, for lines only.
 
     Parameters
     ----------
     measurement : ArraySnapshot
-        A line on a uniform grid of at most half the wavelength; sensors may be missing.
-    n_sources, max_sources, forgetting, smoothing, backward, interval
+        A line on a uniform grid of at most half the wavelength, gaps allowed.
+    n_sources : int, "mdl" or "aic"
+        As in `MUSIC`.
+    max_sources : int, optional
+        As in `MUSIC`.
+    forgetting : float
+        As in `MUSIC`.
+    smoothing : int, optional
+        As in `MUSIC`.
+    backward : bool
+        As in `MUSIC`.
+    interval : int
         As in `MUSIC`.
 
     Attributes
@@ -162,7 +186,7 @@ class RootMUSIC(CovarianceSubspace[Roots]):
     Raises
     ------
     ValueError
-        If the array is no such line, or `n_sources` is not below the number of sensors.
+        If the array is not such a line, or `n_sources` is not below the number of sensors.
 
     Notes
     -----
@@ -183,5 +207,6 @@ class RootMUSIC(CovarianceSubspace[Roots]):
     array([-0.2,  0.5])
     """
 
-    def _finder(self, model: ArraySnapshot) -> Roots:
-        return Roots(on_grid(model))
+    def direction_finder(self, model: ArraySnapshot) -> PolynomialRooting:
+        """Return root-MUSIC on the line of the model."""
+        return PolynomialRooting(uniform_line(model))

@@ -1,4 +1,4 @@
-"""How many sources there are: information criteria on the eigenvalues of a covariance.
+"""Number of sources by information criteria on the eigenvalues of a covariance.
 
 Equation numbers are those of Wax and Kailath, "Detection of signals by information theoretic
 criteria", IEEE Trans. ASSP 33(2), 1985.
@@ -15,19 +15,19 @@ from arrivals.typing import Float, Int
 from arrivals.validation import one_of, positive, real
 
 Criterion: TypeAlias = Literal["aic", "mdl"]
-ROUNDING = 1e-12  # eigenvalues below this part of the largest are taken to be equal
+MIN_RELATIVE_EIGENVALUE = 1e-12  # smaller eigenvalues are clipped to this part of the largest
 
 
 def aic(eigenvalues: ArrayLike, n_snapshots: float) -> Float:
-    """Return Akaike's criterion for 0, 1, ... sources; the least is best.
+    """Return Akaike's criterion for 0, 1, ... sources; the minimum is best.
 
     Parameters
     ----------
     eigenvalues : array_like, shape (..., n_sensors)
         Of the mean covariance, in any order.
     n_snapshots : float
-        Snapshots that it is the mean of. With fewer than n_sensors the smallest eigenvalues are
-        zero whatever was heard, and only the n_snapshots largest are looked at.
+        Number of snapshots of the mean. With fewer than n_sensors the smallest eigenvalues are
+        zero for any data, and only the n_snapshots largest are used.
 
     Returns
     -------
@@ -48,8 +48,8 @@ def aic(eigenvalues: ArrayLike, n_snapshots: float) -> Float:
     >>> aic([21.2359, 2.1717, 1.4279, 1.0979, 1.0544, 0.9432, 0.7324], 100).argmin()
     np.int64(2)
     """
-    misfit, free = _misfit(eigenvalues, n_snapshots)
-    return np.asarray(2 * misfit + 2 * free)
+    misfit, n_free = _misfit(eigenvalues, n_snapshots)
+    return np.asarray(2 * misfit + 2 * n_free)  # (16)
 
 
 def mdl(eigenvalues: ArrayLike, n_snapshots: float) -> Float:
@@ -57,12 +57,15 @@ def mdl(eigenvalues: ArrayLike, n_snapshots: float) -> Float:
 
     Parameters
     ----------
-    eigenvalues, n_snapshots
-        As in `aic`; unlike that, this one finds the number for certain as snapshots grow many.
+    eigenvalues : array_like, shape (..., n_sensors)
+        As in `aic`.
+    n_snapshots : float
+        As in `aic`; unlike `aic`, the estimated number is consistent as n_snapshots grows.
 
     Returns
     -------
     ndarray, shape (..., n_sensors)
+        For 0 to n_sensors - 1 sources; infinite for n_snapshots sources and more.
 
     Raises
     ------
@@ -78,14 +81,28 @@ def mdl(eigenvalues: ArrayLike, n_snapshots: float) -> Float:
     >>> mdl([21.2359, 2.1717, 1.4279, 1.0979, 1.0544, 0.9432, 0.7324], 100).round(1)
     array([590.4,  67.2,  66.9,  80.7,  95.5, 105.2, 110.5])
     """
-    misfit, free = _misfit(eigenvalues, n_snapshots)
-    return np.asarray(misfit + free / 2 * np.log(n_snapshots))
+    misfit, n_free = _misfit(eigenvalues, n_snapshots)
+    return np.asarray(misfit + n_free / 2 * np.log(n_snapshots))  # (17)
 
 
 def number_of_sources(
     eigenvalues: ArrayLike, n_snapshots: float, criterion: Criterion = "mdl"
 ) -> Int:
-    """Return the number of sources, (...), at which a criterion is least; see `aic`, `mdl`.
+    """Return the number of sources that minimizes a criterion.
+
+    Parameters
+    ----------
+    eigenvalues : array_like, shape (..., n_sensors)
+        As in `aic`.
+    n_snapshots : float
+        As in `aic`.
+    criterion : {"mdl", "aic"}
+        The criterion.
+
+    Returns
+    -------
+    ndarray of int, shape (...)
+        Number of sources.
 
     Examples
     --------
@@ -98,15 +115,15 @@ def number_of_sources(
 
 
 def _misfit(eigenvalues: ArrayLike, n_snapshots: float) -> tuple[Float, Float]:
-    """Return minus the log-likelihood, and the number of free parameters, for k sources."""
+    """Return the negative log-likelihood and the number of free parameters for k sources."""
     n = positive("n_snapshots", n_snapshots)
     values = real("eigenvalues", eigenvalues)
     if values.ndim == 0 or values.shape[-1] == 0 or not np.isfinite(values).all():
-        raise ValueError(f"eigenvalues must be finite, at least one of them; got {eigenvalues!r}")
+        raise ValueError(f"eigenvalues must be finite, at least one; got {eigenvalues!r}")
     p = values.shape[-1]
     used = max(1, min(p, int(n)))
     values = -np.sort(-values, axis=-1)[..., :used]
-    floor = np.maximum(ROUNDING * values[..., :1], np.finfo(float).tiny)
+    floor = np.maximum(MIN_RELATIVE_EIGENVALUE * values[..., :1], np.finfo(float).tiny)
     values = np.maximum(values, floor)
     k = np.arange(used)
     arithmetic = _tails(values) / (used - k)
@@ -117,5 +134,5 @@ def _misfit(eigenvalues: ArrayLike, n_snapshots: float) -> tuple[Float, Float]:
 
 
 def _tails(values: Float) -> Float:
-    """Return the sums of all values from each one on."""
+    """Return the sums of each value and all later ones."""
     return np.asarray(values[..., ::-1].cumsum(axis=-1)[..., ::-1])

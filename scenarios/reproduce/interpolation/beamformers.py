@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models import ArraySamples, FlatBand, Tones
-from arrivals.trackers.beamforming.cbf import look_directions, refined
-from arrivals.trackers.beamforming.mvdr import capon_power, loaded
+from arrivals.trackers.beamforming.covariance import diagonal_loading
+from arrivals.trackers.beamforming.mvdr import capon_power
+from arrivals.trackers.beamforming.spectrum import refine_peaks, scan_directions
 from arrivals.typing import Complex, Float, Int
 from arrivals.validation import one_of, real
 
@@ -71,12 +72,12 @@ def scan(
     if not refine:
         degrees = np.deg2rad(np.arange(-90.0, 91.0))
         return float(degrees[_highest(beams.power(degrees))[0]])
-    grid = look_directions(measurement.array, N_DIRECTIONS)
+    grid = scan_directions(measurement.array, N_DIRECTIONS)
     top = _highest(beams.power(grid))
     step = grid[1] - grid[0]
     fine = np.clip(grid[top] + step * np.linspace(-1, 1, 101), -np.pi / 2, np.pi / 2)
     power = beams.power(fine)
-    return float(refined(fine, power, _highest(power))[0])
+    return float(refine_peaks(fine, power, _highest(power))[0])
 
 
 def _highest(power: Float) -> Int:
@@ -102,7 +103,7 @@ class Narrowband:
         """Return the power of beams at directions (n,)."""
         A = self.array.steering_vector(doa, self.wavelength)
         if self.method == "mvdr":
-            return capon_power(A, np.asarray(loaded(self.covariance, self.loading)))
+            return capon_power(A, np.asarray(diagonal_loading(self.covariance, self.loading)))
         return np.asarray(((A.conj() @ self.covariance) * A).sum(axis=-1).real)
 
 
@@ -130,7 +131,9 @@ class Broadband:
         # the covariance of the aligned bins, steered
         R = (np.swapaxes(aligned, -1, -2) @ aligned.conj()).real / len(self.Y)
         ones = np.ones((self.array.n_sensors, 1))
-        return np.asarray(1 / np.linalg.solve(loaded(R, self.loading), ones).sum(axis=(-2, -1)))
+        return np.asarray(
+            1 / np.linalg.solve(diagonal_loading(R, self.loading), ones).sum(axis=(-2, -1))
+        )
 
 
 def bins(frequencies: Float, measurement: ArraySamples) -> Int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from arrivals.scenarios.simulations.swellex96 import TowPastLine
-from arrivals.trackers.beamforming.cbf import beam_power, look_directions
+from arrivals.trackers.beamforming.spectrum import bartlett_power, scan_directions
 from arrivals.typing import Complex, Float, Int
 
 CRITICAL = np.arccos(1488 / 1600)  # rad, the paper's critical angle of the bottom
@@ -23,8 +23,8 @@ def beam(scenario: TowPastLine, snapshots: Complex) -> tuple[Float, Float]:
     ((361,), (1, 361))
     """
     model = scenario.measurement
-    doa = look_directions(model.array, 361)
-    return doa, beam_power(model.array.steering_vector(doa, model.wavelength), snapshots)
+    doa = scan_directions(model.array, 361)
+    return doa, bartlett_power(model.array.steering_vector(doa, model.wavelength), snapshots)
 
 
 def claims(scenario: TowPastLine, step: Int) -> list[Claim]:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from arrivals.files import atomic_write
 from arrivals.measurement_models import ArraySnapshot, SensorArray
-from arrivals.trackers.beamforming.cbf import beam_power, look_directions, looks_power
+from arrivals.trackers.beamforming.spectrum import bartlett_power, mean_beam_power, scan_directions
 from arrivals.trackers.run import Run
 from arrivals.typing import Bool, Float, Int
 from arrivals.validation import one_of, positive, shaped
@@ -117,7 +117,7 @@ def _draw_beam(
         raise ValueError(f"snapshots must have shape {shape}; got {snapshots.shape}")
     if not (np.isfinite(snapshots) & (snapshots != 0)).any():
         return  # silence
-    doa = look_directions(measurement.array, N_DIRECTIONS)
+    doa = scan_directions(measurement.array, N_DIRECTIONS)
     starts = np.arange(0, len(at), max(1, -(-len(at) // N_COLUMNS)))
     blocks = np.split(snapshots, starts[1:])
     power = np.array([_beam(measurement, doa, block) for block in blocks])
@@ -136,10 +136,12 @@ def _beam(measurement: ArraySnapshot, doa: Float, block: Any) -> Float:
     """Return the highest power in each direction of the steps of a block."""
     if measurement.is_single and measurement.response is None:
         A = measurement.steering_vector(doa)
-        return np.asarray(beam_power(A, block).max(axis=0))
+        return np.asarray(bartlett_power(A, block).max(axis=0))
     steering = measurement.waves.steering(doa)
     looks = block.reshape(len(block), measurement.n_bins, measurement.n_snapshots, -1)
-    return np.asarray(np.max([looks_power(steering, np.swapaxes(Y, 1, 2)) for Y in looks], axis=0))
+    return np.asarray(
+        np.max([mean_beam_power(steering, np.swapaxes(Y, 1, 2)) for Y in looks], axis=0)
+    )
 
 
 def _edges(centres: Float) -> Float:

@@ -1,4 +1,4 @@
-"""SBL and SSBL: the algorithm written out by hand, several snapshots, batches, memory."""
+"""SBL and SSBL: reference implementation, several snapshots, batches, memory."""
 
 import numpy as np
 import pytest
@@ -7,10 +7,10 @@ from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.scenarios import create
 from arrivals.trackers import SBL, SSBL
 from arrivals.trackers.sparse_bayes.fixed_point import (
-    SparseBayes,
+    FixedPointSolver,
     residual_noise,
-    sharpened,
-    widened,
+    spread_powers,
+    update_powers,
 )
 from arrivals.typing import Complex, Float
 
@@ -19,9 +19,9 @@ CIRCLE = ArraySnapshot(SensorArray.uca(9, radius=0.5), wavelength=1.0, noise=1e-
 GRID = np.deg2rad(np.arange(-90, 90.25, 0.5))
 
 
-def by_hand(A: Complex, y: Complex, gamma: Float) -> tuple[Float, float, int]:
-    """Section 11 of the specification, one snapshot, with a pseudo-inverse."""
-    M, sigma2, least, best = len(y), 0.1, np.inf, (gamma, 0.1, 0)
+def reference_sbl(A: Complex, y: Complex, gamma: Float) -> tuple[Float, float, int]:
+    """Reference implementation: specification, section 11, one snapshot, pseudo-inverse."""
+    M, sigma2, smallest, best = len(y), 0.1, np.inf, (gamma, 0.1, 0)
     for n in range(1, 1001):
         Sigma = np.linalg.inv(sigma2 * np.eye(M) + A @ np.diag(gamma) @ A.conj().T)
         numerator = np.abs(A.conj().T @ Sigma @ y) ** 2
@@ -30,19 +30,21 @@ def by_hand(A: Complex, y: Complex, gamma: Float) -> tuple[Float, float, int]:
         inner = range(1, len(gamma) - 1)
         top = [i for i in inner if gamma[i - 1] < gamma[i] >= gamma[i + 1]]
         active = A[:, sorted(top, key=lambda i: -gamma[i])[: -(-M // 2)]]
-        left = np.eye(M) - active @ np.linalg.pinv(active)
-        sigma2 = np.trace(left @ np.outer(y, y.conj())).real / (M - -(-M // 2))
+        residual = np.eye(M) - active @ np.linalg.pinv(active)
+        sigma2 = np.trace(residual @ np.outer(y, y.conj())).real / (M - -(-M // 2))
         change = np.abs(gamma - old).sum() / gamma.sum()
-        if change < least:
-            least, best = change, (gamma, sigma2, n)
+        if change < smallest:
+            smallest, best = change, (gamma, sigma2, n)
         if n >= 15 and change < 1e-3:
             return *best[:2], n
     raise AssertionError("did not converge")
 
 
-def test_sbl_is_the_algorithm_written_out() -> None:
+def test_sbl_equals_the_reference_implementation() -> None:
     z = LINE.simulate(np.deg2rad([-31.0, 4.2, 55.0]), [1.0, 0.8j, -0.7], np.random.default_rng(1))
-    gamma, sigma2, n = by_hand(LINE.array.steering_vector(GRID, 1.0).T / 15**0.5, z, np.ones(361))
+    gamma, sigma2, n = reference_sbl(
+        LINE.array.steering_vector(GRID, 1.0).T / 15**0.5, z, np.ones(361)
+    )
     tracker = SBL(LINE)
     tracker.update(z)
     np.testing.assert_allclose(tracker.gamma, gamma, atol=1e-8 * gamma.max())
@@ -50,8 +52,8 @@ def test_sbl_is_the_algorithm_written_out() -> None:
     assert tracker.estimate.iterations == n
 
 
-def test_likelihood_does_not_fall_while_the_noise_is_known() -> None:
-    """The fixed point is that of the evidence: ln det Σ + yᴴΣ⁻¹y goes down, up to its end."""
+def test_update_powers_with_known_noise_never_decreases_the_likelihood() -> None:
+    """The fixed point minimizes ln det Σ + yᴴΣ⁻¹y, the negative log evidence."""
     z = LINE.simulate(np.deg2rad([-31.0, 4.2]), [1.0, 0.8j], np.random.default_rng(2))
     A = LINE.array.steering_vector(GRID, 1.0) / 15**0.5
     gamma, cost = np.ones((1, 361)), []
@@ -59,13 +61,13 @@ def test_likelihood_does_not_fall_while_the_noise_is_known() -> None:
         Sigma = 0.01 * np.eye(15) + (A.T * gamma[0]) @ A.conj()
         quadratic = np.vdot(z, np.linalg.solve(Sigma, z)).real
         cost.append(np.linalg.slogdet(Sigma)[1] + quadratic)
-        gamma = sharpened(A, z[None, :, None], gamma, np.array([0.01]))
+        gamma = update_powers(A, z[None, :, None], gamma, np.array([0.01]))
     assert cost[-1] < cost[0] - 10
     assert np.diff(cost).max() < 1e-6
 
 
 @pytest.mark.parametrize("model", [LINE, CIRCLE])
-def test_same_snapshot_twice_is_that_snapshot(model: ArraySnapshot) -> None:
+def test_sbl_of_a_repeated_snapshot_equals_that_of_one(model: ArraySnapshot) -> None:
     z = model.simulate([-0.4, 0.9], [1.0, 0.8j], np.random.default_rng(3))
     one, two = SBL(model), SBL(model)
     one.update(z)
@@ -74,7 +76,7 @@ def test_same_snapshot_twice_is_that_snapshot(model: ArraySnapshot) -> None:
     assert two.noise == pytest.approx(one.noise)
 
 
-def test_more_snapshots_find_weaker_sources() -> None:
+def test_sbl_of_several_snapshots_detects_weak_sources() -> None:
     rng = np.random.default_rng(4)
     doa = np.deg2rad([-20.0, 10.0])
     phases = np.exp(2j * np.pi * rng.random((40, 2)))
@@ -85,71 +87,71 @@ def test_more_snapshots_find_weaker_sources() -> None:
     assert np.sort(tracker.estimate.doa) == pytest.approx(doa, abs=np.deg2rad(1.6))
 
 
-def test_rows_that_were_missed_and_sensors_that_failed_are_left_out() -> None:
+def test_sbl_leaves_out_missing_rows_and_failed_sensors() -> None:
     z = LINE.simulate(np.full((3, 1), 0.3), 1.0, np.random.default_rng(5))
-    holed = z.copy()
-    holed[1] = np.nan
+    damaged = z.copy()
+    damaged[1] = np.nan
     tracker, other = SBL(LINE), SBL(LINE)
-    tracker.update(holed)
+    tracker.update(damaged)
     other.update(z[[0, 2]])
     np.testing.assert_array_equal(tracker.gamma, other.gamma)
-    holed[0, 4] = np.nan
-    tracker.update(holed)
+    damaged[0, 4] = np.nan
+    tracker.update(damaged)
     assert tracker.estimate.doa[0] == pytest.approx(0.3, abs=0.02)
 
 
 @pytest.mark.parametrize("kind", [SBL, SSBL])
-def test_batch_is_the_runs_to_the_last_bit(kind: type[SBL]) -> None:
+def test_run_batch_equals_single_runs_bit_by_bit(kind: type[SBL]) -> None:
     trials = [create("svalse_fig6", n_steps=n).sample(np.random.default_rng(n)) for n in (3, 5, 4)]
     batch = [trial.measurements.copy() for trial in trials]
     batch[1][2, 3] = np.nan
     batch[2][1] = np.nan
-    together = kind(LINE).run_batch(batch)
-    for run, z in zip(together, batch, strict=True):
-        alone = kind(LINE).run(z)
-        np.testing.assert_array_equal(run.doa, alone.doa)
-        np.testing.assert_array_equal(run.noise, alone.noise)
-        np.testing.assert_array_equal(run.iterations, alone.iterations)
+    runs = kind(LINE).run_batch(batch)
+    for run, z in zip(runs, batch, strict=True):
+        single = kind(LINE).run(z)
+        np.testing.assert_array_equal(run.doa, single.doa)
+        np.testing.assert_array_equal(run.noise, single.noise)
+        np.testing.assert_array_equal(run.iterations, single.iterations)
 
 
-def test_ssbl_starts_from_the_last_step_that_was_heard() -> None:
+def test_ssbl_starts_from_the_last_step_with_data() -> None:
     z = LINE.simulate(np.full((2, 1), 0.3), 1.0, np.random.default_rng(6))
     tracker, first = SSBL(LINE), SBL(LINE)
     tracker.predict()
     tracker.update(z[0])
     first.update(z[0])
     np.testing.assert_array_equal(tracker.gamma, first.gamma)
-    for silent in (None, np.zeros(15), np.nan * np.zeros(15)):
+    for z_empty in (None, np.zeros(15), np.nan * np.zeros(15)):
         tracker.predict()
-        tracker.update(silent)
+        tracker.update(z_empty)
         assert tracker.estimate.n_found == 0
     tracker.predict()
-    np.testing.assert_array_equal(tracker.start, widened(first.gamma, 2, 0.04, 1e-3, False))
+    np.testing.assert_array_equal(tracker.start, spread_powers(first.gamma, 2, 0.04, 1e-3, False))
     other = tracker.set_params(n_directions=91)
     other.update(z[1])
     assert other.gamma.shape == (91,)
 
 
-def test_widening_wraps_on_a_circle_only() -> None:
+def test_spread_powers_wraps_on_a_circle_only() -> None:
     spike = np.eye(1, 8)[0]
-    np.testing.assert_allclose(widened(spike, 1, 1.0, 1e-3, True)[[-1, 0, 1]], 1.001)
-    assert widened(spike, 1, 1.0, 1e-3, False)[-1] == pytest.approx(1e-3)
+    np.testing.assert_allclose(spread_powers(spike, 1, 1.0, 1e-3, True)[[-1, 0, 1]], 1.001)
+    assert spread_powers(spike, 1, 1.0, 1e-3, False)[-1] == pytest.approx(1e-3)
 
 
-def test_noise_of_what_the_peaks_explain_is_zero_and_of_the_rest_its_share() -> None:
+def test_residual_noise_is_the_power_outside_the_peaks() -> None:
     A = np.eye(6, dtype=np.complex128)
-    gamma = np.array([[0.0, 3.0, 0.0, 2.0, 0.0, 0.0]])  # two peaks, where three may be
+    gamma = np.array([[0.0, 3.0, 0.0, 2.0, 0.0, 0.0]])  # two peaks; three are allowed
     Y = np.array([1.0, 2.0, 2.0, 5.0, 0.0, 0.0])[None, :, None]
     assert residual_noise(A, Y, gamma, circular=False) == pytest.approx([(1 + 4) / 3])
 
 
-def test_impatient_iteration_says_that_it_did_not_converge() -> None:
+def test_sbl_with_too_few_iterations_reports_no_convergence() -> None:
     z = LINE.simulate([0.3], 1.0, np.random.default_rng(7))
     A = LINE.array.steering_vector(GRID, 1.0) / 15**0.5
-    powers = SparseBayes(max_iterations=3).fit(A, z[None, :, None], np.ones((1, 361)), 0.1)
+    powers = FixedPointSolver(max_iterations=3).solve(A, z[None, :, None], np.ones((1, 361)), 0.1)
     assert not powers.converged[0]
     assert powers.iterations[0] == 3
-    tracker = SBL(LINE, max_iterations=3)
+    tracker = SBL(LINE).set_params(solver__max_iterations=3)
     tracker.update(z)
     assert not tracker.estimate.converged
 
@@ -159,10 +161,29 @@ def test_impatient_iteration_says_that_it_did_not_converge() -> None:
     [
         ({"n_directions": 2}, "n_directions must be at least 3"),
         ({"threshold": 2.0}, r"threshold must lie in \[0, 1\]"),
-        ({"start_noise": 0.0}, "start_noise must be finite and positive"),
+        ({"initial_noise": 0.0}, "initial_noise must be finite and positive"),
         ({"max_sources": 0}, "max_sources must be at least 1"),
     ],
 )
-def test_nonsense_is_refused(params: dict[str, float], message: str) -> None:
+def test_invalid_parameters_are_refused(params: dict[str, float], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         SBL(LINE, **params)  # type: ignore[arg-type]  # on purpose
+
+
+@pytest.mark.parametrize(
+    ("params", "message"),
+    [
+        ({"tolerance": 0.0}, "tolerance must be finite and positive"),
+        ({"max_iterations": 0}, "max_iterations must be at least 1"),
+    ],
+)
+def test_solver_refuses_invalid_settings(params: dict[str, float], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        FixedPointSolver(**params)  # type: ignore[arg-type]  # on purpose
+
+
+def test_old_settings_of_the_iteration_are_refused_with_the_new_names() -> None:
+    with pytest.raises(TypeError, match="now called 'max_iterations', a parameter of 'solver'"):
+        SSBL(LINE, max_iterations=3)  # type: ignore[call-arg]  # on purpose
+    with pytest.raises(TypeError, match="'reach': it is now called 'n_neighbours'"):
+        SSBL(LINE, reach=3)  # type: ignore[call-arg]  # on purpose

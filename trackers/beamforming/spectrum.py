@@ -1,0 +1,210 @@
+"""Spatial spectra on a scan grid, and their peaks."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from arrivals.measurement_models.arrays.sensor_array import SensorArray
+from arrivals.typing import Complex, Float, Int
+
+
+def scan_directions(array: SensorArray, n: int) -> Float:
+    """Return n equally spaced directions: -π/2 to π/2 for a line, the full circle otherwise.
+
+    Parameters
+    ----------
+    array : SensorArray
+        Decides between a line and a circle by its dimension.
+    n : int
+        Number of directions.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Directions, rad.
+
+    Examples
+    --------
+    >>> np.rad2deg(scan_directions(SensorArray.ula(4, 0.5), 5))
+    array([-90., -45.,   0.,  45.,  90.])
+    """
+    if array.dim == 1:
+        return np.linspace(-np.pi / 2, np.pi / 2, n)
+    return np.linspace(-np.pi, np.pi, n, endpoint=False)
+
+
+@lru_cache(maxsize=4)  # arrays are immutable; without the cache it is a third of a step's time
+def scan_steering_matrix(array: SensorArray, wavelength: float, n: int) -> tuple[Float, Complex]:
+    """Return n scan directions and their steering vectors, cached and read-only.
+
+    Parameters
+    ----------
+    array : SensorArray
+        Array of isotropic sensors.
+    wavelength : float
+        Wavelength, m.
+    n : int
+        Number of directions.
+
+    Returns
+    -------
+    doa_grid : ndarray, shape (n,)
+        Directions, rad, as in `scan_directions`.
+    A : ndarray, shape (n, n_sensors)
+        Rows a(β).
+
+    Examples
+    --------
+    >>> doa_grid, A = scan_steering_matrix(SensorArray.ula(4, 0.5), 1.0, 5)
+    >>> doa_grid.shape, A.shape
+    ((5,), (5, 4))
+    """
+    doa_grid = scan_directions(array, n)
+    A = array.steering_vector(doa_grid, wavelength)
+    for shared in (doa_grid, A):
+        shared.setflags(write=False)
+    return doa_grid, A
+
+
+def bartlett_power(A: Complex, z: ArrayLike) -> Float:
+    """Return the Bartlett spectrum |aᴴz|² / ‖a‖² of snapshots.
+
+    Parameters
+    ----------
+    A : ndarray, shape (n_directions, n_sensors)
+        Rows a(β), of entries with unit modulus.
+    z : array_like, shape (..., n_sensors)
+        Snapshots; sensors that are NaN or infinite are left out.
+
+    Returns
+    -------
+    ndarray, shape (..., n_directions)
+        A plane wave of amplitude w has M|w|² in its direction, M the number of valid sensors.
+
+    Examples
+    --------
+    >>> bartlett_power(np.ones((1, 3)), [1.0, np.nan, 1.0]).round(6)
+    array([2.])
+    """
+    z = np.asarray(z)
+    valid = np.isfinite(z)
+    beam = np.where(valid, z, 0) @ A.conj().T
+    n_valid = np.maximum(valid.sum(axis=-1, keepdims=True), 1)
+    return np.asarray((beam.real**2 + beam.imag**2) / n_valid)
+
+
+def mean_beam_power(A: Complex, Y: Complex) -> Float:
+    """Return the mean of |aᴴy|² / ‖a‖² over bins and snapshots, the largest over a nuisance.
+
+    Parameters
+    ----------
+    A : ndarray, shape (n_nuisance, n_bins, n_sensors, n_directions)
+        Steering vectors for each value of the nuisance parameter: slowness or elevation.
+    Y : ndarray, shape (n_bins, n_sensors, n_snapshots)
+        Snapshots without valid data are left out, and sensors that are NaN are left out of theirs.
+
+    Returns
+    -------
+    ndarray, shape (n_directions,)
+        A plane wave of amplitude w has M|w|² in its direction, M the number of valid sensors.
+
+    Examples
+    --------
+    >>> mean_beam_power(np.ones((1, 1, 3, 1)), np.array([[[1.0], [np.nan], [1.0]]]))
+    array([2.])
+    """
+    valid = ~np.isnan(Y)
+    # axes: nuisance, bins, directions, snapshots
+    beam = np.swapaxes(A.conj(), 2, 3) @ np.where(valid, Y, 0)
+    norm = np.swapaxes(A.real**2 + A.imag**2, 2, 3) @ valid
+    power = (beam.real**2 + beam.imag**2) / np.maximum(norm, 1e-12)
+    n_valid = max(int(valid.any(axis=1).sum()), 1)
+    return np.asarray(power.sum(axis=(1, 3)).max(axis=0) / n_valid)
+
+
+def find_peaks(power: Float, *, circular: bool) -> Int:
+    """Return the indices of the local maxima of a spectrum, the highest first.
+
+    Parameters
+    ----------
+    power : ndarray, shape (n_directions,)
+        Spectrum on a scan grid.
+    circular : bool
+        True if the first direction follows the last. The ends of a line's spectrum are never
+        peaks.
+
+    Returns
+    -------
+    ndarray of int, shape (n_peaks,)
+        Indices into `power`.
+
+    Examples
+    --------
+    >>> find_peaks(np.array([9.0, 1.0, 3.0, 2.0, 4.0, 0.0]), circular=False)
+    array([4, 2])
+    """
+    rise = 1e-9 * power.max()  # the ripple of a flat spectrum is rounding
+    around = np.concatenate([power[-1:], power, power[:1]])
+    is_peak = (power > around[:-2] + rise) & (power >= around[2:])
+    if not circular:
+        is_peak[[0, -1]] = False
+    peaks = is_peak.nonzero()[0]
+    return np.asarray(peaks[np.argsort(-power[peaks], kind="stable")])
+
+
+def refine_peaks(doa_grid: Float, power: Float, peaks: Int) -> Float:
+    """Return directions between grid points: vertices of parabolas through the peaks in dB.
+
+    Parameters
+    ----------
+    doa_grid : ndarray, shape (n_directions,)
+        Scan directions, equally spaced, rad.
+    power : ndarray, shape (n_directions,)
+        Spectrum.
+    peaks : ndarray of int, shape (n_peaks,)
+        Indices of the peaks.
+
+    Returns
+    -------
+    ndarray, shape (n_peaks,)
+        Directions, rad, at most half a grid step from the peaks.
+
+    Examples
+    --------
+    >>> level = np.array([3.0, 4.0, 4.0, 3.0])
+    >>> refine_peaks(np.arange(4.0), np.exp(level), np.array([1]))
+    array([1.5])
+    """
+    return parabolic_peak(doa_grid, np.log(np.maximum(power, np.finfo(float).tiny)), peaks)
+
+
+def parabolic_peak(doa_grid: Float, level: Float, peaks: Int) -> Float:
+    """Return the vertices of the parabolas through peaks of a level and their two neighbours.
+
+    Parameters
+    ----------
+    doa_grid : ndarray, shape (n_directions,)
+        Scan directions, equally spaced, rad.
+    level : ndarray, shape (n_directions,)
+        Any function of direction, such as a spectrum in dB.
+    peaks : ndarray of int, shape (n_peaks,)
+        Indices of the peaks.
+
+    Returns
+    -------
+    ndarray, shape (n_peaks,)
+        Directions, rad, at most half a grid step from the peaks.
+
+    Examples
+    --------
+    >>> parabolic_peak(np.arange(4.0), np.array([3.0, 4.0, 4.0, 3.0]), np.array([1]))
+    array([1.5])
+    """
+    left, middle, right = level[peaks - 1], level[peaks], level[(peaks + 1) % len(level)]
+    bend = 2 * middle - left - right
+    shift = (right - left) / (2 * np.where(bend > 0, bend, np.inf))
+    step = doa_grid[1] - doa_grid[0]
+    return np.asarray(doa_grid[peaks] + step * np.maximum(np.minimum(shift, 0.5), -0.5))
