@@ -414,44 +414,44 @@ class CannotBeCloned(Smoother):
 
 NUMBERS = np.random.default_rng(0).normal(size=(4, 2))
 FAULTS: list[tuple[Callable[[], Tracker], str, str]] = [
-    (WritesIntoItsArrays, "kept_arrays_stay", "half step.*x"),
-    (WritesIntoTheMeasurement, "measurement_stays_the_callers", "measurement 1: "),
-    (KeepsTheMeasurement, "measurement_stays_the_callers", "array was reused"),
+    (WritesIntoItsArrays, "earlier_results_are_not_modified", "half step.*x"),
+    (WritesIntoTheMeasurement, "measurement_is_neither_modified_nor_kept", "measurement 1: "),
+    (KeepsTheMeasurement, "measurement_is_neither_modified_nor_kept", "array was reused"),
     (CountsInAGlobal, "same_input_gives_same_output", "step 0 .*x"),
-    (ForgetsToRestore, "bad_measurement_leaves_everything", "one number too many.*P|P.*became"),
-    (SwallowsText, "bad_measurement_leaves_everything", "text was accepted"),
-    (RaisesKeyError, "bad_measurement_leaves_everything", "raised KeyError"),
-    (TakesAnything, "constructor_takes_the_parameters", "must name its parameters"),
-    (RenamesItsParameter, "constructor_takes_the_parameters", "no attribute 'alpha'"),
-    (HalvesItsParameter, "constructor_takes_the_parameters", "gain: 0.25 became 0.125"),
-    (ForgetsOnSetParams, "own_parameters_change_nothing", "after set_params"),
+    (ForgetsToRestore, "invalid_measurement_changes_nothing", "one value too many.*P|P.*became"),
+    (SwallowsText, "invalid_measurement_changes_nothing", "text was accepted"),
+    (RaisesKeyError, "invalid_measurement_changes_nothing", "raised KeyError"),
+    (TakesAnything, "constructor_accepts_its_parameters", "must name its parameters"),
+    (RenamesItsParameter, "constructor_accepts_its_parameters", "no attribute 'alpha'"),
+    (HalvesItsParameter, "constructor_accepts_its_parameters", "gain: 0.25 became 0.125"),
+    (ForgetsOnSetParams, "setting_own_parameters_changes_nothing", "after set_params"),
     (IgnoresUnknownNames, "unknown_parameter_is_refused", "no_such_parameter=1. was accepted"),
     (SetsBeforeItChecks, "unknown_parameter_is_refused", "after set_params"),
-    (MovesWhenMissed, "missed_measurement_leaves_belief", "update.None.*P"),
-    (ChokesOnNaN, "missed_measurement_leaves_belief", "nan"),
+    (MovesWhenMissed, "missing_measurement_keeps_belief", "update.None.*P"),
+    (ChokesOnNaN, "missing_measurement_keeps_belief", "nan"),
     (NegativeVariance, "belief_has_mean_and_covariance", "negative eigenvalue -0.001"),
     (LopsidedCovariance, "belief_has_mean_and_covariance", "not symmetric"),
     (ComplexMean, "belief_has_mean_and_covariance", "array of floats"),
     (GrowsItsState, "belief_has_mean_and_covariance", "shapes"),
-    (CannotBePickled, "pickle_goes_on_like_the_original", "raised"),
-    (PickleLosesTheMean, "pickle_goes_on_like_the_original", "after pickling"),
-    (CopiesAreAliases, "deep_copy_is_independent", "while its copy moved|after copying"),
-    (RunsFromScratch, "run_is_the_loop", "x of step 0"),
-    (BatchMovesTheTracker, "batch_is_single_runs", "after run_batch"),
-    (ForgetsTheLastOfABatch, "batch_is_single_runs", "number of runs"),
-    (LabelsTwice, "estimate_is_a_frozen_record", "given twice"),
+    (CannotBePickled, "pickled_tracker_continues_like_the_original", "raised"),
+    (PickleLosesTheMean, "pickled_tracker_continues_like_the_original", "after pickling"),
+    (CopiesAreAliases, "deep_copy_is_independent", "after steps of its copy|after copying"),
+    (RunsFromScratch, "run_equals_the_predict_update_loop", "x of step 0"),
+    (BatchMovesTheTracker, "batch_equals_single_runs", "after run_batch"),
+    (ForgetsTheLastOfABatch, "batch_equals_single_runs", "number of runs"),
+    (LabelsTwice, "estimate_is_a_frozen_record", "must be unique"),
     (MoreLikelyThanSure, "estimate_is_a_frozen_record", r"existence must lie in \[0, 1\]"),
     (FieldsDiffer, "estimate_is_a_frozen_record", "differ in length"),
     (ChangesKind, "estimate_is_a_frozen_record", "DirectionEstimate.* became .*OtherKind"),
     (NotFrozen, "estimate_is_a_frozen_record", "Thawed is not frozen"),
     (DirectionUnknown, "estimate_is_a_frozen_record", "doa must be finite"),
     (WritesHalfARow, "estimate_is_a_frozen_record", "row"),
-    (ReplacesItsModel, "parts_are_immutable", "motion was replaced"),
+    (ReplacesItsModel, "models_are_not_modified", "motion was replaced"),
     (HasSlowProperty, "filterpy_saver_works", "not yet"),
     (KeepsARaggedHistory, "filterpy_saver_works", "could not convert|history"),
     (NotJSON, "configuration_survives_json", "not JSON serializable"),
     (DropsAParameter, "configuration_survives_json", "the rebuilt one"),
-    (CannotBeCloned, "sklearn_clones_it", "places"),
+    (CannotBeCloned, "sklearn_clone_is_equal", "places"),
 ]
 
 
@@ -476,12 +476,12 @@ def test_sound_tracker_passes() -> None:
 
 
 def test_check_tracker_runs_the_checks() -> None:
-    with pytest.raises(AssertionError, match=r"^kept_arrays_stay"):
+    with pytest.raises(AssertionError, match=r"^earlier_results_are_not_modified"):
         check_tracker(WritesIntoItsArrays, NUMBERS)
 
 
 def test_one_measurement_is_not_enough() -> None:
-    with pytest.raises(AssertionError, match="needs two measurements"):
+    with pytest.raises(AssertionError, match="requires at least two measurements"):
         CHECKS[0](Smoother, NUMBERS[:1])
 
 
