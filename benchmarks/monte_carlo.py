@@ -12,12 +12,14 @@ import sys
 import tempfile
 import time
 
-from arrivals.scenarios import SixSources, create, monte_carlo
+from arrivals.scenarios import create, monte_carlo
+from arrivals.scenarios.simulations import SixSources
 
 TRACKERS = ["cbf", "peaks_gnn", "sbl", "ssbl", "valse", "svalse"]
 MEMORY = """
 import resource
-from arrivals.scenarios import SixSources, monte_carlo
+from arrivals.scenarios import monte_carlo
+from arrivals.scenarios.simulations import SixSources
 monte_carlo(SixSources(n_steps=2), ["cbf"], {runs}, out={out!r}, batch=50)
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """

@@ -1,4 +1,4 @@
-"""What every scenario promises: simulated truth, and measurements of it."""
+"""Base classes of scenarios and trials, and the registry of scenarios."""
 
 from __future__ import annotations
 
@@ -26,11 +26,20 @@ class Trial:
     measurements : ndarray, shape (n_steps, n_sensors)
         Complex for an `ArraySnapshot`, real for the others.
     truth : ndarray, shape (n_steps, n_sources) or (n_steps, n_sources, 2)
-        Directions, rad, or positions, m; NaN while a source is off.
+        Directions, rad, or positions, m; NaN while a source is inactive.
     measurement : ArraySnapshot, ArraySamples or LogNormalRSS
+        Measurement model of the scenario.
     motion : MotionModel
+        Motion model of the sources.
     signals : ndarray, shape (n_steps, n_sources), optional
-        What the sources send, where it is their own: complex or real.
+        Source signals, complex or real, of scenarios that simulate them.
+
+    Examples
+    --------
+    >>> from arrivals.scenarios import create
+    >>> trial = create("svalse_fig6", n_steps=3).sample(np.random.default_rng(0))
+    >>> trial.measurements.shape, trial.truth.shape
+    ((3, 15), (3, 6))
     """
 
     measurements: Complex | Float
@@ -40,7 +49,19 @@ class Trial:
     signals: Complex | Float | None = field(default=None, kw_only=True)
 
     def tracker(self, name: str | type[Tracker], **params: Any) -> Tracker:
-        """Make the tracker of that name, or class, with as many of the trial's models as it takes.
+        """Make a tracker with those models of the trial that its constructor takes.
+
+        Parameters
+        ----------
+        name : str or type
+            Registered name, or class.
+        **params : object
+            Further arguments of the constructor; they replace those of the trial.
+
+        Returns
+        -------
+        Tracker
+            A new tracker.
 
         Examples
         --------
@@ -50,21 +71,48 @@ class Trial:
         0.1
         """
         kind = find(name) if isinstance(name, str) else name
-        wanted = inspect.signature(kind).parameters
-        fitting = {key: value for key, value in self.known().items() if key in wanted}
-        return kind(**fitting | params)
+        accepted = inspect.signature(kind).parameters
+        arguments = {key: value for key, value in self.known().items() if key in accepted}
+        return kind(**arguments | params)
 
     def known(self) -> dict[str, Any]:
-        """Return what a tracker may be told, by the names of its parameters."""
+        """Return the models of the trial by the names of a tracker's parameters.
+
+        Returns
+        -------
+        dict
+            Arguments that `tracker` passes where the constructor takes them.
+        """
         return {"measurement": self.measurement, "motion": self.motion}
 
 
 class Scenario(FrozenModel, ABC):
-    """A situation that trackers are tried on; frozen, its numbers are its parameters."""
+    """Base class of scenarios: frozen models that draw trials.
+
+    A subclass is a frozen dataclass whose fields are its parameters.
+
+    Examples
+    --------
+    >>> from arrivals.scenarios import create
+    >>> scenario = create("svalse_fig6", n_steps=3)
+    >>> isinstance(scenario, Scenario), scenario.replace(snr_db=10.0).snr_db
+    (True, 10.0)
+    """
 
     @abstractmethod
     def sample(self, rng: np.random.Generator) -> Trial:
-        """Draw one trial."""
+        """Draw one trial.
+
+        Parameters
+        ----------
+        rng : numpy.random.Generator
+            Source of all random numbers of the trial.
+
+        Returns
+        -------
+        Trial
+            Measurements, truth and models.
+        """
 
 
 _scenarios: Registry[Scenario] = Registry(Scenario, "arrivals.scenarios", "scenario")  # type: ignore[type-abstract]  # only its subclasses are made

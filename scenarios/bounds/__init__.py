@@ -1,1 +1,17 @@
-"""Bounds."""
+"""Cramér-Rao bounds of directions and positions, and probabilities of detection."""
+
+from arrivals.scenarios.bounds.delay import band_bound, exact_bound, tone_bound
+from arrivals.scenarios.bounds.detection import exact_detection, network_detection
+from arrivals.scenarios.bounds.signal_strength import rss_bound
+from arrivals.scenarios.bounds.snapshot import line_bound, snapshot_bound
+
+__all__ = [
+    "band_bound",
+    "exact_bound",
+    "exact_detection",
+    "line_bound",
+    "network_detection",
+    "rss_bound",
+    "snapshot_bound",
+    "tone_bound",
+]

@@ -10,7 +10,7 @@ from arrivals.validation import count, instance, number
 
 
 def tone_bound(measurement: ArraySamples, doa: float, n_steps: int) -> float:
-    """Return the deterministic Cramér-Rao bound of a source of tones: standard deviation, rad.
+    """Return the deterministic Cramér-Rao bound of a source of tones, a standard deviation, rad.
 
     Amplitude and phase of each tone are unknown, its frequency is known:
 
@@ -28,7 +28,7 @@ def tone_bound(measurement: ArraySamples, doa: float, n_steps: int) -> float:
     Raises
     ------
     TypeError
-        If the source is not made of tones.
+        If the source does not consist of tones.
 
     References
     ----------
@@ -49,13 +49,13 @@ def tone_bound(measurement: ArraySamples, doa: float, n_steps: int) -> float:
 
 
 def band_bound(measurement: ArraySamples, doa: float, n_steps: int) -> float:
-    """Return the stochastic Cramér-Rao bound of a flat band: standard deviation, rad.
+    """Return the stochastic Cramér-Rao bound of a flat band, a standard deviation, rad.
 
-    For many snapshots: with η = SNR / (2 (f₂-f₁)),
+    The limit of many snapshots. With η = SNR / (2 (f₂-f₁)),
 
         J = M N(N²-1)/12 ∫ 2η Nη/(1+Nη) (2πf)² df,    std = J^(-1/2) / (κ cos β)
 
-    Below some hundred snapshots it is too low; see `exact_bound`.
+    Below about a hundred snapshots it is too low; see `exact_bound`.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def band_bound(measurement: ArraySamples, doa: float, n_steps: int) -> float:
     Raises
     ------
     TypeError
-        If the source is no flat band.
+        If the source is not a flat band.
 
     Examples
     --------
@@ -87,9 +87,9 @@ def band_bound(measurement: ArraySamples, doa: float, n_steps: int) -> float:
 
 
 def exact_bound(measurement: ArraySamples, doa: float, n_steps: int) -> float:
-    """Return the stochastic Cramér-Rao bound of any Gaussian source: standard deviation, rad.
+    """Return the stochastic Cramér-Rao bound of any Gaussian source, a standard deviation, rad.
 
-    J = tr(C⁻¹C'C⁻¹C') / 2, C the covariance of all samples, so that it is exact for few snapshots.
+    J = tr(C⁻¹C'C⁻¹C') / 2 with the covariance C of all samples; exact for few snapshots.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def exact_bound(measurement: ArraySamples, doa: float, n_steps: int) -> float:
     doa : float
         Direction, rad.
     n_steps : int
-        M, snapshots; a matrix of M times the number of sensors is solved.
+        M, snapshots; a matrix of size M times the number of sensors is solved.
 
     Examples
     --------

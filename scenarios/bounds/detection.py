@@ -1,4 +1,4 @@
-"""How likely a sensor, or a field of sensors, is to notice sources in noise."""
+"""Probabilities of detection and false alarm of one sensor and of a sensor network."""
 
 from __future__ import annotations
 
@@ -9,19 +9,24 @@ from arrivals.typing import Float
 
 
 def exact_detection(false_alarm: ArrayLike, n_snapshots: ArrayLike, snr: ArrayLike) -> Float:
-    """Return the probability of detection of one sensor, exactly.
+    """Return the exact probability of detection of one sensor.
 
     N e²/σ² is a Gamma variable of shape N: P_D = Q_Γ(N, Q_Γ⁻¹(N, P_FA) / (1 + SNR)), with the
-    regularised upper incomplete gamma function. Thresholds are to be set by this one.
+    regularised upper incomplete gamma function. Set thresholds by this one.
 
     Parameters
     ----------
     false_alarm : array_like
-        P_FA.
+        Probability of false alarm, P_FA.
     n_snapshots : array_like
-        N.
+        Number of snapshots, N.
     snr : array_like
         Power of the sources over that of the noise, at the sensor.
+
+    Returns
+    -------
+    ndarray
+        P_D, of the broadcast shape of the arguments.
 
     References
     ----------
@@ -40,7 +45,7 @@ def exact_detection(false_alarm: ArrayLike, n_snapshots: ArrayLike, snr: ArrayLi
 
 
 def log_gaussian_detection(false_alarm: ArrayLike, n_snapshots: ArrayLike, snr: ArrayLike) -> Float:
-    """Return the same with ξ Gaussian: P_D = Q(Q⁻¹(P_FA) - √N ln(1 + SNR)); poor in the tails.
+    """Return P_D with ξ Gaussian: P_D = Q(Q⁻¹(P_FA) - √N ln(1 + SNR)); inaccurate in the tails.
 
     Parameters are those of `exact_detection`.
 
@@ -58,7 +63,7 @@ def log_gaussian_detection(false_alarm: ArrayLike, n_snapshots: ArrayLike, snr: 
 def amplitude_gaussian_detection(
     false_alarm: ArrayLike, n_snapshots: ArrayLike, snr: ArrayLike
 ) -> Float:
-    """Return the same with e Gaussian: γ = 1 + Q⁻¹(P_FA)/2√N, P_D = Q(2√N (γ/√(1+SNR) - 1)).
+    """Return P_D with e Gaussian: γ = 1 + Q⁻¹(P_FA)/2√N, P_D = Q(2√N (γ/√(1+SNR) - 1)).
 
     Parameters are those of `exact_detection`.
 
@@ -75,7 +80,7 @@ def amplitude_gaussian_detection(
 
 
 def true_false_alarm(false_alarm: ArrayLike, n_snapshots: ArrayLike) -> tuple[Float, Float]:
-    """Return the false alarms that the two Gaussian thresholds really give.
+    """Return the exact false-alarm probabilities of the two Gaussian thresholds.
 
     Returns
     -------
@@ -96,15 +101,23 @@ def true_false_alarm(false_alarm: ArrayLike, n_snapshots: ArrayLike) -> tuple[Fl
 
 
 def network_detection(false_alarm: ArrayLike, weights: ArrayLike, snr: ArrayLike) -> Float:
-    """Return the probability of detection of known sources by a whole field of sensors.
+    """Return the probability of detection of known sources by a sensor network.
 
     P_D ≈ Q(Q⁻¹(P_FA) - δ), δ² = Σ W (½ ln(1 + SNR))².
 
     Parameters
     ----------
-    false_alarm : float
-    weights, snr : array_like, shape (..., n_sensors)
-        W = 1/r and the SNR of each sensor.
+    false_alarm : array_like
+        Probability of false alarm, P_FA.
+    weights : array_like, shape (..., n_sensors)
+        W = 1/r of each sensor, r the variance of its reading.
+    snr : array_like, shape (..., n_sensors)
+        Power of the sources over that of the noise, at each sensor.
+
+    Returns
+    -------
+    ndarray, shape (...)
+        P_D.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Bounds on positions and powers from signal strength."""
+"""Cramér-Rao bounds on positions and powers from signal strength."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from arrivals.validation import real
 
 
 class Bound(NamedTuple):
-    """Least variances of unbiased estimates.
+    """Smallest variances of unbiased estimates.
 
     Parameters
     ----------
     v : ndarray, shape (..., n_sources)
-        Of log amplitudes, Np².
+        Variances of log amplitudes, Np².
     Sigma : ndarray, shape (..., n_sources, 2, 2)
         Covariances of positions, m².
     """
@@ -46,7 +46,7 @@ def rss_bound(
     v0: ArrayLike | None = None,
     P0: ArrayLike | None = None,
 ) -> Bound:
-    """Return the Cramér-Rao bound, or with priors the Bayesian one.
+    """Return the Cramér-Rao bound, or the Bayesian one where priors are given.
 
     J = Σ W g gᵀ, plus the precisions of the priors; the same for the exact Chi statistic as for
     its Gaussian approximation.
@@ -54,19 +54,25 @@ def rss_bound(
     Parameters
     ----------
     measurement : LogNormalRSS
+        Sensors and propagation.
     u : array_like, shape (..., n_sources)
         Log amplitudes, Np.
     theta : array_like, shape (..., n_sources, 2)
         Positions, m.
     v0 : float or array_like, shape (n_sources,), optional
-        Prior variances of the log amplitudes, Np²; unknown before if None.
+        Prior variances of the log amplitudes, Np²; no prior if None.
     P0 : array_like, shape (2, 2) or (n_sources, 2, 2), optional
-        Prior covariances of the positions, m²; unknown before if None.
+        Prior covariances of the positions, m²; no prior if None.
+
+    Returns
+    -------
+    Bound
+        Smallest variances of log amplitudes and positions.
 
     Raises
     ------
     ValueError
-        If the readings do not hold all unknowns.
+        If the readings do not determine all unknowns.
 
     References
     ----------
@@ -74,8 +80,8 @@ def rss_bound(
 
     Examples
     --------
-    >>> heard = LogNormalRSS([[0.0, 0.0], [60.0, 0.0], [0.0, 60.0], [60.0, 60.0]])
-    >>> rss_bound(heard, [9.2], [[30.0, 30.0]]).position.round(2)
+    >>> model = LogNormalRSS([[0.0, 0.0], [60.0, 0.0], [0.0, 60.0], [60.0, 60.0]])
+    >>> rss_bound(model, [9.2], [[30.0, 30.0]]).position.round(2)
     array([3.])
     """
     u, theta = real("u", u), real("theta", theta)
@@ -90,5 +96,5 @@ def rss_bound(
         return Bound(*marginals(J))
     except np.linalg.LinAlgError:
         raise ValueError(
-            f"{measurement.dim_z} readings do not hold the {3 * K} unknowns of {K} sources"
+            f"{measurement.dim_z} readings do not determine the {3 * K} unknowns of {K} sources"
         ) from None

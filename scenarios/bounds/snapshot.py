@@ -1,33 +1,33 @@
-"""How well single snapshots can tell directions apart, whatever the method."""
+"""Cramér-Rao bounds on directions from single snapshots."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models import ArraySnapshot
 from arrivals.measurement_models.arrays.sensor_array import direction
-from arrivals.scenarios.simulations.line_arrays import LineScenario
-from arrivals.typing import Float
+from arrivals.typing import Complex, Float
 from arrivals.validation import instance, positive
 
 
 def snapshot_bound(
     measurement: ArraySnapshot, doa: ArrayLike, amplitude: ArrayLike, noise: ArrayLike
 ) -> Float:
-    """Return the deterministic Cramér-Rao bound of one snapshot: standard deviations, rad.
+    """Return the deterministic Cramér-Rao bound of one snapshot, standard deviations, rad.
 
         C = σ²/2 {Re[(DᴴP⊥D) ∘ (w wᴴ)ᵀ]}⁻¹,  D = ∂A/∂β,  P⊥ = I - A A⁺
 
-    Number of sources and noise are known, amplitudes are not.
+    Number of sources and noise variance are known, amplitudes are not.
 
     Parameters
     ----------
     measurement : ArraySnapshot
+        Array and wavelength.
     doa : array_like, shape (..., n_sources)
-        rad.
+        Directions, rad.
     amplitude : array_like, shape (..., n_sources)
         Complex, at the origin of coordinates.
     noise : array_like, shape (...)
@@ -36,6 +36,7 @@ def snapshot_bound(
     Returns
     -------
     ndarray, shape (..., n_sources)
+        Standard deviations, rad.
 
     References
     ----------
@@ -55,11 +56,14 @@ def snapshot_bound(
     array, w = instance("measurement", measurement, ArraySnapshot).array, np.asarray(amplitude)
     beta, wavelength = np.asarray(doa, np.float64), measurement.plain_wavelength("the bound")
     A = np.swapaxes(array.steering_vector(beta, wavelength), -1, -2)
-    turned = direction(beta + np.pi / 2, max(array.dim, 2))  # du/dβ in the plane
-    slope = turned[..., 1:2] if array.dim == 1 else turned
+    rotated = direction(beta + np.pi / 2, max(array.dim, 2))  # du/dβ in the plane
+    slope = rotated[..., 1:2] if array.dim == 1 else rotated
+    # D = ∂A/∂β
     D = 2j * np.pi / wavelength * (array.positions @ np.swapaxes(slope, -1, -2)) * A
-    left = D - A @ (np.linalg.pinv(A) @ D)
-    J = ((np.swapaxes(D.conj(), -1, -2) @ left) * _outer(w)).real
+    # P⊥D = D - A A⁺ D
+    residual = D - A @ (np.linalg.pinv(A) @ D)
+    # J = Re[(DᴴP⊥D) ∘ (w wᴴ)ᵀ],  C = σ²/2 J⁻¹   (2.11)
+    J = ((np.swapaxes(D.conj(), -1, -2) @ residual) * _outer(w)).real
     variance = np.diagonal(np.linalg.pinv(J, hermitian=True), axis1=-2, axis2=-1)
     return np.asarray(np.sqrt(np.asarray(noise)[..., None] / 2 * variance))
 
@@ -69,13 +73,24 @@ def _outer(w: ArrayLike) -> Float:
     return np.asarray(w[..., :, None].conj() * w[..., None, :])
 
 
+class SnapshotScenario(Protocol):
+    """Scenario of single snapshots, such as those of `simulations.line_arrays`."""
+
+    @property
+    def measurement(self) -> ArraySnapshot:
+        """Array and wavelength."""
+
+    def signals(self, rng: np.random.Generator) -> tuple[Float, Complex, Float]:
+        """Draw directions, amplitudes and noise variances, one row a step."""
+
+
 class LineBound(NamedTuple):
-    """What an efficient method that knows the number of sources would reach, degrees.
+    """Errors, degrees, of an efficient estimator with a known number of sources.
 
     Parameters
     ----------
     gospa : float
-        Mean over steps of Σ E min(|e|, c/2): a source that is dropped costs c/2.
+        Mean over steps of Σ E min(|e|, c/2): a missed source costs c/2.
     rmse : float
         Mean over steps of the root of the mean of E min(e², c²).
     """
@@ -84,19 +99,25 @@ class LineBound(NamedTuple):
     rmse: float
 
 
-def line_bound(scenario: LineScenario, runs: int, seed: int = 0, c: float = 10.0) -> LineBound:
-    """Average the bound of single snapshots over a study's draws, errors taken as Gaussian.
+def line_bound(scenario: SnapshotScenario, runs: int, seed: int = 0, c: float = 10.0) -> LineBound:
+    """Average the bound of single snapshots over a study's draws, for Gaussian errors.
 
-    No bound on GOSPA in the strict sense, and none at all on a method that carries over what it
-    knew: a scale.
+    A scale for the results: it is not a bound on GOSPA in the strict sense, and it does not bound
+    a method with memory.
 
     Parameters
     ----------
-    scenario : LineScenario
+    scenario : SnapshotScenario
+        Draws directions, amplitudes and noise.
     runs, seed : int
         As in `monte_carlo`.
     c : float
         Cut-off, degrees.
+
+    Returns
+    -------
+    LineBound
+        Mean GOSPA and RMSE, degrees.
 
     Examples
     --------

@@ -1,1 +1,1 @@
-"""Demos."""
+"""Demonstrations on shipped data: several trackers, a table of tracks of each, one picture."""

@@ -1,4 +1,4 @@
-"""Several methods on one recording: their tracks as CSV files, and one picture of all."""
+"""Comparison of several methods on one recording: tracks as CSV files and one figure."""
 
 from __future__ import annotations
 
@@ -17,20 +17,22 @@ from arrivals.typing import Complex, Float
 
 @dataclass(frozen=True, eq=False)
 class MethodComparison:
-    """A recording, and what is to be drawn of it.
+    """A recording and the settings of its figure.
 
     Parameters
     ----------
     name : str
-        The picture's file name, without its ending.
+        File name of the figure, without suffix.
     measurement : ArraySnapshot
+        Array and wavelengths.
     steps : ndarray, shape (n_steps, ...)
+        Snapshots of each step.
     time : ndarray, shape (n_steps,)
-        Middle of each step, s.
+        Centre of each step, s.
     axes : mapping
-        Properties of the picture's panels, such as `ylabel`.
+        Properties of the panels, such as `ylabel`.
     prefix : str
-        What the names of tracks files begin with.
+        Prefix of the names of tracks files.
     """
 
     name: str
@@ -47,18 +49,18 @@ class MethodComparison:
         bar: Callable[..., Any] = lambda steps, **_: steps,
         n_steps: int | None = None,
     ) -> None:
-        """Run each method, and write PREFIXmethod.csv and NAME.png.
+        """Run each method and write PREFIXmethod.csv and NAME.png.
 
         Parameters
         ----------
         out : path
-            Folder; made if it is not there.
+            Folder; created if missing.
         methods : mapping of str to (str, Tracker)
             Titles of the panels, and the trackers, by name.
         bar : callable
-            Takes the steps and `desc`, gives the steps back, such as tqdm.
+            Progress bar: takes the steps and `desc`, returns the steps, as tqdm does.
         n_steps : int, optional
-            Stop after so many steps.
+            Maximum number of steps.
         """
         from threadpoolctl import threadpool_limits
 
@@ -71,14 +73,14 @@ class MethodComparison:
                 run = tracker.run(bar(steps, desc=f"{name:<6}")).at(time)
             path = folder / f"{self.prefix}{name}.csv"
             run.to_csv(path)
-            print(f"{path}: {_told(run)}", flush=True)
+            print(f"{path}: {_summary(run)}", flush=True)
             runs[title] = run
-        picture = folder / f"{self.name}.png"
-        self._draw(picture, runs, steps)
-        print(picture)
+        figure = folder / f"{self.name}.png"
+        self._draw(figure, runs, steps)
+        print(figure)
 
     def _draw(self, path: Path, runs: Mapping[str, Run], steps: Complex) -> None:
-        """Draw the tracks of each method over the beam power, one below the other."""
+        """Draw the tracks of each method over the beam power, one panel a method."""
         from matplotlib.figure import Figure
 
         from arrivals.plots.bearing_time import plot_bearing_time, save
@@ -95,8 +97,8 @@ class MethodComparison:
         save(panels[0], path)
 
 
-def _told(run: Run) -> str:
-    """Return in words how much was found."""
+def _summary(run: Run) -> str:
+    """Return the numbers of directions, labels and steps, and the elapsed time, as text."""
     n_labels = len(np.unique(run.label[run.label >= 0]))
     labels = f" under {n_labels} labels" if n_labels else ""
     return f"{run.n_found.sum()} directions{labels} in {len(run)} steps, {run.elapsed:.1f} s"

@@ -1,4 +1,4 @@
-"""The second demonstration: sources that come and go, on a recorded infrasound array."""
+"""Demonstration on a recorded infrasound array: intermittent sources."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ FREQUENCIES = (0.6, 1.0, 1.4, 1.8, 2.2)  # Hz
 SLOWNESS = np.linspace(2.0, 5.0, 10) / 1000  # s/m
 METHODS = {
     "svalse": "SVALSE: tracks, one colour a label",
-    "valse": "VALSE: each step on its own",
+    "valse": "VALSE: each step independently",
     "cbf": "Conventional beamformer: its highest peak",
 }
 
@@ -34,9 +34,10 @@ def brp2012() -> tuple[ArraySnapshot, Complex, Float]:
     measurement : ArraySnapshot
         Four microphones in Utah; five frequencies from 0.6 to 2.2 Hz, three windows of 5 s a
         step, the slowness unknown between 2 and 5 s/km. Azimuths are clockwise from north.
-    looks : ndarray, shape (240, 5, 3, 4)
+    steps : ndarray, shape (240, 5, 3, 4)
+        Snapshots (n_steps, n_bins, n_snapshots, n_sensors).
     time : ndarray, shape (240,)
-        Middles of the steps, s from 18:00 UTC, 9 April 2012.
+        Centres of the steps, s after 18:00 UTC, 9 April 2012.
 
     Examples
     --------
@@ -48,21 +49,22 @@ def brp2012() -> tuple[ArraySnapshot, Complex, Float]:
         array = SensorArray.from_toml(path)
     with as_file(files("arrivals.scenarios") / "data" / "brp2012.npz") as path:
         recording = read(path, array=array, variable="samples")
-    heard = looks(recording, FREQUENCIES, window=125, hop=62, n_snapshots=3, stride=2)
+    steps = looks(recording, FREQUENCIES, window=125, hop=62, n_snapshots=3, stride=2)
     measurement = ArraySnapshot(
         array,
         [array.wavelength(f) for f in FREQUENCIES],
         n_snapshots=3,
         slowness=(SLOWNESS * (array.speed or np.nan)).tolist(),
     )
-    return measurement, heard.values, heard.time
+    return measurement, steps.values, steps.time
 
 
 def tracker(name: str, measurement: ArraySnapshot) -> Tracker:
-    """Return a tracker with the settings that this recording wants.
+    """Return a tracker with the settings for this recording.
 
-    Of two sources at most, as four sensors resolve a few tens of degrees; looks overlap and
-    deviate from plane waves alike, so that four count as one; gusts of wind are not sources.
+    At most two sources, as four sensors resolve a few tens of degrees. Snapshots overlap and
+    deviate from plane waves in the same way, so that four count as one. A power floor excludes
+    gusts of wind.
     """
     if name == "cbf":
         return CBF(measurement, max_sources=1)
@@ -77,19 +79,19 @@ def infrasound(
     bar: Callable[..., Any] = lambda steps, **_: steps,
     n_steps: int | None = None,
 ) -> None:
-    """Track infrasound that comes and goes across a recorded array of four microphones.
+    """Track intermittent infrasound recorded by an array of four microphones.
 
-    Between silence, which is wind, there is a short signal from the north-west, a long one from
-    the west-south-west, and the first direction again.
+    Between intervals of wind alone there are three arrivals: a short one from the north-west, a
+    long one from the west-south-west, and one from the north-west again.
 
     Parameters
     ----------
     out : path
-        Folder for the tracks files (CSV) and the picture; made if it is not there.
+        Folder for the tracks files (CSV) and the figure; created if missing.
     bar : callable
-        Takes the steps and `desc`, gives the steps back, such as tqdm.
+        Progress bar: takes the steps and `desc`, returns the steps, as tqdm does.
     n_steps : int, optional
-        Stop after so many of the 240 steps.
+        Maximum number of steps, of 240.
     """
     measurement, steps, time = brp2012()
     axes = {"ylabel": "azimuth from north, degrees"}

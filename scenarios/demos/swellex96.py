@@ -1,4 +1,4 @@
-"""The demonstration: three trackers on shipped data, a table of tracks of each and one picture."""
+"""Demonstration on the shipped SWellEx-96 scene: three trackers, tracks files and one figure."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from arrivals.typing import Complex, Float
 FREQUENCY = 198.0  # Hz
 METHODS = {
     "svalse": "SVALSE: tracks, one colour a label",
-    "valse": "VALSE: each snapshot on its own",
+    "valse": "VALSE: each snapshot independently",
     "cbf": "Conventional beamformer: peaks within 10 dB",
 }
 
 
 def swellex96() -> tuple[ArraySnapshot, Complex, Float]:
-    """Return the shipped scene: a tone towed past a vertical line array, simulated.
+    """Return the shipped simulation of a tone towed past a vertical line array.
 
     Returns
     -------
@@ -44,9 +44,9 @@ def swellex96() -> tuple[ArraySnapshot, Complex, Float]:
     with as_file(files("arrivals.scenarios") / "data" / "swellex96.toml") as path:
         array = SensorArray.from_toml(path)
     with as_file(files("arrivals.scenarios") / "data" / "swellex96.npz") as path:
-        heard = read(path, array=array).snapshots(FREQUENCY)
+        snapshots = read(path, array=array).snapshots(FREQUENCY)
     measurement = ArraySnapshot(array, array.wavelength(FREQUENCY))
-    return measurement, heard.values, heard.time
+    return measurement, snapshots.values, snapshots.time
 
 
 def demo(
@@ -54,19 +54,19 @@ def demo(
     bar: Callable[..., Any] = lambda steps, **_: steps,
     n_steps: int | None = None,
 ) -> None:
-    """Track the sound of a towed source past a 63-element vertical array, by three methods.
+    """Track a towed source with a vertical array of 63 elements, by three methods.
 
     The scene is a simulation of the SWellEx-96 experiment: sound reaches the array by several
-    paths, from above and from below, that come and go.
+    paths, from above and from below, each present for a part of the time.
 
     Parameters
     ----------
     out : path
-        Folder for the tracks files (CSV) and the picture; made if it is not there.
+        Folder for the tracks files (CSV) and the figure; created if missing.
     bar : callable
-        Takes the steps and `desc`, gives the steps back, such as tqdm.
+        Progress bar: takes the steps and `desc`, returns the steps, as tqdm does.
     n_steps : int, optional
-        Stop after so many of the 350 steps.
+        Maximum number of steps, of 350.
     """
     measurement, snapshots, time = swellex96()
     axes = {"ylim": (-50, 50), "yticks": np.arange(-45, 46, 15), "ylabel": "elevation, degrees"}

@@ -1,4 +1,4 @@
-"""A few runs of one scenario by several methods: what one process is given at a time."""
+"""Batch of runs of one scenario by several methods: the task of one process."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from arrivals.scenarios.experiments.methods import Method
 from arrivals.scenarios.metrics.registry import CPU, Metric
 from arrivals.trackers import Run, Tracker
 
-ERROR = "error"  # the metric of a run that failed; its note tells why
-LONGEST = 300  # letters of a note: an error may quote a whole array
+ERROR = "error"  # metric of a failed run; its note has the cause
+MAX_NOTE_LENGTH = 300  # characters: an error may quote a whole array
 
 
 class Row(NamedTuple):
-    """One number of a study; `note` says why it is missing."""
+    """One number of a study; `note` has the reason for a missing one."""
 
     case: str
     run: int
@@ -36,14 +36,17 @@ class RunBatch:
     Parameters
     ----------
     case : str
-        What the scenario is called in the study.
+        Name of the scenario in the study.
     scenario : Scenario
+        Draws the trials.
     methods : sequence of Method
+        Trackers with settings.
     metrics : mapping of str to callable
+        Functions of (trial, run).
     seed : int
-        Of the study.
+        Seed of the study.
     runs : sequence of int
-        Their numbers.
+        Numbers of the runs.
     """
 
     case: str
@@ -54,15 +57,15 @@ class RunBatch:
     runs: Sequence[int]
 
     def rows(self) -> list[Row]:
-        """Draw the trials, let every method work on them, and score what it found."""
+        """Draw the trials, run every method on them, and evaluate the metrics."""
         from threadpoolctl import threadpool_limits
 
-        with threadpool_limits(1, "blas"):  # the matrices are small: more threads only wait
+        with threadpool_limits(1, "blas"):  # small matrices: more threads only wait
             trials = {run: self._draw(run) for run in self.runs}
             return [row for method in self.methods for row in self._scored(method, trials)]
 
     def seed_sequence(self, run: int) -> np.random.SeedSequence:
-        """Return what the run draws from: the same, whichever process and whatever company."""
+        """Return the seed sequence of a run, the same in every process and batch."""
         return np.random.SeedSequence(self.seed, spawn_key=(run,))
 
     def _draw(self, run: int) -> Trial | Exception:
@@ -73,60 +76,60 @@ class RunBatch:
 
     def _scored(self, method: Method, trials: Mapping[int, Trial | Exception]) -> Iterator[Row]:
         drawn = {run: trial for run, trial in trials.items() if isinstance(trial, Trial)}
-        done = self._together(method, drawn) or {
-            run: self._alone(method, run, trial) for run, trial in drawn.items()
+        outcomes = self._run_batch(method, drawn) or {
+            run: self._run_single(method, run, trial) for run, trial in drawn.items()
         }
         for run, trial in trials.items():
-            outcome = done[run] if isinstance(trial, Trial) else trial
+            outcome = outcomes[run] if isinstance(trial, Trial) else trial
             if isinstance(outcome, Exception):
                 yield self._failed(method, run, outcome)
             else:
                 yield from self._scores(method, run, drawn[run], *outcome)
 
-    def _together(
+    def _run_batch(
         self, method: Method, trials: Mapping[int, Trial]
     ) -> dict[int, tuple[Run, float] | Exception] | None:
-        """Run a batch, if the tracker has a way of its own and the trials differ in data alone."""
+        """Run a batch if the tracker has its own `run_batch` and the trials share their models."""
         try:
             made = [method.make(trial, self.seed_sequence(run)) for run, trial in trials.items()]
             own = made and type(made[0]).run_batch is not Tracker.run_batch
             if not own or any(one.to_dict() != made[0].to_dict() for one in made):
                 return None
             started = time.thread_time()
-            found = made[0].run_batch([trial.measurements for trial in trials.values()])
+            results = made[0].run_batch([trial.measurements for trial in trials.values()])
             cpu = (time.thread_time() - started) / len(made)
         except Exception:
-            return None  # one by one, to see which of them it is
-        return {run: (one, cpu) for run, one in zip(trials, found, strict=True)}
+            return None  # then single runs: only the faulty ones fail
+        return {run: (result, cpu) for run, result in zip(trials, results, strict=True)}
 
-    def _alone(self, method: Method, run: int, trial: Trial) -> tuple[Run, float] | Exception:
+    def _run_single(self, method: Method, run: int, trial: Trial) -> tuple[Run, float] | Exception:
         try:
             tracker = method.make(trial, self.seed_sequence(run))
             started = time.thread_time()
-            found = tracker.run(trial.measurements)
-            return found, time.thread_time() - started
+            result = tracker.run(trial.measurements)
+            return result, time.thread_time() - started
         except Exception as error:
             return error
 
     def _scores(
-        self, method: Method, run: int, trial: Trial, found: Run, cpu: float
+        self, method: Method, run: int, trial: Trial, result: Run, cpu: float
     ) -> Iterator[Row]:
         for name, metric in self.metrics.items():
             try:
-                yield Row(self.case, run, method.label, name, float(metric(trial, found)))
+                yield Row(self.case, run, method.label, name, float(metric(trial, result)))
             except Exception as error:
                 note = brief(f"{method.label}: {error}")
                 yield Row(self.case, run, method.label, name, np.nan, note)
-        yield Row(self.case, run, method.label, CPU, 1e3 * cpu / max(1, len(found)))
+        yield Row(self.case, run, method.label, CPU, 1e3 * cpu / max(1, len(result)))
 
     def _failed(self, method: Method, run: int, error: Exception) -> Row:
-        what = brief(f"{type(error).__name__}: {error}")
-        note = f"{what} (SeedSequence({self.seed}, spawn_key=({run},)))"
+        cause = brief(f"{type(error).__name__}: {error}")
+        note = f"{cause} (SeedSequence({self.seed}, spawn_key=({run},)))"
         return Row(self.case, run, method.label, ERROR, np.nan, note)
 
 
 def brief(text: str) -> str:
-    r"""Return one line; of a long one, its beginning and its end.
+    r"""Return text as one line, shortened in the middle if it is long.
 
     Examples
     --------
@@ -134,5 +137,7 @@ def brief(text: str) -> str:
     ('a b', 300)
     """
     line = " ".join(text.split())
-    end = LONGEST // 4
-    return line if len(line) <= LONGEST else f"{line[: LONGEST - end - 5]} ... {line[-end:]}"
+    if len(line) <= MAX_NOTE_LENGTH:
+        return line
+    end = MAX_NOTE_LENGTH // 4
+    return f"{line[: MAX_NOTE_LENGTH - end - 5]} ... {line[-end:]}"

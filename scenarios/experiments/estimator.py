@@ -1,4 +1,4 @@
-"""A tracker as a scikit-learn estimator, so that its grid searches tune it."""
+"""A tracker as a scikit-learn estimator, for its grid searches."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ class TrackerEstimator(BaseEstimator):  # type: ignore[misc]  # scikit-learn has
     Parameters
     ----------
     tracker : Tracker
-        Where every sequence starts from. Its parameters are `tracker__...` of the estimator:
+        Initial state of every sequence. Its parameters are `tracker__...` of the estimator:
         `tracker__motion__p_activate`.
     c_deg : float
-        GOSPA's cut-off, degrees.
+        Cut-off of GOSPA, degrees.
 
     Notes
     -----
     A sample is a sequence of measurements, (n_steps, n_sensors), its target the true directions,
-    (n_steps, n_sources), rad, NaN where there is none. Nothing is learned in `fit`.
+    (n_steps, n_sources), rad, NaN for inactive sources. `fit` only checks the parameters.
 
     Examples
     --------
@@ -53,18 +53,18 @@ class TrackerEstimator(BaseEstimator):  # type: ignore[misc]  # scikit-learn has
         Raises
         ------
         TypeError, ValueError
-            If the tracker is none, or the cut-off not positive.
+            If `tracker` is not a Tracker, or the cut-off is not positive.
         """
         instance("tracker", self.tracker, Tracker)  # type: ignore[type-abstract]  # any
         self.c_deg_ = positive("c_deg", self.c_deg)
         return self
 
     def runs(self, X: Sequence[ArrayLike]) -> list[Run]:
-        """Run the tracker through each sequence."""
+        """Run the tracker on each sequence."""
         return self.tracker.run_batch([np.asarray(sequence) for sequence in X])
 
     def predict(self, X: Sequence[ArrayLike]) -> list[Float]:
-        """Return the directions found, rad, (n_steps, n_slots) for each sequence."""
+        """Return the estimated directions, rad, (n_steps, n_slots) for each sequence."""
         return [run.fields["doa"] for run in self.runs(X)]
 
     def score(self, X: Sequence[ArrayLike], y: Sequence[ArrayLike]) -> float:

@@ -1,4 +1,4 @@
-"""What a study compares: trackers by name, with settings, and grids of settings."""
+"""Methods of a study: trackers by name, with settings, and grids of settings."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from arrivals.trackers import Tracker, find
 
 @dataclass(frozen=True)
 class Method:
-    """A tracker with settings, under a name of its own.
+    """A tracker with settings and a label.
 
     Parameters
     ----------
     tracker : str
-        A registered name.
+        Registered name.
     params : mapping of str to object
-        Its parameters, by (nested) names; models that are not set come from the trial.
+        Parameters of the tracker, by (nested) names; models that are not set come from the trial.
     label : str
-        What it is called in tables; made from the others if empty.
+        Name in tables; built from `tracker` and `params` if empty.
 
     Raises
     ------
     ValueError
-        If there is no such tracker, or it has no such parameter.
+        If the tracker is unknown, or does not have one of the parameters.
 
     Examples
     --------
@@ -42,7 +42,7 @@ class Method:
     tracker: str
     params: Mapping[str, Any] = field(default_factory=dict)
     label: str = ""
-    kind: type[Tracker] = field(init=False, repr=False)  # goes along to other processes
+    kind: type[Tracker] = field(init=False, repr=False)  # pickled for other processes
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "kind", find(self.tracker))
@@ -54,11 +54,24 @@ class Method:
                     f"{', '.join(known)}"
                 )
         settings = ", ".join(f"{name}={value}" for name, value in self.params.items())
-        made = f"{self.tracker}({settings})" if settings else self.tracker
-        object.__setattr__(self, "label", self.label or made)
+        default = f"{self.tracker}({settings})" if settings else self.tracker
+        object.__setattr__(self, "label", self.label or default)
 
     def make(self, trial: Trial, seed_sequence: np.random.SeedSequence) -> Tracker:
-        """Make the tracker for a trial; one that takes an `rng` draws from `seed_sequence`."""
+        """Make the tracker for a trial.
+
+        Parameters
+        ----------
+        trial : Trial
+            Provides the models that are not set.
+        seed_sequence : numpy.random.SeedSequence
+            Seeds the generator of a tracker that takes an `rng`.
+
+        Returns
+        -------
+        Tracker
+            A new tracker.
+        """
         known = inspect.signature(self.kind).parameters
         settings = {name: value for name, value in self.params.items() if name in known}
         nested = {name: value for name, value in self.params.items() if name not in known}
@@ -74,13 +87,13 @@ class Method:
         return type(made)(**made.set_params(**nested).get_params(deep=False))
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the description that a results file keeps."""
+        """Return the configuration for a results file."""
         params = {name: to_plain(value) for name, value in self.params.items()}
         return {"tracker": self.tracker, "params": params, "label": self.label}
 
 
 def methods(trackers: Sequence[str | Method]) -> list[Method]:
-    """Return methods, each of its own label.
+    """Return methods with unique labels.
 
     Examples
     --------
@@ -88,15 +101,15 @@ def methods(trackers: Sequence[str | Method]) -> list[Method]:
     ['cbf', 'cbf(threshold_db=3.0)']
     >>> methods(["cbf", "cbf"])
     Traceback (most recent call last):
-    ValueError: every method needs a label of its own; 'cbf' is there twice
+    ValueError: labels of methods must be unique; got 'cbf' twice
     """
     made = [Method(one) if isinstance(one, str) else one for one in trackers]
     labels = [method.label for method in made]
     twice = next((label for label in labels if labels.count(label) > 1), None)
     if twice is not None:
-        raise ValueError(f"every method needs a label of its own; {twice!r} is there twice")
+        raise ValueError(f"labels of methods must be unique; got {twice!r} twice")
     if not made:
-        raise ValueError("a study needs at least one tracker")
+        raise ValueError("trackers must have at least one entry; got none")
     return made
 
 
@@ -106,8 +119,14 @@ def grid(tracker: str, values: Mapping[str, Sequence[Any]]) -> list[Method]:
     Parameters
     ----------
     tracker : str
-    values : mapping of str to sequence, or a list of such
-        As `sklearn.model_selection.ParameterGrid` takes it.
+        Registered name.
+    values : mapping of str to sequence, or a list of mappings
+        Values by parameter, as for `sklearn.model_selection.ParameterGrid`.
+
+    Returns
+    -------
+    list of Method
+        One method a combination.
 
     Examples
     --------
@@ -120,7 +139,7 @@ def grid(tracker: str, values: Mapping[str, Sequence[Any]]) -> list[Method]:
 
 
 def tracker_name(method: str) -> str:
-    """Return the tracker that a label begins with.
+    """Return the tracker's name, the first word of a label.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Many runs of scenarios by several trackers, on as many processes or machines as joblib has."""
+"""Monte Carlo comparison of trackers on one or several scenarios, in parallel by joblib."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from arrivals.scenarios.experiments.results_file import Results, code_mark
 from arrivals.scenarios.experiments.study import Study
 from arrivals.scenarios.experiments.workers import report_worker_failure
 from arrivals.scenarios.metrics.registry import CPU, METRICS, Metric
-from arrivals.validation import count
+from arrivals.validation import count, one_of
 
 Metrics = Sequence[str] | Mapping[str, Metric]
 
@@ -29,54 +29,57 @@ def monte_carlo(
     *,
     metrics: Metrics | None = None,
     out: str | os.PathLike[str] | None = None,
-    n_jobs: int | None = None,
     batch: int = 4,
     progress: bool = False,
 ) -> Study:
-    """Compare trackers on the same draws of a scenario, or of several.
+    """Compare trackers on the same draws of one or several scenarios.
 
-    Run r of every scenario and every method descends from `SeedSequence(seed, spawn_key=(r,))`,
-    so that serial, threads, processes and a cluster give the same numbers.
+    Run r of every scenario and every method is seeded by `SeedSequence(seed, spawn_key=(r,))`:
+    serial, threads, processes and a cluster give the same numbers. Inside
+    `joblib.parallel_config(n_jobs=2)`, or with any other backend of joblib, the runs are computed
+    in parallel.
 
     Parameters
     ----------
     scenario : str, Scenario, or mapping of str to Scenario
-        A mapping names its cases.
+        Registered name, scenario, or scenarios by the names of their cases.
     trackers : sequence of str or Method
-        Registered names, and trackers with settings; see `methods.grid` for grids.
+        Registered names, and trackers with settings; see `grid` for grids of settings.
     runs : int
+        Number of runs.
     seed : int
+        Seed of all runs.
     metrics : sequence of str, or mapping of str to callable, optional
-        Names out of `scores.METRICS`, or functions of (trial, run); all of `METRICS` if
-        None, degrees where the truth is directions, metres where it is positions.
+        Names in `METRICS` of `arrivals.scenarios.metrics`, or functions of (trial, run); all of
+        `METRICS` if None. Degrees where the truth is directions, metres where it is positions.
     out : path, optional
-        A CSV file that results stream into, or a folder in which each configuration finds its
-        own. What is in it already is not computed again; more runs are added to it.
-    n_jobs : int, optional
-        Processes; what `joblib.parallel_config` says if None, and 1 without it.
+        A CSV file to which results are appended, or a folder in which each configuration has its
+        own file. Finished runs in it are not computed again; new runs are added.
     batch : int
-        Runs that a process is given at a time, and a method with its own `run_batch` at once.
+        Number of runs in one task of a process, and in one call of a method with its own
+        `run_batch`.
     progress : bool
-        Show a bar on standard error.
+        Show a progress bar on standard error.
 
     Returns
     -------
     Study
+        Results of runs 0 to `runs` - 1.
 
     Raises
     ------
     ValueError
-        If there is no such scenario, tracker or metric, or `out` is the file of another study.
+        If a scenario, tracker or metric is unknown, or `out` is the file of another study.
     OSError
         If the file cannot be written, or another process writes to it.
     ChildProcessError
-        If a worker process died, an OSError too. What was in the file before any of these is kept.
+        If a worker process was killed; an OSError too. Rows in the file are kept in each case.
 
     Notes
     -----
     A configuration is scenarios, trackers, metrics, seed, and the code of all of them. A run that
-    fails is a row with its error and its seed, and the study goes on. The rows of
-    "cpu_ms", processor time of a step, are the only ones that differ from call to call.
+    fails is a row with its error and its seed, and the study continues. Only the rows of
+    "cpu_ms", processor time of a step, differ from call to call.
 
     Examples
     --------
@@ -87,82 +90,77 @@ def monte_carlo(
     >>> study.mean("gospa", "sbl") < study.mean("gospa", "cbf")
     True
     """
-    cases, compared, scored = _cases(scenario), methods(trackers), _metrics(metrics)
+    cases, compared, measures = _cases(scenario), methods(trackers), _metrics(metrics)
     count("runs", runs)
     config = {
         "version": arrivals.__version__,
-        "code": code_mark({one.__module__ for one in [*cases.values(), *scored.values()]}),
+        "code": code_mark({one.__module__ for one in [*cases.values(), *measures.values()]}),
         "seed": count("seed", seed, least=0),
         "scenarios": {name: to_plain(one) for name, one in cases.items()},
         "methods": [method.to_dict() for method in compared],
-        "metrics": {name: f"{f.__module__}.{f.__qualname__}" for name, f in scored.items()},
+        "metrics": {name: f"{f.__module__}.{f.__qualname__}" for name, f in measures.items()},
     }
     results = Results(config, out)
     with results.writing():
         finished = _finished(results, len(compared))
         results.keep(lambda row: (row.case, row.run) in finished)
-        todo = list(_todo(cases, runs, count("batch", batch), finished))
-        blocks = (RunBatch(name, cases[name], compared, scored, seed, left) for name, left in todo)
+        pending = list(_pending(cases, runs, count("batch", batch), finished))
+        batches = (RunBatch(name, cases[name], compared, measures, seed, numbers)
+                   for name, numbers in pending)  # fmt: skip
         total = runs * len(cases)
-        with _bar(progress, total, total - sum(len(left) for _, left in todo)) as bar:
-            for rows in _computed(blocks, n_jobs, results):
+        with _bar(progress, total, total - sum(len(numbers) for _, numbers in pending)) as bar:
+            for rows in _computed(batches, results):
                 results.add(rows)
                 bar.update(len({row.run for row in rows}))
     return Study(results, range(runs))
 
 
-def _todo(
+def _pending(
     cases: Iterable[str], runs: int, batch: int, finished: set[tuple[str, int]]
 ) -> Iterator[tuple[str, list[int]]]:
-    """Give the runs that are to be done, in batches that do not depend on what was finished."""
+    """Yield cases and numbers of unfinished runs, in batches with fixed first runs."""
     for first in range(0, runs, batch):
         for name in cases:
             numbers = range(first, min(first + batch, runs))
-            left = [run for run in numbers if (name, run) not in finished]
-            if left:
-                yield name, left
+            unfinished = [run for run in numbers if (name, run) not in finished]
+            if unfinished:
+                yield name, unfinished
 
 
 def _cases(scenario: str | Scenario | Mapping[str, Scenario]) -> dict[str, Scenario]:
     if isinstance(scenario, Mapping):
         if not scenario:
-            raise ValueError("a study needs at least one scenario")
+            raise ValueError("scenario must have at least one case; got an empty mapping")
         return dict(scenario)
     if isinstance(scenario, str):
         return {scenario: create(scenario)}
     return {type(scenario).__name__: scenario}
 
 
-def _metrics(wanted: Metrics | None) -> dict[str, Metric]:
-    if wanted is None:
+def _metrics(metrics: Metrics | None) -> dict[str, Metric]:
+    if metrics is None:
         return METRICS
-    if isinstance(wanted, Mapping):
-        return dict(wanted)
-    unknown = [name for name in wanted if name not in METRICS]
-    if unknown:
-        raise ValueError(f"there is no metric {unknown[0]!r}; known: {', '.join(METRICS)}")
-    return {name: METRICS[name] for name in wanted}
+    if isinstance(metrics, Mapping):
+        return dict(metrics)
+    return {one_of("metrics", name, tuple(METRICS)): METRICS[name] for name in metrics}
 
 
 def _finished(results: Results, n_methods: int) -> set[tuple[str, int]]:
-    """Return the (case, run) of which every method's last row is there."""
+    """Return the (case, run) for which the last row of every method exists."""
     last = Counter((row.case, row.run) for row in results.rows() if row.metric in (ERROR, CPU))
     return {key for key, n in last.items() if n == n_methods}
 
 
-def _computed(
-    blocks: Iterable[RunBatch], n_jobs: int | None, results: Results
-) -> Iterator[list[Row]]:
-    """Give the rows of the blocks as they come, whoever computes them."""
+def _computed(batches: Iterable[RunBatch], results: Results) -> Iterator[list[Row]]:
+    """Yield the rows of the batches in order of completion."""
     from joblib import Parallel, delayed
 
-    parallel = Parallel(n_jobs=n_jobs, return_as="generator_unordered", pre_dispatch="2*n_jobs",
-                        batch_size=1)  # fmt: skip
-    kept = "nothing is kept: no file was named"
+    parallel = Parallel(return_as="generator_unordered", pre_dispatch="2*n_jobs", batch_size=1)
+    kept = "no run is kept: out is None"
     if results.path is not None:
-        kept = f"finished runs are kept in {results.path}: call again to go on"
+        kept = f"finished runs are kept in {results.path}: call again to resume"
     with report_worker_failure(kept):
-        yield from parallel(delayed(RunBatch.rows)(block) for block in blocks)
+        yield from parallel(delayed(RunBatch.rows)(batch) for batch in batches)
 
 
 def _bar(progress: bool, total: int, done: int) -> Any:

@@ -1,4 +1,4 @@
-"""A study's file: it grows by a row for each number, and knows what it belongs to."""
+"""Resumable results file of a study: one row a number, below a line with the configuration."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MARK = "# arrivals study "
 
 
 def fingerprint(config: Mapping[str, Any]) -> str:
-    """Return ten letters that differ when a configuration differs.
+    """Return a hash of a configuration, ten hexadecimal digits.
 
     Examples
     --------
@@ -32,9 +32,9 @@ def fingerprint(config: Mapping[str, Any]) -> str:
 
 
 def code_mark(modules: Iterable[str] | None = None) -> str:
-    """Return ten letters that differ when trackers, models or the named modules have changed.
+    """Return a hash of the code of trackers, models and the named modules, ten digits.
 
-    If no modules are given, all scenarios count too.
+    All scenarios are included if no modules are given.
 
     Examples
     --------
@@ -58,20 +58,19 @@ def _text(config: Mapping[str, Any]) -> str:
 
 
 class Results:
-    """Rows in a file that others may read while it grows, or in memory.
+    """Rows in a file, which other processes may read at any time, or in memory.
 
     Parameters
     ----------
     config : mapping
-        What the study is, as JSON has it.
+        Configuration of the study, as JSON has it.
     path : path, optional
-        A CSV file, or a folder in which each configuration has a file of its own. In memory if
-        None.
+        A CSV file, or a folder in which each configuration has its own file. In memory if None.
 
     Raises
     ------
     ValueError
-        If the file is no study's, or another study's.
+        If the file is not a study file, or has another configuration.
     OSError
         If it cannot be read or written.
     """
@@ -84,41 +83,43 @@ class Results:
             self._check(read_config(self.path))
 
     def _check(self, other: Mapping[str, Any]) -> None:
-        """Refuse a file of another study, or with rows that its own first line does not know."""
+        """Reject a file of another study, or with rows of cases that its first line lacks."""
         differ = sorted(k for k in {*self.config, *other} if self.config.get(k) != other.get(k))
         if differ:
             raise ValueError(
-                f"{self.path} holds another study: {', '.join(differ)} differ(s); name another "
-                "file, or a folder, in which each study finds its own"
+                f"{self.path} must be the file of this study; got another {', '.join(differ)}: "
+                "name another file, or a folder, in which each study has its own file"
             )
         known = other.get("scenarios", {})
         strange = next((row.case for row in self.rows() if row.case not in known), None)
         if strange is not None:
-            raise ValueError(f"{self.path} has rows of the case {strange!r}: its study has none")
+            raise ValueError(
+                f"cases of {self.path} must be those of its first line; got {strange!r}"
+            )
 
     def rows(self) -> Iterator[Row]:
-        """Give the rows there are, in order of arrival."""
+        """Iterate over the rows, in order of completion."""
         return iter(self._rows) if self.path is None else read_rows(self.path)
 
-    def keep(self, wanted: Callable[[Row], bool]) -> None:
-        """Drop the rows that are not wanted, and a last line that was cut off."""
+    def keep(self, condition: Callable[[Row], bool]) -> None:
+        """Keep the rows that satisfy a condition; remove the others and an incomplete last line."""
         if self.path is None or not self.path.exists():
             return
-        if _is_whole(self.path) and all(wanted(row) for row in self.rows()):
+        if _is_complete(self.path) and all(condition(row) for row in self.rows()):
             return
         with atomic_write(self.path) as file:
             file.write(self._head())
-            rows = (row for row in self.rows() if wanted(row))
+            rows = (row for row in self.rows() if condition(row))
             csv.writer(file, lineterminator="\n").writerows(rows)
 
     @contextmanager
     def writing(self) -> Iterator[None]:
-        """Keep other processes from writing to the file; a process that dies lets go of it.
+        """Lock the file against other writers; the lock ends with the process.
 
         Raises
         ------
         BlockingIOError
-            If another one writes to it now.
+            If another process has the lock.
         """
         if self.path is None or sys.platform == "win32":
             yield
@@ -137,17 +138,17 @@ class Results:
                 lock.unlink(missing_ok=True)
 
     def add(self, rows: Iterable[Row]) -> None:
-        """Append rows; they are in the file when this returns.
+        """Append rows and write them to the file.
 
         Raises
         ------
         OSError
-            If there is no room for them; the rows before stay.
+            If the disk is full; earlier rows are kept.
         """
         if self.path is None:
             self._rows.extend(rows)
             return
-        new = not self.path.exists()  # such a one goes again if it cannot be begun
+        new = not self.path.exists()  # removed again if its first rows cannot be written
         lines = io.StringIO()
         csv.writer(lines, lineterminator="\n").writerows(rows)
         try:
@@ -158,7 +159,7 @@ class Results:
                 self.path.unlink(missing_ok=True)
             raise OSError(
                 error.errno,
-                f"{error.strerror}: what was finished before is kept; call again to go on",
+                f"{error.strerror}: finished runs are kept; call again to resume",
                 str(self.path),
             ) from None
 
@@ -175,20 +176,20 @@ def _place(path: Path, config: Mapping[str, Any]) -> Path:
     return path / f"study-{fingerprint(config)}.csv"
 
 
-def _is_whole(path: Path) -> bool:
-    """Tell whether the last line ends."""
+def _is_complete(path: Path) -> bool:
+    """Return True if the last line of a file is complete."""
     with open(path, "rb") as file:
         file.seek(-1, os.SEEK_END)
         return file.read() == b"\n"
 
 
 def read_config(path: Path) -> dict[str, Any]:
-    """Return what the study of a file is.
+    """Return the configuration in the first line of a study file.
 
     Raises
     ------
     ValueError
-        If the file is no study's.
+        If the file is not a study file.
     """
     with open(path, encoding="utf-8", errors="replace") as file:
         first = file.readline()
@@ -197,17 +198,17 @@ def read_config(path: Path) -> dict[str, Any]:
             raise ValueError
         config: dict[str, Any] = json.loads(first.removeprefix(MARK))
     except ValueError:
-        raise ValueError(f"{path} is no file of a study") from None
+        raise ValueError(f"{path} is not a study file") from None
     return config
 
 
 def read_rows(path: Path) -> Iterator[Row]:
-    """Give the rows of a file; a line that was cut off at its end does not count.
+    """Iterate over the rows of a study file, without an incomplete last line.
 
     Raises
     ------
     ValueError
-        If another line is no row.
+        If another line is not a row.
     """
     if not path.exists():
         return
@@ -221,6 +222,6 @@ def read_rows(path: Path) -> Iterator[Row]:
                 row = Row(case, int(run), method, metric, float(value), note)
             except ValueError:
                 raise ValueError(
-                    f"line {number} of {path} is no row of a study: take it out to go on"
+                    f"line {number} of {path} is not a row of a study: remove it to resume"
                 ) from None
             yield row

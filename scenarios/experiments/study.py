@@ -1,4 +1,4 @@
-"""What a study found: tidy rows, means with intervals, and differences on the same draws."""
+"""Results of a study: tidy rows, means with intervals, and paired differences."""
 
 from __future__ import annotations
 
@@ -16,12 +16,14 @@ from arrivals.typing import Float
 
 
 class Difference(NamedTuple):
-    """The mean of a difference over runs, its standard error, and in how many runs it is below 0.
+    """Paired difference of two methods over runs.
 
     Parameters
     ----------
     mean, error : float
+        Mean of the difference and its standard error.
     n_below, n_runs : int
+        Number of runs with a difference below 0, and of all runs.
     """
 
     mean: float
@@ -31,20 +33,21 @@ class Difference(NamedTuple):
 
 
 class Study:
-    """The numbers of a study, read from its file when they are asked for.
+    """Results of a study, read from its file on demand.
 
     Parameters
     ----------
     results : Results
+        Rows of the study.
     runs : sequence of int, optional
-        The runs to look at; all that are there if None.
+        Selected runs; all runs if None.
 
     Attributes
     ----------
     config : dict
         Scenarios, methods, metrics, seed and version.
     path : Path or None
-        The file.
+        The study file.
 
     Examples
     --------
@@ -65,10 +68,20 @@ class Study:
     def read(cls, path: str | os.PathLike[str]) -> Study:
         """Return the study of a file, finished or not.
 
+        Parameters
+        ----------
+        path : path
+            A study file.
+
+        Returns
+        -------
+        Study
+            All runs of the file.
+
         Raises
         ------
         ValueError
-            If the file is no study's.
+            If the file is not a study file.
         OSError
             If it cannot be read.
         """
@@ -86,7 +99,7 @@ class Study:
 
     @property
     def runs(self) -> list[int]:
-        """Numbers of the runs that are there."""
+        """Numbers of the runs with results."""
         return sorted({row.run for row in self._rows()})
 
     def _rows(self) -> Iterator[Row]:
@@ -94,44 +107,61 @@ class Study:
         return (row for row in rows if self._runs is None or row.run in self._runs)
 
     def rows(self) -> list[Row]:
-        """Return all rows, in order of cases, runs and methods, whatever order they came in."""
+        """Return all rows, sorted by case, run and method.
+
+        Returns
+        -------
+        list of Row
+            Fields `case`, `run`, `method`, `metric`, `value` and `note`.
+        """
         case = {name: n for n, name in enumerate(self.cases)}
         method = {name: n for n, name in enumerate(self.methods)}
         return sorted(self._rows(), key=lambda row: (case[row.case], row.run, method[row.method]))
 
     def failures(self) -> list[Row]:
-        """Return the rows of the runs that failed; their notes tell error and seed."""
+        """Return the rows of failed runs; their notes have error and seed.
+
+        Returns
+        -------
+        list of Row
+            One row a failed run.
+        """
         return [row for row in self.rows() if row.metric == ERROR]
 
     def values(self, metric: str, method: str, case: str | None = None) -> dict[int, float]:
-        """Return the numbers of a metric by run; runs that failed, and NaN, are left out.
+        """Return the values of a metric by run, without failed runs and NaN.
 
         Parameters
         ----------
         metric, method : str
+            Name of the metric and label of the method.
         case : str, optional
-            May be left out if there is one.
+            Name of the case; may be None if the study has one.
+
+        Returns
+        -------
+        dict of int to float
+            Values by run.
 
         Raises
         ------
         ValueError
-            If there is no such metric, method or case, or the method gives no such number.
+            If the metric, method or case is unknown, or the metric does not apply to the method.
         """
         case = self._one("case", case, self.cases)
         self._one("method", method, self.methods)
-        found = [r for r in self._rows()
-                 if r.metric == metric and r.method == method and r.case == case]  # fmt: skip
-        notes = [row.note for row in found if row.note]
-        if notes and len(notes) == len(found):
-            raise ValueError(f"{metric} cannot be given: {notes[0]}")
-        if not found:
+        rows = [r for r in self._rows()
+                if r.metric == metric and r.method == method and r.case == case]  # fmt: skip
+        notes = [row.note for row in rows if row.note]
+        if notes and len(notes) == len(rows):
+            raise ValueError(f"{metric} is not defined: {notes[0]}")
+        if not rows:
             failed = [r for r in self.failures() if r.method == method and r.case == case]
-            raise ValueError(
-                f"every run of {method!r} failed, the first by {failed[0].note}" if failed else
-                f"no run has the metric {metric!r} of {method!r}; the study has: "
-                f"{', '.join([*self.config['metrics'], 'cpu_ms'])}"
-            )  # fmt: skip
-        return {row.run: row.value for row in sorted(found) if row.value == row.value}
+            if failed:
+                raise ValueError(f"all runs of {method!r} failed; the first: {failed[0].note}")
+            known = ", ".join([*self.config["metrics"], "cpu_ms"])
+            raise ValueError(f"no run of {method!r} has the metric {metric!r}; known: {known}")
+        return {row.run: row.value for row in sorted(rows) if row.value == row.value}
 
     def _one(self, noun: str, name: str | None, known: list[str]) -> str:
         if name is None and len(known) == 1:
@@ -141,16 +171,49 @@ class Study:
         return name
 
     def array(self, metric: str, method: str, case: str | None = None) -> Float:
-        """Return the numbers of a metric in order of runs."""
+        """Return the values of a metric in order of runs.
+
+        Parameters
+        ----------
+        metric, method, case : str
+            As in `values`.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Values.
+        """
         return np.array(list(self.values(metric, method, case).values()), dtype=np.float64)
 
     def mean(self, metric: str, method: str, case: str | None = None) -> float:
-        """Return the mean over the runs; NaN if none has a number."""
+        """Return the mean over the runs.
+
+        Parameters
+        ----------
+        metric, method, case : str
+            As in `values`.
+
+        Returns
+        -------
+        float
+            Mean; NaN without values.
+        """
         values = self.array(metric, method, case)
         return float(values.mean()) if values.size else np.nan
 
     def spread(self, metric: str, method: str, case: str | None = None) -> float:
-        """Return the standard deviation over the runs; NaN for fewer than two."""
+        """Return the standard deviation over the runs.
+
+        Parameters
+        ----------
+        metric, method, case : str
+            As in `values`.
+
+        Returns
+        -------
+        float
+            Standard deviation; NaN for fewer than two values.
+        """
         values = self.array(metric, method, case)
         return float(values.std(ddof=1)) if values.size > 1 else np.nan
 
@@ -159,8 +222,19 @@ class Study:
     ) -> tuple[float, float]:
         """Return the bootstrap interval of the mean over the runs.
 
-        Bias-corrected and accelerated, 2000 resamples; the same at every call. NaN for fewer than
-        two runs.
+        Bias-corrected and accelerated, 2000 resamples with a fixed seed.
+
+        Parameters
+        ----------
+        metric, method, case : str
+            As in `values`.
+        level : float
+            Confidence level, in (0, 1).
+
+        Returns
+        -------
+        low, high : float
+            Ends of the interval; NaN for fewer than two values.
 
         References
         ----------
@@ -173,22 +247,41 @@ class Study:
             return np.nan, np.nan
         if np.ptp(values) == 0:
             return float(values[0]), float(values[0])
-        found = bootstrap(
+        interval = bootstrap(
             (values,), np.mean, n_resamples=2000, confidence_level=level,
             rng=np.random.default_rng(0),
-        )  # fmt: skip
-        return float(found.confidence_interval.low), float(found.confidence_interval.high)
+        ).confidence_interval  # fmt: skip
+        return float(interval.low), float(interval.high)
 
     def paired(self, metric: str, first: str, second: str, case: str | None = None) -> Difference:
-        """Return first minus second on the same draws, over the runs that both have."""
+        """Return first minus second on the same draws, over the runs that both have.
+
+        Parameters
+        ----------
+        metric, first, second : str
+            Name of the metric and labels of two methods.
+        case : str, optional
+            As in `values`.
+
+        Returns
+        -------
+        Difference
+            Mean, standard error and numbers of runs.
+        """
         a, b = self.values(metric, first, case), self.values(metric, second, case)
-        off = np.array([a[run] - b[run] for run in a if run in b], dtype=np.float64)
-        n = len(off)
-        error = float(off.std(ddof=1) / np.sqrt(n)) if n > 1 else np.nan
-        return Difference(float(off.mean()) if n else np.nan, error, int((off < 0).sum()), n)
+        d = np.array([a[run] - b[run] for run in a if run in b], dtype=np.float64)
+        n = len(d)
+        error = float(d.std(ddof=1) / np.sqrt(n)) if n > 1 else np.nan
+        return Difference(float(d.mean()) if n else np.nan, error, int((d < 0).sum()), n)
 
     def summary(self) -> list[dict[str, Any]]:
-        """Return a row for each case, method and metric: mean, std, interval, number of runs."""
+        """Return a row for each case, method and metric.
+
+        Returns
+        -------
+        list of dict
+            Keys `case`, `method`, `metric`, `mean`, `std`, `low`, `high`, `n_runs`.
+        """
         table = []
         for case in self.cases:
             for method in self.methods:
@@ -207,7 +300,13 @@ class Study:
         return key | {"mean": mean, "std": std, "low": low, "high": high, "n_runs": n}
 
     def to_csv(self, path: str | os.PathLike[str]) -> None:
-        """Write the tidy rows, in order; the file appears only when it is complete."""
+        """Write the sorted rows as CSV, atomically.
+
+        Parameters
+        ----------
+        path : path
+            The file.
+        """
         import csv
 
         with atomic_write(path) as file:

@@ -1,4 +1,4 @@
-"""Work in other processes, and what is said when one of them dies."""
+"""Parallel calls by joblib, and the report of a killed worker process."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from contextlib import contextmanager
 from typing import Any, TypeVar
 
 T = TypeVar("T")
-NOT_KEPT = "this study keeps no runs and starts anew when called again; finished ones stay"
+NOT_KEPT = "this study keeps no runs and starts again from the first; finished studies are kept"
 
 
 @contextmanager
 def report_worker_failure(kept: str) -> Iterator[None]:
-    """Tell in one line that a process was killed, and what is kept.
+    """Report a killed worker process in one line.
 
     Parameters
     ----------
     kept : str
-        Where what was finished is, and how to go on.
+        Place of the finished runs, and how to resume.
 
     Raises
     ------
@@ -31,13 +31,13 @@ def report_worker_failure(kept: str) -> Iterator[None]:
         yield
     except BrokenProcessPool as error:
         raise ChildProcessError(
-            f"a worker process died ({_cause(str(error))}); {kept}; if memory ran out, with fewer "
-            "processes"
+            f"a worker process died ({_cause(str(error))}); {kept}; use fewer processes if memory "
+            "ran out"
         ) from None
 
 
 def _cause(message: str) -> str:
-    """Return the exit codes that joblib tells, or that there are none.
+    """Return the exit codes in a message of joblib, or a guess if it has none.
 
     Examples
     --------
@@ -50,15 +50,26 @@ def _cause(message: str) -> str:
 
 
 def parallel_map(function: Callable[..., T], cases: Iterable[Sequence[Any]]) -> list[T]:
-    """Call a function with the arguments of every case, on as many processes as joblib is told.
+    """Call a function with the arguments of every case, in the processes that joblib is set to.
 
-    Inside `joblib.parallel_config(n_jobs=...)` that many, else in this one; the results are those
-    of a loop, in its order.
+    `joblib.parallel_config(n_jobs=...)` sets their number; without it all run in this process.
+
+    Parameters
+    ----------
+    function : callable
+        Called once a case.
+    cases : iterable of sequence
+        Positional arguments of each call.
+
+    Returns
+    -------
+    list
+        Results in the order of the cases.
 
     Raises
     ------
     ChildProcessError
-        If a process died.
+        If a process was killed.
 
     Examples
     --------

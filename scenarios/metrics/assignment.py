@@ -1,4 +1,4 @@
-"""Which found point belongs to which true one, and what follows for tracks and their labels."""
+"""Assignment of estimates to true sources, label switches and track lengths."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from arrivals.validation import positive, real
 
 
 class Matches(NamedTuple):
-    """Pairs of a true and a found direction or position, step after step.
+    """Pairs of a true and an estimated direction or position, in order of steps.
 
     Parameters
     ----------
     step, source, slot : ndarray of int, shape (n_pairs,)
-        Time step, column of the truth and column of what was found.
+        Time step, column of the truth and column of the estimates.
     error : ndarray, shape (n_pairs,) or (n_pairs, dim)
-        Found minus true, in the unit given; the shorter way round.
+        Estimate minus truth, in the unit of the arguments; wrapped if there is a period.
     """
 
     step: Int
@@ -29,16 +29,21 @@ class Matches(NamedTuple):
 
 
 def matches(truth: ArrayLike, found: ArrayLike, c: float, period: float | None = None) -> Matches:
-    """Pair, in each step, true and found points nearer than `c` as GOSPA with p = 1 does.
+    """Assign estimates nearer than `c` to true points, in each step, as GOSPA with p = 1.
 
     Parameters
     ----------
     truth, found : array_like, shapes (n_steps, n_sources[, dim]), (n_steps, n_slots[, dim])
-        Directions, or positions; NaN where there is none.
+        True and estimated directions or positions; NaN for inactive and undetected.
     c : float
-        Same unit.
+        Cut-off, in the same unit.
     period : float, optional
-        Takes differences around a circle of this length.
+        Period of the angles; differences are wrapped.
+
+    Returns
+    -------
+    Matches
+        Pairs and their errors.
 
     Raises
     ------
@@ -76,12 +81,19 @@ def matches(truth: ArrayLike, found: ArrayLike, c: float, period: float | None =
 
 
 def label_switches(pairs: Matches, label: ArrayLike) -> int:
-    """Count how often a source is found under another label than when it was last found.
+    """Count the detections of a source with a label other than that of its last detection.
 
     Parameters
     ----------
     pairs : Matches
+        As `matches` returns them.
     label : array_like of int, shape (n_steps, n_slots)
+        Labels of the estimates.
+
+    Returns
+    -------
+    int
+        Number of switches of all sources.
 
     References
     ----------
@@ -98,12 +110,19 @@ def label_switches(pairs: Matches, label: ArrayLike) -> int:
 
 
 def track_lengths(pairs: Matches, label: ArrayLike) -> Int:
-    """Return the numbers of steps for which one source is found, without a gap, under one label.
+    """Return the numbers of successive steps in which a source is detected with one label.
 
     Parameters
     ----------
     pairs : Matches
+        As `matches` returns them.
     label : array_like of int, shape (n_steps, n_slots)
+        Labels of the estimates.
+
+    Returns
+    -------
+    ndarray of int, shape (n_tracks,)
+        Lengths of the tracks without gaps.
 
     Examples
     --------
@@ -119,7 +138,7 @@ def track_lengths(pairs: Matches, label: ArrayLike) -> Int:
 
 
 def _histories(pairs: Matches, label: ArrayLike) -> list[tuple[Int, Int]]:
-    """Return steps and labels of each source that was found, in order of time."""
+    """Return steps and labels of each detected source, in order of time."""
     names = np.asarray(label)[pairs.step, pairs.slot]
     mine = [pairs.source == source for source in np.unique(pairs.source)]
     return [(pairs.step[on], names[on]) for on in mine]

@@ -1,4 +1,4 @@
-"""Whether stated standard deviations are those of the errors."""
+"""Consistency of stated standard deviations and covariances with the errors: NEES, coverage."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from arrivals.validation import real
 
 
 def circular_nees(error: ArrayLike, std: ArrayLike) -> float:
-    """Average the errors on the circle, squared, over what the stated deviations make expected.
+    """Average the squared errors on the circle, normalised by their expected values.
 
-    2 (1 - cos e) / 2 (1 - exp(-σ²/2)): chords in place of arcs, so that neither a large error nor
-    a wide density leaves the circle. 1 if the deviations are right, larger if they are too small.
+    2 (1 - cos e) / 2 (1 - exp(-σ²/2)): chords in place of arcs, which stay bounded for large
+    errors and wide densities. 1 if the deviations are right, larger if they are too small.
 
     Parameters
     ----------
@@ -25,12 +25,12 @@ def circular_nees(error: ArrayLike, std: ArrayLike) -> float:
     Returns
     -------
     float
-        NaN for no errors.
+        Normalised mean square; NaN without errors.
 
     Raises
     ------
     ValueError
-        If a deviation is not positive, or is NaN where there is an error.
+        If a deviation of an error is not positive or NaN.
 
     References
     ----------
@@ -51,7 +51,7 @@ def circular_nees(error: ArrayLike, std: ArrayLike) -> float:
 
 
 def coverage(error: ArrayLike, std: ArrayLike, level: float = 0.95) -> float:
-    """Return the share of errors within the normal interval of a level about the estimate.
+    """Return the fraction of errors within the normal interval of a level about the estimate.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def position_nees(error: ArrayLike, covariance: ArrayLike) -> float:
     Raises
     ------
     ValueError
-        If a covariance is not positive definite, or is NaN where there is an error.
+        If a covariance of an error is not positive definite.
 
     References
     ----------
@@ -118,7 +118,7 @@ def position_nees(error: ArrayLike, covariance: ArrayLike) -> float:
 
 
 def position_coverage(error: ArrayLike, covariance: ArrayLike, level: float = 0.95) -> float:
-    """Return the share of errors within the normal ellipse of a level about the estimate.
+    """Return the fraction of errors within the normal ellipse of a level about the estimate.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ def _mahalanobis(error: ArrayLike, covariance: ArrayLike) -> tuple[Float, int]:
             f"got {e.shape} and {P.shape}"
         )
     if not (np.isfinite(P).all() and (np.linalg.eigvalsh(P) > 0).all()):
-        raise ValueError("covariance must be positive definite wherever there is an error")
+        raise ValueError("covariance must be positive definite for every error")
     return np.einsum("ni,ni->n", e, np.linalg.solve(P, e[..., None])[..., 0]), e.shape[1]
 
 
@@ -167,5 +167,5 @@ def _stated(error: ArrayLike, std: ArrayLike) -> tuple[Float, Float]:
     if e.shape != s.shape:
         raise ValueError(f"error and std must have the same shape; got {e.shape} and {s.shape}")
     if not (s > 0).all():
-        raise ValueError("std must be positive wherever there is an error")
+        raise ValueError("std must be positive for every error")
     return e, s

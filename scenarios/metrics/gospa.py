@@ -1,4 +1,4 @@
-"""How far what was found lies from the truth, when both are sets of points of any size."""
+"""Metrics between two sets of points of any size: GOSPA, OSPA and RMSE."""
 
 from __future__ import annotations
 
@@ -14,15 +14,21 @@ from arrivals.validation import number, positive, real
 
 @dataclass(frozen=True)
 class Gospa:
-    """The GOSPA metric and the three parts that it is made of.
+    """GOSPA metric and its three parts.
 
     Parameters
     ----------
     total : float
         The metric, in the unit of the points.
     distance, missed, false : float
-        Parts due to the error of what was found, to what was missed and to what is not there. They
-        are p-th powers: total^p = distance + missed + false, and for p = 1 they share its unit.
+        Parts due to errors of detected points, missed points and false points. They are p-th
+        powers: total^p = distance + missed + false; for p = 1 they have the unit of the points.
+
+    Examples
+    --------
+    >>> result = gospa([10, 20, 40], [11, 26, 70], c=10)
+    >>> result.total == result.distance + result.missed + result.false
+    True
     """
 
     total: float
@@ -39,21 +45,21 @@ def gospa(
     alpha: float = 2.0,
     period: float | None = None,
 ) -> Gospa:
-    """Measure errors, missed and false points at once: generalised optimal sub-pattern assignment.
+    """Compute the generalised optimal sub-pattern assignment metric: errors, missed and false.
 
     Parameters
     ----------
     truth, found : array_like, shape (n,) or (n, dim)
-        Angles or points, in any unit. Rows that hold a NaN count as absent.
+        True and estimated angles or points, in any unit. Rows with a NaN are ignored.
     c : float
-        Cut-off, same unit: a true and a found point at distance `c` or more are never a pair.
+        Cut-off, same unit: a true and an estimated point at distance `c` or more are not paired.
     p : float
         Exponent, at least 1.
     alpha : float
-        In (0, 2]: a point without partner costs c^p / α. Only at 2 is it the same to leave a
-        distant pair apart; below, a pair cut off costs c^p, half of it missed and half of it false.
+        In (0, 2]: an unpaired point costs c^p / α. For 2, a distant pair costs as much as two
+        unpaired points; below, a pair beyond the cut-off costs c^p, half missed and half false.
     period : float, optional
-        Takes differences around a circle of this length, 2π for angles in rad.
+        Period of the angles, such as 2π for rad; differences are wrapped.
 
     Returns
     -------
@@ -72,7 +78,7 @@ def gospa(
 
     Examples
     --------
-    Ten is found at 11 and twenty at 26; forty is missed, and seventy is false.
+    10 is estimated as 11 and 20 as 26; 40 is missed, and 70 is false.
 
     >>> gospa([10, 20, 40], [11, 26, 70], c=10)
     Gospa(total=17.0, distance=7.0, missed=5.0, false=5.0)
@@ -96,18 +102,18 @@ def gospa(
 def ospa(
     truth: ArrayLike, found: ArrayLike, c: float, p: float = 1.0, period: float | None = None
 ) -> float:
-    """Measure the error per point, where a surplus point on either side counts as `c`.
+    """Compute the OSPA metric: the error per point, where an unpaired point counts as `c`.
 
     Parameters
     ----------
     truth, found : array_like, shape (n,) or (n, dim)
-        Angles or points, in any unit. Rows that hold a NaN count as absent.
+        True and estimated angles or points, in any unit. Rows with a NaN are ignored.
     c : float
         Cut-off, same unit.
     p : float
         Exponent, at least 1.
     period : float, optional
-        Takes differences around a circle of this length.
+        Period of the angles; differences are wrapped.
 
     Returns
     -------
@@ -131,27 +137,27 @@ def ospa(
     """
     c, p = positive("c", c), _exponent(p)
     d = _distances(truth, found, period)
-    most, surplus = max(d.shape), abs(d.shape[0] - d.shape[1])
+    size, surplus = max(d.shape), abs(d.shape[0] - d.shape[1])
     powers = np.sum(np.minimum(_assigned(d, c, p), c) ** p) + c**p * surplus
-    return float((powers / most) ** (1 / p)) if most else 0.0
+    return float((powers / size) ** (1 / p)) if size else 0.0  # (3)
 
 
 def rmse(truth: ArrayLike, found: ArrayLike, c: float, period: float | None = None) -> float:
-    """Measure the error per true point, where a missed one counts as `c`; false ones cost nothing.
+    """Compute the RMSE per true point: a missed point counts as `c`, false points cost nothing.
 
     Parameters
     ----------
     truth, found : array_like, shape (n,) or (n, dim)
-        Angles or points, in any unit. Rows that hold a NaN count as absent.
+        True and estimated angles or points, in any unit. Rows with a NaN are ignored.
     c : float
         Cut-off, same unit.
     period : float, optional
-        Takes differences around a circle of this length.
+        Period of the angles; differences are wrapped.
 
     Returns
     -------
     float
-        Root mean square error, in [0, c]; 0 if nothing is true.
+        Root mean square error, in [0, c]; 0 for an empty truth.
 
     Raises
     ------
@@ -186,8 +192,10 @@ def mean_gospa(
     Parameters
     ----------
     truth, found : array_like, shape (n_steps, n_slots) or (n_steps, n_slots, dim)
-        One set in each step, filled up by NaN; lists of sets that differ in size will do as well.
-    c, p, alpha, period
+        One set in each step, padded with NaN, or lists of sets of different sizes.
+    c, p, alpha : float
+        As in `gospa`.
+    period : float, optional
         As in `gospa`.
 
     Returns
@@ -198,7 +206,7 @@ def mean_gospa(
     Raises
     ------
     ValueError
-        If the numbers of steps differ or are zero, and as `gospa` does.
+        If the numbers of steps differ or are zero; further as in `gospa`.
 
     Examples
     --------
@@ -220,19 +228,21 @@ def mean_rmse(
     Parameters
     ----------
     truth, found : array_like, shape (n_steps, n_slots) or (n_steps, n_slots, dim)
-        One set in each step, filled up by NaN; lists of sets that differ in size will do as well.
-    c, period
+        One set in each step, padded with NaN, or lists of sets of different sizes.
+    c : float
+        As in `rmse`.
+    period : float, optional
         As in `rmse`.
 
     Returns
     -------
     float
-        Mean over the steps; a step without truth counts as 0.
+        Mean over the steps; a step with an empty truth counts as 0.
 
     Raises
     ------
     ValueError
-        If the numbers of steps differ or are zero, and as `rmse` does.
+        If the numbers of steps differ or are zero; further as in `rmse`.
 
     Examples
     --------
@@ -265,13 +275,13 @@ def _points(name: str, value: ArrayLike) -> Float:
     if points.ndim not in (1, 2):
         raise ValueError(f"{name} must have shape (n,) or (n, dim); got {points.shape}")
     if np.any(np.isinf(points)):
-        raise ValueError(f"{name} must be finite, or NaN where absent; got an infinite value")
+        raise ValueError(f"{name} must be finite, or NaN for absent points; got an infinite value")
     points = points[:, None] if points.ndim == 1 else points
     return np.asarray(points[~np.any(np.isnan(points), axis=1)])
 
 
 def _distances(truth: ArrayLike, found: ArrayLike, period: float | None) -> Float:
-    """Euclidean distances (n_true, n_found), around the circle if there is a period."""
+    """Return Euclidean distances (n_true, n_found), wrapped if there is a period."""
     t, f = _points("truth", truth), _points("found", found)
     if t.shape[1] != f.shape[1]:
         if t.size and f.size:
@@ -287,7 +297,7 @@ def _distances(truth: ArrayLike, found: ArrayLike, period: float | None) -> Floa
 
 
 def _assigned(d: Float, c: float, p: float) -> Float:
-    """Distances of the pairs that make the sum of min(d, c)^p least; all of the smaller set."""
+    """Return distances of the pairs with the smallest sum of min(d, c)^p."""
     from scipy.optimize import linear_sum_assignment
 
     return np.asarray(d[linear_sum_assignment(np.minimum(d, c) ** p)])

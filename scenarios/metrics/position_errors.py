@@ -1,4 +1,4 @@
-"""Errors of several positions at once: who stands for whom, and summaries that lost runs spare."""
+"""Errors of several positions: assignment, Huber's M-estimates and summaries."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from arrivals.typing import Float, Int
 from arrivals.validation import one_of, positive, real
 
 HUBER = 1.345  # deviations: 95 % efficient for Gaussian errors
-FAR = 20.0  # m, of the share of lost sources
-GONE = 1e6  # m, in place of an estimate that is not finite
+LOST_DISTANCE = 20.0  # m: sources beyond it are counted as lost
+MAX_DISTANCE = 1e6  # m, of estimates that are not finite
 
 Assignment = Literal["nearest", "one-to-one"]
 
 
 @dataclass(frozen=True)
 class HuberEstimate:
-    """Robust mean and spread of errors.
+    """Robust mean and root mean square of errors.
 
     Parameters
     ----------
@@ -41,14 +41,19 @@ def huber(errors: ArrayLike, k: float = HUBER) -> HuberEstimate:
     Parameters
     ----------
     errors : array_like
-        Any shape; in any unit.
+        Errors of any shape, in any unit.
     k : float
         Errors beyond k scales count linearly. The scale is the median absolute deviation.
+
+    Returns
+    -------
+    HuberEstimate
+        Mean and root mean square.
 
     Raises
     ------
     ValueError
-        If there is no error, or one is not finite.
+        If `errors` is empty or not finite.
 
     References
     ----------
@@ -56,8 +61,8 @@ def huber(errors: ArrayLike, k: float = HUBER) -> HuberEstimate:
 
     Examples
     --------
-    >>> found = huber([1.0, -1.0, 2.0, -2.0, 1000.0])
-    >>> round(found.bias, 2), round(found.rms, 1)
+    >>> estimate = huber([1.0, -1.0, 2.0, -2.0, 1000.0])
+    >>> round(estimate.bias, 2), round(estimate.rms, 1)
     (1.0, 31.6)
     """
     from scipy.optimize import least_squares
@@ -65,73 +70,83 @@ def huber(errors: ArrayLike, k: float = HUBER) -> HuberEstimate:
     e = real("errors", errors).ravel()
     if e.size == 0 or not np.isfinite(e).all():
         raise ValueError(f"errors must be finite, at least one; got {e.tolist()}")
-    middle = float(np.median(e))
-    scale = float(np.median(np.abs(e - middle))) / 0.6745
+    median = float(np.median(e))
+    scale = float(np.median(np.abs(e - median))) / 0.6745
     if scale == 0:
-        return HuberEstimate(middle, float(np.sqrt(np.mean(e**2))))
-    reach = positive("k", k) * scale
-    found = least_squares(
-        lambda m: e - m, [middle], lambda m: -np.ones((e.size, 1)), loss="huber", f_scale=reach
+        return HuberEstimate(median, float(np.sqrt(np.mean(e**2))))
+    limit = positive("k", k) * scale
+    fit = least_squares(
+        lambda m: e - m, [median], lambda m: -np.ones((e.size, 1)), loss="huber", f_scale=limit
     )
-    bias = float(found.x[0])
-    weights = np.minimum(1.0, reach / np.maximum(np.abs(e - bias), 1e-300))
+    bias = float(fit.x[0])
+    weights = np.minimum(1.0, limit / np.maximum(np.abs(e - bias), 1e-300))
     return HuberEstimate(bias, float(np.sqrt((weights * e**2).sum() / weights.sum())))
 
 
 def assign(theta: ArrayLike, truth: ArrayLike, how: Assignment = "nearest") -> Int:
-    """Return, for each true position, the number of the estimate that stands for it.
+    """Return the index of the estimate that is assigned to each true position.
 
     Parameters
     ----------
     theta : array_like, shape (n_found, 2)
-        Estimates, m; at least as many as truths for "one-to-one".
+        Estimates, m; at least n_sources for "one-to-one".
     truth : array_like, shape (n_sources, 2)
-        m.
+        True positions, m.
     how : {"nearest", "one-to-one"}
-        The paper's, which may take one estimate twice and so flatters merged solutions; or
-        each once, of the least sum of distances.
+        The paper's assignment, which may use one estimate twice and so favours merged solutions;
+        or each estimate once, with the smallest sum of distances.
+
+    Returns
+    -------
+    ndarray of int, shape (n_sources,)
+        Rows of `theta`.
+
+    Raises
+    ------
+    ValueError
+        If "one-to-one" has too few estimates.
 
     Examples
     --------
-    >>> found, truth = [[0.0, 0.0], [90.0, 0.0]], [[1.0, 0.0], [10.0, 0.0]]
-    >>> assign(found, truth), assign(found, truth, "one-to-one")
+    >>> theta, truth = [[0.0, 0.0], [90.0, 0.0]], [[1.0, 0.0], [10.0, 0.0]]
+    >>> assign(theta, truth), assign(theta, truth, "one-to-one")
     (array([0, 0]), array([0, 1]))
     """
-    apart = distances(theta, truth)
+    distance = distances(theta, truth)
     if one_of("how", how, ("nearest", "one-to-one")) == "nearest":
-        return np.asarray(apart.argmin(axis=0))
+        return np.asarray(distance.argmin(axis=0))
     from scipy.optimize import linear_sum_assignment
 
-    if len(apart) < apart.shape[1]:
+    if len(distance) < distance.shape[1]:
         raise ValueError(
-            f"one-to-one wants an estimate for each of {apart.shape[1]}; got {len(apart)}"
+            f"theta must have at least {distance.shape[1]} rows for one-to-one; got {len(distance)}"
         )
-    rows, columns = linear_sum_assignment(apart)
+    rows, columns = linear_sum_assignment(distance)
     return np.asarray(rows[np.argsort(columns)])
 
 
 def distances(theta: ArrayLike, truth: ArrayLike) -> Float:
-    """Return distances (n_found, n_sources), m; very large where an estimate is not finite."""
-    apart = np.linalg.norm(real("theta", theta)[:, None] - real("truth", truth), axis=-1)
-    return np.where(np.isfinite(apart), np.minimum(apart, GONE), GONE)
+    """Return distances (n_found, n_sources), m, at most `MAX_DISTANCE`, also of NaN."""
+    distance = np.linalg.norm(real("theta", theta)[:, None] - real("truth", truth), axis=-1)
+    return np.where(np.isfinite(distance), np.minimum(distance, MAX_DISTANCE), MAX_DISTANCE)
 
 
 @dataclass(frozen=True)
 class Scores:
-    """How well many runs did.
+    """Summary of the errors of many runs.
 
     Parameters
     ----------
     location_rms : float
-        Huber's, of the x and y errors together, m.
+        Huber's RMS of the x and y errors together, m.
     location_bias : float
         Length of Huber's mean of the x and y errors, m.
     amplitude_rms, amplitude_bias : float
-        Huber's, dB.
+        Huber's RMS and mean of the amplitude errors, dB.
     median, p90 : float
-        Of the distances, m.
+        Quantiles of the distances, m.
     lost : float
-        Share of distances beyond 20 m.
+        Fraction of distances beyond 20 m.
     """
 
     location_rms: float
@@ -150,7 +165,7 @@ def scores(
     true_u: ArrayLike,
     how: Assignment = "nearest",
 ) -> Scores:
-    """Summarise the errors of many runs, as the paper's Table 1 does and beyond.
+    """Summarise the errors of many runs by the statistics of the paper's Table 1, and quantiles.
 
     Parameters
     ----------
@@ -161,6 +176,11 @@ def scores(
     how : {"nearest", "one-to-one"}
         As in `assign`.
 
+    Returns
+    -------
+    Scores
+        Robust statistics and quantiles.
+
     References
     ----------
     Cevher, Sankaranarayanan, Chellappa, ICASSP 2008, Table 1.
@@ -169,24 +189,28 @@ def scores(
     --------
     >>> rng = np.random.default_rng(0)
     >>> truth = rng.uniform(-50, 50, (200, 2, 2))
-    >>> found = truth + rng.standard_normal(truth.shape)
-    >>> round(scores(found, truth, truth[..., 0], truth[..., 0]).location_rms, 1)
+    >>> theta = truth + rng.standard_normal(truth.shape)
+    >>> round(scores(theta, truth, truth[..., 0], truth[..., 0]).location_rms, 1)
     1.3
     """
     theta, truth = real("theta", theta), real("truth", truth)
-    which = np.array([assign(t, s, how) for t, s in zip(theta, truth, strict=True)])
-    found = np.take_along_axis(theta, which[..., None], axis=1)
-    step = np.clip(np.nan_to_num(found - truth, nan=GONE), -GONE, GONE)
-    far = np.hypot(step[..., 0], step[..., 1])
-    x, y = huber(step[..., 0]), huber(step[..., 1])
-    du = np.take_along_axis(real("u", u), which, axis=1) - real("true_u", true_u)
-    level = huber(np.clip(np.nan_to_num(neper_to_db(du), nan=GONE), -GONE, GONE))
+    index = np.array([assign(t, s, how) for t, s in zip(theta, truth, strict=True)])
+    error = _bounded(np.take_along_axis(theta, index[..., None], axis=1) - truth)
+    distance = np.hypot(error[..., 0], error[..., 1])
+    x, y = huber(error[..., 0]), huber(error[..., 1])
+    du = np.take_along_axis(real("u", u), index, axis=1) - real("true_u", true_u)
+    level = huber(_bounded(neper_to_db(du)))
     return Scores(
         location_rms=float(np.hypot(x.rms, y.rms)),
         location_bias=float(np.hypot(x.bias, y.bias)),
         amplitude_rms=level.rms,
         amplitude_bias=level.bias,
-        median=float(np.median(far)),
-        p90=float(np.quantile(far, 0.9)),
-        lost=float(np.mean(far > FAR)),
+        median=float(np.median(distance)),
+        p90=float(np.quantile(distance, 0.9)),
+        lost=float(np.mean(distance > LOST_DISTANCE)),
     )
+
+
+def _bounded(error: Float) -> Float:
+    """Return errors within ± `MAX_DISTANCE`; NaN becomes the upper end."""
+    return np.clip(np.nan_to_num(error, nan=MAX_DISTANCE), -MAX_DISTANCE, MAX_DISTANCE)

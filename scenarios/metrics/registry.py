@@ -1,6 +1,6 @@
-"""What a run is worth, held against the truth of its trial: one number each.
+"""Metrics of studies: functions of a trial and a run.
 
-Directions are scored in degrees, positions in metres; the trial's truth says which.
+Directions are scored in degrees, positions in metres, according to the trial's truth.
 """
 
 from __future__ import annotations
@@ -24,17 +24,18 @@ from arrivals.trackers.run import Run
 from arrivals.typing import Float
 
 Metric: TypeAlias = Callable[[Trial, Run], float]
-CUT_OFF = 10.0  # degrees: the paper's c; and metres
+CUT_OFF = 10.0  # degrees, the paper's c; for positions metres
 
 
 class Sets(NamedTuple):
-    """True and found directions, degrees, or positions, m; NaN where there is none.
+    """True and estimated directions, degrees, or positions, m; NaN for inactive and undetected.
 
     Parameters
     ----------
     truth, found : ndarray, shapes (n_steps, n_sources) and (n_steps, n_slots); positions (..., 2)
+        Truth and estimates.
     period : float or None
-        Of directions all around, degrees.
+        Period of directions in the plane, degrees.
     """
 
     truth: Float
@@ -43,32 +44,32 @@ class Sets(NamedTuple):
 
 
 def sets(trial: Trial, run: Run) -> Sets:
-    """Return what is compared: directions if the trial's truth is directions, else positions.
+    """Return truth and estimates: directions if the trial's truth has directions, else positions.
 
     Raises
     ------
     ValueError
-        If the run holds none of that kind.
+        If the run has no estimates of that kind.
     """
     noun, name = ("positions", "position") if trial.truth.ndim == 3 else ("directions", "doa")
     if name not in run.fields:
-        raise ValueError(f"the trial's truth is {noun}; a run of {run.kind.__name__}s holds none")
+        raise ValueError(f"the trial's truth has {noun}; a run of {run.kind.__name__}s has none")
     if name == "position":
         return Sets(trial.truth, np.asarray(run.fields[name]), None)
-    period = 360.0 if trial.measurement.array.dim > 1 else None  # type: ignore[union-attr]  # heard by an array
+    period = 360.0 if trial.measurement.array.dim > 1 else None  # type: ignore[union-attr]  # directions have an array
     return Sets(np.rad2deg(trial.truth), np.rad2deg(run.fields[name]), period)
 
 
-@lru_cache(maxsize=1)  # the parts are asked for one after the other
+@lru_cache(maxsize=1)  # shared by the metrics of its parts
 def gospa_of(trial: Trial, run: Run) -> Gospa:
-    """Return GOSPA and its parts, degrees or m, means over the steps."""
+    """Return GOSPA and its parts, degrees or m, averaged over the steps."""
     truth, found, period = sets(trial, run)
     return mean_gospa(truth, found, c=CUT_OFF, period=period)
 
 
 @lru_cache(maxsize=1)
 def pairs_of(trial: Trial, run: Run) -> Matches:
-    """Return the pairs of true and found ones, errors in rad or m."""
+    """Return the pairs of truth and estimates, errors in rad or m."""
     truth, found, period = sets(trial, run)
     pairs = matches(truth, found, CUT_OFF, period)
     return pairs if truth.ndim == 3 else pairs._replace(error=np.deg2rad(pairs.error))
@@ -92,17 +93,17 @@ def _cardinality(trial: Trial, run: Run) -> float:
 
 
 def _stated(trial: Trial, run: Run) -> tuple[Float, Float]:
-    """Return errors, and the deviations (n,), rad, or covariances (n, 2, 2), m², stated."""
+    """Return errors and stated deviations (n,), rad, or covariances (n, 2, 2), m²."""
     pairs = pairs_of(trial, run)
     spread = run.fields["std" if pairs.error.ndim == 1 else "covariance"]
     if run.n_found.any() and np.isnan(spread).all():
-        raise ValueError("the tracker states no standard deviations")
+        raise ValueError("the tracker does not estimate standard deviations")
     return pairs.error, np.asarray(spread[pairs.step, pairs.slot])
 
 
 def _labels(trial: Trial, run: Run) -> Matches:
     if run.n_found.any() and (run.fields["label"] < 0).all():
-        raise ValueError("the tracker gives no labels")
+        raise ValueError("the tracker does not assign labels")
     return pairs_of(trial, run)
 
 
@@ -168,4 +169,4 @@ METRICS: dict[str, Metric] = {
     "track_length": _track_length,
     "converged": _converged,
 }
-CPU = "cpu_ms"  # processor time of a step, measured by the runner: the seed does not settle it
+CPU = "cpu_ms"  # processor time of a step, measured by the runner: not reproducible by the seed

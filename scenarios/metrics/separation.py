@@ -1,4 +1,4 @@
-"""How far separated source signals lie from the true ones."""
+"""Errors of separated source signals: NMSE and SDR."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from arrivals.typing import Complex, Float
 
 
 def nmse(truth: ArrayLike, found: ArrayLike, *, db: bool = False) -> Float:
-    """Measure the error of each source's signal, relative to its power.
+    """Compute the error of each source's signal, normalised by its power.
 
     Parameters
     ----------
     truth, found : array_like, shape (..., n_steps, n_sources)
-        Signals, real or complex, in the same order of sources.
+        True and estimated signals, real or complex, in the same order of sources.
     db : bool
-        Give 10 log10 of it.
+        Return 10 log10 of the error.
 
     Returns
     -------
     ndarray, shape (..., n_sources)
-        Σ|ŝ - s|² / Σ|s|², over the steps: 0 is exact, and 1 what zeros get.
+        Σ|ŝ - s|² / Σ|s|², over the steps: 0 for exact signals, 1 for zeros.
 
     Raises
     ------
@@ -41,18 +41,18 @@ def nmse(truth: ArrayLike, found: ArrayLike, *, db: bool = False) -> Float:
 
 
 def sdr(truth: ArrayLike, found: ArrayLike) -> Float:
-    """Measure the signal-to-distortion ratio of each source, dB, its scale and phase set free.
+    """Compute the signal-to-distortion ratio of each source, dB, invariant to scale and phase.
 
     Parameters
     ----------
     truth, found : array_like, shape (..., n_steps, n_sources)
-        Signals, real or complex, in the same order of sources.
+        True and estimated signals, real or complex, in the same order of sources.
 
     Returns
     -------
     ndarray, shape (..., n_sources)
-        10 log10 of |αs|² / |ŝ - αs|², α = sᴴŝ / sᴴs the best factor; -inf if nothing of s is in ŝ,
-        inf if nothing else is.
+        10 log10 of |αs|² / |ŝ - αs|², α = sᴴŝ / sᴴs the best factor; -inf if ŝ is orthogonal to s,
+        inf if it is proportional to s.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def sdr(truth: ArrayLike, found: ArrayLike) -> Float:
     alpha = (s.conj() * s_hat).sum(axis=-2, keepdims=True) / _energy(s)[..., None, :]
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = _energy(alpha * s) / _energy(s_hat - alpha * s)
-    return _decibels(np.where(np.isnan(ratio), 0.0, ratio))  # 0/0: nothing was found
+    return _decibels(np.where(np.isnan(ratio), 0.0, ratio))  # 0/0: the estimate is zero
 
 
 def _signals(truth: ArrayLike, found: ArrayLike) -> tuple[Complex | Float, Complex | Float]:
@@ -86,9 +86,9 @@ def _signals(truth: ArrayLike, found: ArrayLike) -> tuple[Complex | Float, Compl
         if signals.dtype.kind not in "biufc":
             raise TypeError(f"{name} must hold numbers; got {signals.dtype}")
         if not np.isfinite(signals).all():
-            raise ValueError(f"{name} must be finite: leave out steps that hold nothing")
+            raise ValueError(f"{name} must be finite; got NaN or infinity: leave out empty steps")
     if not _energy(s).all():
-        raise ValueError("truth must not be zero throughout, for any source")
+        raise ValueError("truth must be nonzero for every source; got a signal of zeros")
     return s + 0.0, s_hat + 0.0
 
 

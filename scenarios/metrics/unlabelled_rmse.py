@@ -1,4 +1,4 @@
-"""How far unlabelled angles lie from the truth, when there are as many of them in each step."""
+"""RMSE of unlabelled angles, a fixed number of them in each step, by the best assignment."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from arrivals.validation import positive, real
 
 
 def best_assignment_rmse(truth: ArrayLike, found: ArrayLike, period: float | None = None) -> Float:
-    """Measure the error of unlabelled angles, a fixed number of them in each step.
+    """Compute the RMSE of unlabelled angles, a fixed number of them in each step.
 
-    In each step the angles found are assigned to the true ones so that the sum of squares is
-    least. There is no cut-off: what is far off counts in full. Where numbers vary, see `rmse`.
+    In each step the estimates are assigned to the true angles so that the sum of squares is
+    smallest. There is no cut-off: large errors count in full. For varying numbers see `rmse`.
 
     Parameters
     ----------
     truth, found : array_like, shape (..., n_steps, n_sources)
-        Numbers, in any unit; leading axes broadcast.
+        True and estimated angles, in any unit; leading axes broadcast.
     period : float, optional
-        Takes differences around a circle of this length.
+        Period of the angles; differences are wrapped.
 
     Returns
     -------
@@ -54,12 +54,12 @@ def best_assignment_rmse(truth: ArrayLike, found: ArrayLike, period: float | Non
             f"got {t.shape} and {f.shape}"
         )
     if not (np.isfinite(t).all() and np.isfinite(f).all()):
-        raise ValueError("truth and found must be finite; rmse takes sources that were missed")
+        raise ValueError("truth and found must be finite; got NaN: use rmse for missed sources")
     if period is None:
         return np.asarray(np.sqrt(((np.sort(f) - np.sort(t)) ** 2).mean(axis=(-2, -1))))
     length = positive("period", period)
     t, f = np.sort(t % length), np.sort(f % length)
-    turned = np.stack([np.roll(f, k, axis=-1) for k in range(f.shape[-1])])
-    difference = np.abs(turned - t)
+    shifted = np.stack([np.roll(f, k, axis=-1) for k in range(f.shape[-1])])
+    difference = np.abs(shifted - t)
     squares = np.minimum(difference, length - difference) ** 2
     return np.asarray(np.sqrt(squares.mean(axis=-1).min(axis=0).mean(axis=-1)))

@@ -1,4 +1,4 @@
-"""The Cramér-Rao bound against the Fisher information by differences, and the golden figures."""
+"""Cramér-Rao bound of snapshots: numerical Fisher information and published figures."""
 
 import numpy as np
 import pytest
@@ -17,17 +17,17 @@ from arrivals.scenarios.simulations.line_arrays import LineScenario
 @pytest.mark.parametrize(
     "array", [SensorArray.ula(9, spacing=0.5), SensorArray.uca(9, radius=0.5)], ids=["line", "uca"]
 )
-def test_bound_is_the_inverse_of_the_information_of_all_parameters(array: SensorArray) -> None:
+def test_snapshot_bound_is_the_inverse_of_the_joint_fisher_information(array: SensorArray) -> None:
     model = ArraySnapshot(array, wavelength=1.0)
     doa, w, noise = np.array([-0.4, 0.5]), np.array([1.0 + 0.2j, -0.6j]), 0.1
 
-    def heard(p: np.ndarray) -> np.ndarray:
+    def mean_snapshot(p: np.ndarray) -> np.ndarray:
         z = model.wave(p[:2], p[2:4] + 1j * p[4:])
         return np.concatenate([z.real, z.imag])
 
     p = np.concatenate([doa, w.real, w.imag])
     h = 1e-6 * np.eye(6)
-    slope = np.stack([(heard(p + d) - heard(p - d)) / 2e-6 for d in h], axis=1)
+    slope = np.stack([(mean_snapshot(p + d) - mean_snapshot(p - d)) / 2e-6 for d in h], axis=1)
     information = slope.T @ slope * 2 / noise
     expected = np.sqrt(np.linalg.inv(information).diagonal()[:2])
     np.testing.assert_allclose(snapshot_bound(model, doa, w, noise), expected, rtol=1e-5)
@@ -35,7 +35,7 @@ def test_bound_is_the_inverse_of_the_information_of_all_parameters(array: Sensor
     np.testing.assert_allclose(batch, np.tile(expected, (3, 1)), rtol=1e-5)
 
 
-def test_capped_moments_are_those_of_draws() -> None:
+def test_capped_moments_equal_those_of_random_draws() -> None:
     e = 3.0 * np.random.default_rng(0).standard_normal(400_000)
     std = np.array([3.0])
     assert capped_distance(std, 5.0)[0] == pytest.approx(np.minimum(np.abs(e), 5).mean(), rel=5e-3)
@@ -50,7 +50,7 @@ def test_capped_moments_are_those_of_draws() -> None:
         ("svalse_scenario2", 20.0, 14.0),
     ],
 )  # fmt: skip
-def test_golden_figures_of_section_12_6(name: str, snr_db: float, expected: float) -> None:
+def test_line_bound_matches_section_12_6(name: str, snr_db: float, expected: float) -> None:
     scenario = create(name, snr_db=snr_db)
     assert isinstance(scenario, LineScenario)
     assert line_bound(scenario, 4).gospa == pytest.approx(expected, rel=0.06)

@@ -1,4 +1,4 @@
-"""A scheduler and two workers as processes of their own, one of which is killed in the middle."""
+"""A study on a dask cluster of two worker processes, one of which is killed during the study."""
 
 import subprocess
 import sys
@@ -11,7 +11,8 @@ from typing import Any
 
 import pytest
 
-from arrivals.scenarios import PairsInTurn, Study, monte_carlo
+from arrivals.scenarios import Study, monte_carlo
+from arrivals.scenarios.simulations import PairsInTurn
 
 pytest.importorskip("distributed")
 DASK = Path(sysconfig.get_path("scripts")) / ("dask.exe" if sys.platform == "win32" else "dask")
@@ -19,7 +20,7 @@ DASK = Path(sysconfig.get_path("scripts")) / ("dask.exe" if sys.platform == "win
 
 @pytest.fixture
 def cluster(tmp_path: Path) -> Iterator[tuple[Path, list[subprocess.Popen[bytes]]]]:
-    """The file that tells where the scheduler is, and the workers."""
+    """Start a scheduler and two workers; yield the scheduler file and the workers."""
     where = tmp_path / "scheduler.json"
     common = ["--scheduler-file", str(where), "--no-dashboard"]
     one_thread = ["--nthreads", "1", "--no-nanny"]
@@ -40,7 +41,7 @@ def numbers(study: Study) -> list[tuple[Any, ...]]:
     return [row[:5] for row in study.rows() if row.metric != "cpu_ms"]
 
 
-def test_study_survives_a_worker_and_gives_equal_numbers(
+def test_study_with_a_killed_worker_gives_equal_numbers(
     cluster: tuple[Path, list[subprocess.Popen[bytes]]], tmp_path: Path
 ) -> None:
     from distributed import Client

@@ -1,4 +1,4 @@
-"""A worker that is killed is told in one line, and nothing that was finished is lost."""
+"""Killed worker processes: one line of error, finished runs kept."""
 
 import os
 import signal
@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 
 from arrivals.__main__ import main
-from arrivals.scenarios import PairsInTurn, Study, monte_carlo
+from arrivals.scenarios import Study, monte_carlo
 from arrivals.scenarios.experiments.workers import parallel_map
 from arrivals.scenarios.reproduce import studies as reproduce
 from arrivals.scenarios.reproduce.studies import Report
+from arrivals.scenarios.simulations import PairsInTurn
 from arrivals.trackers import CBF, Run, register
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="kills as POSIX does")
@@ -24,7 +25,7 @@ RUNS = 6
 
 @register("is_killed")
 class IsKilled(CBF):
-    """Told by the environment, kills its process once a first run of the study has been kept."""
+    """Kills its process after the first kept run, if ARRIVALS_TEST_KILLED names the folder."""
 
     calls = 0
 
@@ -47,9 +48,12 @@ def study(runs: int, seed: int, out: Path | None = None) -> Report:
     return Report("Killed", ["method", "GOSPA"], values)
 
 
-def called(script: str, killed: Path | None, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """Run a script that may import this module, in a process of its own."""
-    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parent)}
+def run_script(
+    script: str, killed: Path | None, *arguments: str
+) -> subprocess.CompletedProcess[str]:
+    """Run a script that may import this module, in a new process."""
+    paths = [str(Path(__file__).parent), *sys.path]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths)}
     if killed is not None:
         environment["ARRIVALS_TEST_KILLED"] = str(killed)
     return subprocess.run(
@@ -65,16 +69,16 @@ COMMAND = (
 )
 
 
-def test_study_whose_worker_was_killed_is_told_in_one_line_and_goes_on(
+def test_killed_worker_is_reported_in_one_line_and_study_resumes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out = ["reproduce", "killed", "--runs", str(RUNS), "--out", str(tmp_path)]
-    done = called(COMMAND, tmp_path / "runs", *out, "--jobs", "2")
+    done = run_script(COMMAND, tmp_path / "runs", *out, "--jobs", "2")
     assert done.returncode == 2
     (line,) = done.stderr.splitlines()
     (path,) = (tmp_path / "runs").glob("study-*.csv")
     assert line.startswith("arrivals: a worker process died (SIGKILL(-9)); finished runs are kept")
-    assert f"in {path}: call again to go on" in line
+    assert f"in {path}: call again to resume" in line
     assert not (tmp_path / "killed.csv").exists()
     kept = {row for row in Study.read(path).rows() if row.metric == "cpu_ms"}
     assert 0 < len(kept) < 2 * RUNS
@@ -91,45 +95,47 @@ def test_study_whose_worker_was_killed_is_told_in_one_line_and_goes_on(
     assert (tmp_path / "killed.csv").read_text().count("\n") == 1 + 2 * RUNS
 
 
-def deadly(n: int) -> int:
+def kill_at_three(n: int) -> int:
     if n == 3:
         os.kill(os.getpid(), signal.SIGKILL)
     return n
 
 
-def test_study_that_keeps_no_runs_says_so() -> None:
+def test_killed_worker_of_a_study_without_file_is_reported() -> None:
     from joblib import parallel_config
 
     with (
         parallel_config(n_jobs=2),
-        pytest.raises(ChildProcessError, match=r"died \(SIGKILL.*keeps no runs") as told,
+        pytest.raises(ChildProcessError, match=r"died \(SIGKILL.*keeps no runs") as failure,
     ):
-        parallel_map(deadly, [(n,) for n in range(8)])
-    assert "\n" not in str(told.value)
-    assert parallel_map(deadly, [(1,), (2,)]) == [1, 2]
+        parallel_map(kill_at_three, [(n,) for n in range(8)])
+    assert "\n" not in str(failure.value)
+    assert parallel_map(kill_at_three, [(1,), (2,)]) == [1, 2]
 
 
-def written(runs: int, seed: int) -> Report:
+def long_table(runs: int, seed: int) -> Report:
     return Report("Written", ["x"], [(float(x),) for x in np.arange(1000.0)], ["Holds: x (1)."])
 
 
-def test_full_disk_and_unwritable_folder_are_one_line(tmp_path: Path) -> None:
+def test_full_disk_and_unwritable_folder_are_reported_in_one_line(tmp_path: Path) -> None:
     script = (
         "import atexit, resource, signal; signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
         "before = resource.getrlimit(resource.RLIMIT_FSIZE)\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (2000, before[1]))\n"
-        "atexit.register(resource.setrlimit, resource.RLIMIT_FSIZE, before)  # what measures\n"
-        f"{COMMAND.replace(':study', ':written')}"
+        "atexit.register(resource.setrlimit, resource.RLIMIT_FSIZE, before)  # for coverage\n"
+        f"{COMMAND.replace(':study', ':long_table')}"
     )
-    done = called(script, None, "reproduce", "killed", "--out", str(tmp_path))
+    done = run_script(script, None, "reproduce", "killed", "--out", str(tmp_path))
     assert done.returncode == 2
     assert done.stderr.splitlines() == [f"arrivals: {tmp_path / 'killed.csv'}: File too large"]
-    assert list(tmp_path.iterdir()) == []  # nothing half written
+    assert list(tmp_path.iterdir()) == []  # no partial file
     page = tmp_path / "nowhere" / "page.md"
-    done = called(COMMAND, None, "reproduce", "killed", "--out", str(tmp_path), "--page", str(page))
+    done = run_script(
+        COMMAND, None, "reproduce", "killed", "--out", str(tmp_path), "--page", str(page)
+    )
     assert done.stderr.splitlines() == [f"arrivals: {page.parent}: the folder does not exist"]
-    assert list(tmp_path.iterdir()) == []  # said before anything was run
+    assert list(tmp_path.iterdir()) == []  # checked before the study
     (tmp_path / "file").write_text("")
-    done = called(COMMAND, None, "reproduce", "killed", "--out", str(tmp_path / "file"))
+    done = run_script(COMMAND, None, "reproduce", "killed", "--out", str(tmp_path / "file"))
     assert done.returncode == 2
     assert done.stderr.splitlines() == [f"arrivals: {tmp_path / 'file'}: File exists"]

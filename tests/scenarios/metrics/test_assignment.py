@@ -1,4 +1,4 @@
-"""Pairs, labels, and whether stated deviations are right: closed forms and brute force."""
+"""Assignment, labels and consistency of stated deviations: closed forms and brute force."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
-from arrivals.scenarios import SixSources, create, gospa
+from arrivals.scenarios import create, gospa
 from arrivals.scenarios.metrics.assignment import label_switches, matches, track_lengths
 from arrivals.scenarios.metrics.consistency import (
     circular_nees,
@@ -15,13 +15,16 @@ from arrivals.scenarios.metrics.consistency import (
     position_nees,
 )
 from arrivals.scenarios.metrics.registry import METRICS
+from arrivals.scenarios.simulations import SixSources
 from arrivals.trackers import SVALSE
 
 ROWS = st.lists(st.one_of(st.floats(-180, 180), st.just(np.nan)), min_size=1, max_size=4)
 
 
 @given(ROWS, ROWS, st.sampled_from([None, 360.0]))
-def test_pairs_are_those_of_gospa(truth: list[float], found: list[float], period: float) -> None:
+def test_matches_of_directions_equal_those_of_gospa(
+    truth: list[float], found: list[float], period: float
+) -> None:
     pairs = matches([truth], [found], c=10.0, period=period)
     whole = gospa(truth, found, c=10.0, period=period)
     assert np.abs(pairs.error).sum() == pytest.approx(whole.distance)
@@ -29,33 +32,33 @@ def test_pairs_are_those_of_gospa(truth: list[float], found: list[float], period
     assert 5.0 * (n_true - len(pairs.step)) == pytest.approx(whole.missed)
 
 
-def test_error_takes_the_shorter_way_round() -> None:
+def test_matches_errors_wrap_with_a_period() -> None:
     assert matches([[-179.0]], [[178.0]], c=10, period=360).error == pytest.approx([-3.0])
     assert matches([[-179.0]], [[178.0]], c=10).error.size == 0
 
 
-def test_switches_and_lengths_by_hand() -> None:
+def test_label_switches_and_track_lengths_match_hand_count() -> None:
     truth = np.array([[0.0, 50.0]] * 6)
     found = [[0.0, 50.0], [0, 50], [50, np.nan], [50, 0], [50, 0], [50, 0]]
     label = [[1, 2], [1, 2], [2, -1], [3, 1], [3, 1], [3, 1]]
     pairs = matches(truth, np.array(found, dtype=float), c=10)
-    assert label_switches(pairs, label) == 1  # 50 goes from label 2 to 3; 0 comes back as 1
+    assert label_switches(pairs, label) == 1  # source 50 changes from label 2 to 3; 0 returns as 1
     assert sorted(track_lengths(pairs, label)) == [2, 3, 3, 3]
 
 
 @pytest.mark.parametrize("std", [0.01, 0.3, 1.5])
-def test_right_deviations_have_nees_one_and_cover_what_they_say(std: float) -> None:
+def test_correct_deviations_have_nees_one_and_nominal_coverage(std: float) -> None:
     error = np.random.default_rng(0).normal(0, std, 200_000)
     stated = np.full(error.shape, std)
     assert circular_nees(error, stated) == pytest.approx(1.0, abs=0.02)
     assert circular_nees(error, stated / 2) > 1.5
-    if std < 1:  # wider ones wrap
+    if std < 1:  # wider densities wrap
         assert coverage(error, stated, 0.68) == pytest.approx(0.68, abs=0.005)
         assert coverage(error, stated, 0.95) == pytest.approx(0.95, abs=0.005)
 
 
 @given(st.integers(0, 5), st.integers(0, 5), st.integers(0, 10_000))
-def test_pairs_of_positions_are_those_of_gospa(n_true: int, n_found: int, seed: int) -> None:
+def test_matches_of_positions_equal_those_of_gospa(n_true: int, n_found: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     truth, found = rng.uniform(0, 20, (1, n_true, 2)), rng.uniform(0, 20, (1, n_found, 2))
     pairs = matches(truth, found, c=10.0)
@@ -64,7 +67,7 @@ def test_pairs_of_positions_are_those_of_gospa(n_true: int, n_found: int, seed: 
     assert 5.0 * (n_true - len(pairs.step)) == pytest.approx(whole.missed)
 
 
-def test_right_covariances_have_nees_one_and_cover_what_they_say() -> None:
+def test_correct_covariances_have_nees_one_and_nominal_coverage() -> None:
     P = np.array([[4.0, 1.5], [1.5, 1.0]])
     error = np.random.default_rng(0).multivariate_normal([0, 0], P, 100_000)
     stated = np.broadcast_to(P, (len(error), 2, 2))
@@ -80,7 +83,7 @@ def test_right_covariances_have_nees_one_and_cover_what_they_say() -> None:
 
 
 def test_nees_of_von_mises_errors_is_one() -> None:
-    """The deviation of a density of resultant R is √(-2 ln R), whatever its shape."""
+    """The deviation of a density of resultant R is √(-2 ln R) for any shape."""
     from scipy.special import ive
 
     for kappa in (0.5, 5.0, 500.0):
@@ -94,14 +97,16 @@ def test_nees_of_von_mises_errors_is_one() -> None:
     ("error", "std", "message"),
     [([0.1], [0.0], "positive"), ([0.1], [np.nan], "positive"), ([0.1], [1, 1], "same shape")],
 )
-def test_nonsense_is_refused(error: ArrayLike, std: ArrayLike, message: str) -> None:
+def test_consistency_invalid_argument_is_rejected(
+    error: ArrayLike, std: ArrayLike, message: str
+) -> None:
     with pytest.raises(ValueError, match=message):
         circular_nees(error, std)
     with pytest.raises(ValueError, match="level must lie"):
         coverage([0.1], [0.1], level=1.0)
 
 
-def test_svalse_states_the_right_deviation_for_one_source() -> None:
+def test_svalse_deviation_of_one_source_is_consistent() -> None:
     n_steps = 100
     model = SixSources().measurement.replace(noise=0.02)
     rng = np.random.default_rng(2)
@@ -125,18 +130,18 @@ def test_metrics_of_a_perfect_run() -> None:
         run.time,
         run.elapsed,
     )
-    found = {name: metric(trial, perfect) for name, metric in METRICS.items()}
-    assert found == {
+    values = {name: metric(trial, perfect) for name, metric in METRICS.items()}
+    assert values == {
         "gospa": 0, "distance": 0, "missed": 0, "false": 0, "rmse": 0, "ospa": 0,
         "cardinality": 0, "nees": 0, "coverage68": 1, "coverage95": 1, "label_switches": 0,
-        "track_length": 4, "converged": found["converged"],
+        "track_length": 4, "converged": values["converged"],
     }  # fmt: skip
 
 
-def test_metrics_that_cannot_be_given_say_why() -> None:
+def test_inapplicable_metrics_report_the_reason() -> None:
     trial = create("svalse_fig6", n_steps=2).sample(np.random.default_rng(0))
     run = trial.tracker("cbf").run(trial.measurements)
-    with pytest.raises(ValueError, match="states no standard deviations"):
+    with pytest.raises(ValueError, match="does not estimate standard deviations"):
         METRICS["nees"](trial, run)
-    with pytest.raises(ValueError, match="gives no labels"):
+    with pytest.raises(ValueError, match="does not assign labels"):
         METRICS["track_length"](trial, run)

@@ -1,4 +1,4 @@
-"""Metrics against every assignment there is, against their axioms, and on worked examples."""
+"""GOSPA, OSPA and RMSE: brute force over all assignments, axioms, worked examples."""
 
 from collections.abc import Iterator
 from itertools import combinations, permutations
@@ -27,7 +27,7 @@ ALPHAS = st.sampled_from([0.5, 1.0, 1.7, 2.0])
 
 
 def assignments(n: int, m: int) -> Iterator[list[tuple[int, int]]]:
-    """Every set of pairs, of any size, in which nothing occurs twice."""
+    """Yield every set of disjoint pairs, of any size."""
     for k in range(min(n, m) + 1):
         for rows in combinations(range(n), k):
             for columns in permutations(range(m), k):
@@ -44,7 +44,7 @@ def brute_gospa(truth: list[float], found: list[float], c: float, p: float) -> f
 
 
 def brute_cut(small: list[float], large: list[float], c: float, p: float) -> float:
-    """Least sum of min(d, c)^p over the ways to give each of the smaller set a partner."""
+    """Return the smallest sum of min(d, c)^p over the assignments of the smaller set."""
     costs = (
         sum(min(abs(a - b), c) ** p for a, b in zip(small, chosen, strict=True))
         for chosen in permutations(large, len(small))
@@ -87,19 +87,19 @@ def test_rmse_is_the_best_of_all_assignments(
 
 @LAW
 @given(POINTS, POINTS, CUTS, EXPONENTS, ALPHAS)
-def test_the_parts_add_up_and_swap_with_their_sets(
+def test_gospa_parts_add_up_and_swap_with_the_sets(
     a: list[tuple[float, float]], b: list[tuple[float, float]], c: float, p: float, alpha: float
 ) -> None:
-    there, back = gospa(a, b, c, p, alpha), gospa(b, a, c, p, alpha)
-    assert there.total**p == pytest.approx(there.distance + there.missed + there.false)
-    assert there.total == pytest.approx(back.total)
-    assert there.missed - there.false == pytest.approx(back.false - back.missed)
+    forward, reverse = gospa(a, b, c, p, alpha), gospa(b, a, c, p, alpha)
+    assert forward.total**p == pytest.approx(forward.distance + forward.missed + forward.false)
+    assert forward.total == pytest.approx(reverse.total)
+    assert forward.missed - forward.false == pytest.approx(reverse.false - reverse.missed)
     assert ospa(a, b, c, p) == pytest.approx(ospa(b, a, c, p))
 
 
 @LAW
 @given(POINTS, POINTS, POINTS, CUTS, EXPONENTS, ALPHAS)
-def test_no_detour_is_shorter(
+def test_gospa_and_ospa_satisfy_the_triangle_inequality(
     x: list[tuple[float, float]],
     y: list[tuple[float, float]],
     z: list[tuple[float, float]],
@@ -116,7 +116,7 @@ def test_no_detour_is_shorter(
 
 @LAW
 @given(POINTS, POINTS, st.randoms(use_true_random=False), CUTS)
-def test_the_order_of_points_does_not_matter(
+def test_metrics_are_invariant_to_the_order_of_points(
     a: list[tuple[float, float]],
     b: list[tuple[float, float]],
     random: np.random.Generator,
@@ -131,7 +131,7 @@ def test_the_order_of_points_does_not_matter(
 
 @LAW
 @given(ANGLES, ANGLES, st.lists(st.integers(-3, 3), min_size=4, max_size=4))
-def test_full_turns_do_not_matter_on_a_circle(
+def test_gospa_with_period_is_invariant_to_full_turns(
     truth: list[float], found: list[float], turns: list[int]
 ) -> None:
     turned = [f + 360 * n for f, n in zip(found, turns, strict=False)]
@@ -142,14 +142,14 @@ def test_full_turns_do_not_matter_on_a_circle(
 
 @LAW
 @given(ANGLES, ANGLES, st.integers(0, 3))
-def test_rows_with_nan_count_as_absent(truth: list[float], found: list[float], n: int) -> None:
+def test_rows_with_nan_are_ignored(truth: list[float], found: list[float], n: int) -> None:
     padded = np.r_[np.full(n, np.nan), found]
     assert gospa(truth, padded, c=10) == gospa(truth, found, c=10)
     assert rmse(padded, truth, c=10) == rmse(found, truth, c=10)
 
 
 @pytest.mark.parametrize("unit", [1.0, np.pi / 180])
-def test_worked_examples_of_the_specification(unit: float) -> None:
+def test_metrics_match_worked_examples_of_the_specification(unit: float) -> None:
     truth, found, c = unit * np.array([10, 20, 40]), unit * np.array([11, 26, 70]), 10 * unit
     parts = gospa(truth, found, c)
     assert (parts.total / unit, parts.distance / unit) == pytest.approx((17, 7))
@@ -160,24 +160,24 @@ def test_worked_examples_of_the_specification(unit: float) -> None:
     assert (gospa([], found[:2], c).total / unit, rmse([], found, c)) == pytest.approx((10, 0))
 
 
-def test_a_pair_at_the_cut_off_is_no_pair() -> None:
+def test_gospa_pair_at_the_cut_off_is_not_matched() -> None:
     assert gospa([0], [10], c=10) == Gospa(10, 0, 5, 5)
     assert gospa([0], [10], c=10, alpha=1) == Gospa(10, 0, 5, 5)
     assert gospa([0, 0], [0], c=10, alpha=1) == Gospa(10, 0, 10, 0)
 
 
-def test_two_empty_sets_agree() -> None:
+def test_metrics_of_two_empty_sets_are_zero() -> None:
     assert gospa([], [], c=1) == Gospa(0, 0, 0, 0)
     assert ospa([], np.empty((0, 2)), c=1) == 0
     assert gospa([[1, 2]], [], c=4).total == 2
 
 
-def test_angles_wrap_in_rad() -> None:
+def test_metrics_wrap_angles_with_a_period() -> None:
     assert gospa([np.pi - 0.01], [-np.pi], c=1, period=2 * np.pi).distance == pytest.approx(0.01)
     assert rmse([np.pi - 0.01], [-np.pi], c=1) == 1
 
 
-def test_means_are_over_steps() -> None:
+def test_mean_metrics_average_over_steps() -> None:
     truth = np.array([[0.0, 50.0], [1.0, np.nan]])
     found = [[2.0], []]
     assert mean_gospa(truth, found, c=10) == Gospa(6, 1, 5, 0)
@@ -195,17 +195,17 @@ def test_means_are_over_steps() -> None:
         ({"alpha": 2.5}, r"alpha must lie in \(0, 2\]; got 2.5"),
         ({"period": -1}, "period must be finite and positive; got -1"),
         ({"found": [[1.0, 2.0]]}, "must have the same dimension; got 1 and 2"),
-        ({"found": [np.inf]}, "found must be finite, or NaN where absent"),
+        ({"found": [np.inf]}, "found must be finite, or NaN for absent points"),
         ({"truth": 1.0}, r"truth must have shape \(n,\) or \(n, dim\); got \(\)"),
     ],
 )
-def test_bad_input_is_refused(arguments: dict[str, float], message: str) -> None:
+def test_gospa_invalid_argument_is_rejected(arguments: dict[str, float], message: str) -> None:
     good = {"truth": [1.0], "found": [2.0], "c": 10}
     with pytest.raises(ValueError, match=message):
         gospa(**(good | arguments))  # type: ignore[arg-type]
 
 
-def test_other_metrics_refuse_it_too() -> None:
+def test_other_metrics_reject_invalid_arguments() -> None:
     with pytest.raises(ValueError, match="c must be"):
         rmse([1], [1], c=-1)
     with pytest.raises(ValueError, match="p must be"):
@@ -237,12 +237,12 @@ def test_best_assignment_is_the_best_of_all_permutations(
         assert ours[run] == pytest.approx(np.sqrt(total / 2 / n_sources), abs=1e-9)
 
 
-def test_best_assignment_wants_a_fixed_number_of_finite_angles() -> None:
+def test_best_assignment_rmse_requires_finite_angles_of_fixed_number() -> None:
     with pytest.raises(ValueError, match="n_steps, n_sources"):
         best_assignment_rmse([1.0, 2.0], [1.0, 2.0])
     with pytest.raises(ValueError, match=r"got \(1, 2\) and \(1, 1\)"):
         best_assignment_rmse([[1.0, 2.0]], [[1.0]])
-    with pytest.raises(ValueError, match="rmse takes sources that were missed"):
+    with pytest.raises(ValueError, match="use rmse for missed sources"):
         best_assignment_rmse([[1.0, 2.0]], [[1.0, np.nan]])
     with pytest.raises(ValueError, match="period must be finite and positive"):
         best_assignment_rmse([[1.0]], [[1.0]], period=0)

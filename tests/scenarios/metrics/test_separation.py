@@ -1,4 +1,4 @@
-"""Measures of separated signals, and the autoregressive signals that they are tried on."""
+"""NMSE and SDR of separated signals, and simulated autoregressive signals."""
 
 from typing import Any
 
@@ -20,7 +20,7 @@ def signals(seed: int = 0) -> Any:
 # -- measures ------------------------------------------------------------------------------------
 
 
-def test_what_is_found_exactly_has_no_error_and_zeros_have_all() -> None:
+def test_exact_signals_have_no_error_and_zeros_have_unit_error() -> None:
     s = signals()
     np.testing.assert_array_equal(nmse(s, s), np.zeros((3, 2)))
     np.testing.assert_array_equal(nmse(s, 0 * s), np.ones((3, 2)))
@@ -29,7 +29,7 @@ def test_what_is_found_exactly_has_no_error_and_zeros_have_all() -> None:
     np.testing.assert_array_equal(sdr(s, 0 * s), np.full((3, 2), -np.inf))
 
 
-def test_noise_of_a_known_power_gives_its_decibels() -> None:
+def test_noise_of_known_power_has_its_nmse_and_sdr() -> None:
     s = signals()
     rng = np.random.default_rng(1)
     u = rng.standard_normal((*s.shape, 2)) @ np.array([1, 1j]) * np.sqrt(0.01 / 2)
@@ -38,13 +38,13 @@ def test_noise_of_a_known_power_gives_its_decibels() -> None:
 
 
 @given(st.complex_numbers(min_magnitude=1e-3, max_magnitude=1e3, allow_nan=False))
-def test_scale_and_phase_do_not_matter_to_sdr(factor: complex) -> None:
+def test_sdr_is_invariant_to_scale_and_phase(factor: complex) -> None:
     s = signals()
     found = s + 0.1 * signals(1)
     np.testing.assert_allclose(sdr(s, factor * found), sdr(s, found), rtol=1e-9)
 
 
-def test_sdr_is_the_best_that_any_factor_gives() -> None:
+def test_sdr_is_the_maximum_over_complex_factors() -> None:
     s, found = signals()[0, :, :1], (signals() + 0.3 * signals(1))[0, :, :1] * 2j
     turns = np.exp(1j * np.linspace(0, 2 * np.pi, 721))
     alphas = (np.linspace(0.5, 4, 141)[:, None] * turns).ravel()
@@ -60,11 +60,11 @@ def test_sdr_is_the_best_that_any_factor_gives() -> None:
         (np.ones((3, 2)), np.ones((3, 1)), ValueError, "the same shape"),
         (np.ones(3), np.ones(3), ValueError, "n_steps, n_sources"),
         (np.ones((2, 1)), [[np.nan], [1.0]], ValueError, "found must be finite"),
-        (np.zeros((2, 1)), np.ones((2, 1)), ValueError, "zero throughout"),
+        (np.zeros((2, 1)), np.ones((2, 1)), ValueError, "nonzero for every source"),
         ([["a"]], [["a"]], TypeError, "must hold numbers"),
     ],
 )
-def test_signals_that_cannot_be_compared_are_refused(
+def test_nmse_and_sdr_invalid_signals_are_rejected(
     truth: Any, found: Any, error: type[Exception], message: str
 ) -> None:
     for measure in (nmse, sdr):
@@ -75,7 +75,7 @@ def test_signals_that_cannot_be_compared_are_refused(
 # -- autoregressive signals ----------------------------------------------------------------------
 
 
-def test_stationary_covariance_is_the_fixed_point_and_has_unit_power_in_the_paper() -> None:
+def test_stationary_covariance_is_the_fixed_point_with_unit_power_in_the_paper() -> None:
     for a, q in zip(A, Q, strict=True):
         F, P = np.array([a, [1.0, 0.0]]), stationary_covariance(a, q)
         np.testing.assert_allclose(F @ P @ F.T + np.diag([q, 0.0]), P, atol=1e-12)
@@ -83,7 +83,7 @@ def test_stationary_covariance_is_the_fixed_point_and_has_unit_power_in_the_pape
 
 
 @pytest.mark.parametrize("complex_valued", [True, False])
-def test_signals_are_stationary_from_the_first_step(complex_valued: bool) -> None:
+def test_ar_signals_are_stationary_from_the_first_step(complex_valued: bool) -> None:
     rng = np.random.default_rng(0)
     s = ar_signals([A[0], [0.9]], [Q[0], 0.19], 4, rng, (40000,), complex_valued=complex_valued)
     assert s.shape == (40000, 4, 2)
@@ -94,7 +94,7 @@ def test_signals_are_stationary_from_the_first_step(complex_valued: bool) -> Non
     np.testing.assert_allclose(lag_one, np.tile(expected, (3, 1)), atol=0.04)
 
 
-def test_signals_obey_their_recursion_and_sources_are_independent() -> None:
+def test_ar_signals_obey_their_recursion_and_are_independent() -> None:
     s = ar_signals(A, Q, 30000, np.random.default_rng(2))
     for k, (a, q) in enumerate(zip(A, Q, strict=True)):
         v = s[2:, k] - a[0] * s[1:-1, k] - a[1] * s[:-2, k]
@@ -114,7 +114,7 @@ def test_signals_obey_their_recursion_and_sources_are_independent() -> None:
         ([[np.nan]], [1.0], "finite numbers a_1"),
     ],
 )
-def test_processes_that_do_not_exist_are_refused(
+def test_ar_signals_invalid_process_is_rejected(
     coefficients: Any, noise: Any, message: str
 ) -> None:
     with pytest.raises(ValueError, match=message):

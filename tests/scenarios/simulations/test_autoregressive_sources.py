@@ -6,19 +6,17 @@ import numpy as np
 import pytest
 from scipy.io import wavfile
 
-from arrivals.scenarios import (
-    AutoregressiveField,
-    FastSource,
-    FourOnThree,
-    Scenario,
-    SpeechField,
-    ThreeOnThree,
-    create,
-    nmse,
-)
+from arrivals.scenarios import Scenario, create, nmse
 from arrivals.scenarios.reproduce import ar_kalman as reproduce_ar
 from arrivals.scenarios.reproduce.ar_kalman import Experiment, cases, hold_last, run_tracker
 from arrivals.scenarios.reproduce.studies import reproduce
+from arrivals.scenarios.simulations import (
+    AutoregressiveField,
+    FastSource,
+    FourOnThree,
+    SpeechField,
+    ThreeOnThree,
+)
 
 NAMES = [*(f"ar_fig{n}" for n in (1, 3, 4, 5, 6, 7, 8, 9)), "ar_three_on_three", "ar_four_on_three"]
 

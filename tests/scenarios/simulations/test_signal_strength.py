@@ -1,4 +1,4 @@
-"""Scenarios, bounds, detection and metrics of the signal-strength paper."""
+"""Scenarios, bounds, detection and metrics of the paper on signal strength."""
 
 from typing import Any
 
@@ -30,7 +30,7 @@ NAMES = ("rss_table1_k3", "rss_table1_k7", "rss_crossing", "rss_birth_death")
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_scenarios_are_registered_and_take_any_number(name: str) -> None:
+def test_rss_scenarios_are_registered_and_accept_any_number_of_sources(name: str) -> None:
     assert name in available()
     for params in ({}, {"n_sources": 50, "n_sensors": 700}, {"n_sources": 1}):
         scenario: Any = create(name, **params)
@@ -47,7 +47,7 @@ def test_scenarios_are_registered_and_take_any_number(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_trackers_take_the_trial_as_it_is(name: str) -> None:
+def test_rss_trackers_accept_the_arguments_of_a_trial(name: str) -> None:
     trial = create(name, n_sensors=60).sample(np.random.default_rng(1))
     for kind in ("rss_vb", "rss_ml"):
         tracker: Any = trial.tracker(kind)
@@ -56,12 +56,12 @@ def test_trackers_take_the_trial_as_it_is(name: str) -> None:
         assert np.isfinite(tracker.estimate.position).all()
 
 
-def test_a_hundred_thousand_sensors_are_located_with() -> None:
+def test_rss_vb_locates_with_a_hundred_thousand_sensors() -> None:
     trial = Table1K3(n_sensors=100_000).sample(np.random.default_rng(0))
     tracker: Any = trial.tracker("rss_vb")
     tracker.update(trial.measurements[0])
-    far = np.linalg.norm(tracker.estimate.position - trial.truth[0], axis=-1)
-    assert far.max() < 0.5
+    error = np.linalg.norm(tracker.estimate.position - trial.truth[0], axis=-1)
+    assert error.max() < 0.5
 
 
 @pytest.mark.parametrize(
@@ -75,13 +75,13 @@ def test_a_hundred_thousand_sensors_are_located_with() -> None:
         ({"spacing": 0.0}, "spacing must be finite and positive"),
     ],
 )
-def test_nonsense_is_refused(params: dict[str, Any], message: str) -> None:
+def test_rss_scenario_invalid_parameter_is_rejected(params: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         Table1K3(**params)
 
 
 @given(st.integers(2, 50), st.booleans())
-def test_lattice_points_keep_their_distance(n: int, centred: bool) -> None:
+def test_lattice_points_have_the_given_spacing(n: int, centred: bool) -> None:
     points = lattice(n, 30.0, centred)
     apart = np.linalg.norm(points[:, None] - points, axis=-1) + 1e9 * np.eye(n)
     assert apart.min() == pytest.approx(30.0)
@@ -91,33 +91,33 @@ def test_lattice_points_keep_their_distance(n: int, centred: bool) -> None:
 # bounds
 
 
-def test_bound_is_the_spread_of_the_best_estimates() -> None:
+def test_rss_bound_is_the_inverse_covariance_of_the_score() -> None:
     """The inverse information is the covariance of the score, drawn from the exact statistic."""
     rng = np.random.default_rng(0)
-    heard = LogNormalRSS(rng.uniform(-80, 80, (40, 2)), log_noise=float(db_to_neper(40.0)))
+    model = LogNormalRSS(rng.uniform(-80, 80, (40, 2)), log_noise=float(db_to_neper(40.0)))
     u, theta = db_to_neper([80.0]), np.array([[5.0, -10.0]])
     from arrivals.measurement_models.signal_strength.path_loss import slopes
 
-    found = heard.levels(u, theta)
-    z = heard.draw(np.tile(u, (20000, 1)), np.tile(theta, (20000, 1, 1)), rng)
-    e2 = np.exp(2 * (z - found.log_sigma))
-    score = 2 * 50 * (e2 - 1) @ slopes(found, 2.0)  # of the Gamma statistic N e²
+    levels = model.levels(u, theta)
+    z = model.draw(np.tile(u, (20000, 1)), np.tile(theta, (20000, 1, 1)), rng)
+    e2 = np.exp(2 * (z - levels.log_sigma))
+    score = 2 * 50 * (e2 - 1) @ slopes(levels, 2.0)  # of the Gamma statistic N e²
     exact = np.linalg.inv(score.T @ score / 20000)
-    bound = rss_bound(heard, u, theta)
+    bound = rss_bound(model, u, theta)
     np.testing.assert_allclose(bound.Sigma[0], exact[1:, 1:], rtol=0.06)
     np.testing.assert_allclose(bound.v, exact[0, 0], rtol=0.06)
 
 
-def test_priors_make_the_bound_smaller_and_hold_what_readings_do_not() -> None:
-    heard = LogNormalRSS([[0.0, 0.0], [60.0, 0.0]])
-    with pytest.raises(ValueError, match="2 readings do not hold the 3 unknowns"):
-        rss_bound(heard, [9.2], [[20.0, 0.0]])
-    held = rss_bound(heard, [9.2], [[20.0, 30.0]], v0=0.1, P0=100.0 * np.eye(2))
-    assert held.position[0] < np.sqrt(200.0)
-    assert held.amplitude[0] < np.sqrt(0.1)
+def test_priors_reduce_the_rss_bound_and_resolve_ambiguity() -> None:
+    model = LogNormalRSS([[0.0, 0.0], [60.0, 0.0]])
+    with pytest.raises(ValueError, match="2 readings do not determine the 3 unknowns"):
+        rss_bound(model, [9.2], [[20.0, 0.0]])
+    bound = rss_bound(model, [9.2], [[20.0, 30.0]], v0=0.1, P0=100.0 * np.eye(2))
+    assert bound.position[0] < np.sqrt(200.0)
+    assert bound.amplitude[0] < np.sqrt(0.1)
 
 
-def test_bounds_are_those_of_section_11() -> None:
+def test_rss_bound_matches_section_11() -> None:
     for case, position, level in ((Table1K3(), 1.9, 0.62), (Table1K7(), 1.6, 0.50)):
         found = bounds(draws(case, 200, 0))
         far = np.median(np.sqrt(np.trace(found.Sigma, axis1=-2, axis2=-1)))
@@ -138,7 +138,7 @@ def test_bounds_are_those_of_section_11() -> None:
         (100, -3, 0.001, 0.864, 0.835, 0.876, 5.0e-4, 1.1e-3),
     ],
 )
-def test_detection_is_that_of_section_8(
+def test_detection_matches_section_8(
     N: int, snr_db: float, alarm: float, exact: float, log: float, amplitude: float,
     true_log: float, true_amplitude: float,
 ) -> None:  # fmt: skip
@@ -150,17 +150,17 @@ def test_detection_is_that_of_section_8(
     assert [float(p) for p in got] == pytest.approx([true_log, true_amplitude], rel=0.06)
 
 
-def test_exact_detection_is_what_happens() -> None:
+def test_exact_detection_matches_simulation() -> None:
     rng = np.random.default_rng(0)
-    heard = LogNormalRSS([[0.0, 0.0]], n_snapshots=10, log_noise=0.0)
+    model = LogNormalRSS([[0.0, 0.0]], n_snapshots=10, log_noise=0.0)
     u, place = np.zeros((100_000, 1)), np.tile([[[2.0, 0.0]]], (100_000, 1, 1))
-    z = heard.draw(u, place, rng)[:, 0]
+    z = model.draw(u, place, rng)[:, 0]
     threshold = 0.5 * np.log(gamma.isf(0.01, 10) / 10)
     assert exact_detection(0.01, 10, 0.25) == pytest.approx(np.mean(z > threshold), abs=0.005)
 
 
 @given(st.floats(1e-4, 0.5), st.integers(1, 200))
-def test_without_a_source_detection_is_false_alarm(alarm: float, N: int) -> None:
+def test_detection_without_source_equals_false_alarm(alarm: float, N: int) -> None:
     for probability in (exact_detection, log_gaussian_detection, amplitude_gaussian_detection):
         assert probability(alarm, N, 0.0) == pytest.approx(alarm, rel=1e-6)
     assert network_detection(alarm, np.ones(5), 0.0) == pytest.approx(alarm, rel=1e-6)
@@ -169,7 +169,7 @@ def test_without_a_source_detection_is_false_alarm(alarm: float, N: int) -> None
 # metrics
 
 
-def test_huber_is_sklearns_where_scales_agree() -> None:
+def test_huber_matches_sklearn_for_equal_scales() -> None:
     from sklearn.linear_model import HuberRegressor
 
     rng = np.random.default_rng(0)
@@ -180,20 +180,20 @@ def test_huber_is_sklearns_where_scales_agree() -> None:
 
 
 @given(st.floats(0.01, 100), st.floats(-50, 50))
-def test_huber_moves_and_scales_with_the_errors(scale: float, shift: float) -> None:
+def test_huber_is_equivariant_to_shift_and_scale(scale: float, shift: float) -> None:
     e = np.random.default_rng(0).standard_t(2, 60)
     assert huber(scale * e + shift).bias == pytest.approx(scale * huber(e).bias + shift, abs=1e-3)
     assert huber(scale * e).rms == pytest.approx(scale * huber(e).rms, rel=1e-3)
 
 
-def test_huber_refuses_nothing_and_nan() -> None:
+def test_huber_empty_and_nan_errors_are_rejected() -> None:
     for errors in ([], [1.0, np.nan]):
         with pytest.raises(ValueError, match="errors must be finite, at least one"):
             huber(errors)
     assert huber([2.0, 2.0]).bias == 2.0
 
 
-def test_nearest_flatters_merged_solutions() -> None:
+def test_nearest_assignment_favours_merged_solutions() -> None:
     truth = np.array([[[0.0, 0.0], [30.0, 0.0]]] * 5)
     merged = np.array([[[15.0, 0.0], [500.0, 0.0]]] * 5)
     u = np.zeros((5, 2))
@@ -201,21 +201,21 @@ def test_nearest_flatters_merged_solutions() -> None:
     assert near.lost == 0
     assert strict.lost == 0.5
     assert near.median == 15
-    with pytest.raises(ValueError, match="one-to-one wants an estimate for each of 2; got 1"):
+    with pytest.raises(ValueError, match="theta must have at least 2 rows for one-to-one; got 1"):
         assign([[0.0, 0.0]], truth[0], "one-to-one")
 
 
-def test_estimates_that_ran_away_count_as_lost() -> None:
+def test_estimates_that_are_not_finite_count_as_lost() -> None:
     truth = np.zeros((4, 1, 2))
     found = np.array([[[0.1, 0.0]], [[0.0, 0.2]], [[np.nan, 0.0]], [[np.inf, 0.0]]])
     u = np.zeros((4, 1))
     assert scores(found, truth, u, u).lost == 0.5
 
 
-def test_the_study_of_table_1_has_rows_claims_and_a_picture(
+def test_table_1_has_rows_claims_and_a_figure(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(reproduce_rss, "_least_ms", lambda work: 4.0)  # the clock is no test
+    monkeypatch.setattr(reproduce_rss, "_least_ms", lambda work: 4.0)  # not a timing test
     report = table1(2, 0)
     assert len({row[:2] for row in report.rows}) == len(report.rows) == 22
     rms = {row[:2]: row[report.columns.index("location RMS m")] for row in report.rows}
