@@ -1,8 +1,8 @@
-"""The AR Kalman filter with QRD-RLS on the specification's table, on speech, and its speed.
+"""Accuracy of the AR Kalman filter with QRD-RLS on simulated sources and speech, and its speed.
 
 Errors are medians over the runs of the RMSE, all sources together, at the ends of the intervals
-after the first half (moving sources: after the fifth). Starts are off to alternate sides: those of
-the first, third ... source to the right and the others to the left, or the other way round.
+after the first half (moving sources: after the fifth). Initial directions are off to alternate
+sides: the first, third ... source to the right and the others to the left, or vice versa.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ import numpy as np
 
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.motion_models import AutoregressiveSources, yule_walker
-from arrivals.motion_models.companion_form import blocks
 from arrivals.trackers import ARKalmanQRDRLS, Run
+from arrivals.trackers.autoregressive import NoiseSettings, RegressionSettings
 from arrivals.trackers.autoregressive.steady_state import steady_filter
 from arrivals.typing import Complex, Float
 
@@ -37,7 +37,7 @@ THIRD = ([0.7, -0.4, 0.2], [0.9, -0.7, -0.1])
 
 @dataclass(frozen=True)
 class Case:
-    """A row of the table: what is simulated, what tracks it, and the limit of the median."""
+    """A row of the table: scene, settings of the tracker, and limit of the median."""
 
     name: str
     limit: float
@@ -107,7 +107,7 @@ def unit(coefficients: tuple[list[float], ...]) -> AutoregressiveSources:
 
 
 def signals(motion: AutoregressiveSources, n: int, runs: int, rng: np.random.Generator) -> Complex:
-    """Draw complex sources, (runs, n, n_sources), after 300 samples of running in."""
+    """Draw complex stationary sources, (runs, n, n_sources)."""
     from scipy.signal import lfilter
 
     parts = rng.standard_normal((2, runs, n + 300, motion.n_sources))
@@ -117,7 +117,7 @@ def signals(motion: AutoregressiveSources, n: int, runs: int, rng: np.random.Gen
     return np.stack(each, axis=-1)[:, 300:]
 
 
-def heard(model: ArraySnapshot, doa: Float, s: Complex, rng: np.random.Generator) -> Complex:
+def received(model: ArraySnapshot, doa: Float, s: Complex, rng: np.random.Generator) -> Complex:
     """Return noisy snapshots of sources (runs, n, n_sources) at `doa` (n, n_sources), rad."""
     z = np.einsum("rtk,tkm->rtm", s, model.array.steering_vector(doa, model.wavelength))
     noise = rng.standard_normal((*z.shape, 2)) @ np.array([1, 1j])
@@ -131,14 +131,14 @@ def directions(case: Case, n: int) -> Float:
     return doa
 
 
-def found(case: Case, runs: int, seed: int = 0) -> tuple[list[Run], Float, Complex]:
+def simulate(case: Case, runs: int, seed: int = 0) -> tuple[list[Run], Float, Complex]:
     """Return the runs, the directions (n, n_sources), and the sources."""
     rng, n = np.random.default_rng(seed), 200 * case.interval
     motion = unit(case.sources)
     array = SensorArray.symmetric(case.distances)
     model = ArraySnapshot(array, wavelength=1.0, noise=10 ** (-case.snr_db / 10))
     doa, s = directions(case, n), signals(motion, n, runs, rng)
-    z = heard(model, doa, s, rng)
+    z = received(model, doa, s, rng)
     alternate = (-1.0) ** np.arange(motion.n_sources)
     done: dict[int, Run] = {}
     for k, side in enumerate(case.sides):
@@ -148,7 +148,7 @@ def found(case: Case, runs: int, seed: int = 0) -> tuple[list[Run], Float, Compl
             motion if case.models is None else unit(case.models),
             doa=doa[0] + np.deg2rad(case.offset) * side * alternate,
             interval=case.interval,
-            forgetting=case.forgetting,
+            regression=RegressionSettings(forgetting=case.forgetting),
             **case.params,
         )
         done |= dict(zip(mine, tracker.run_batch(z[list(mine)]), strict=True))
@@ -175,7 +175,7 @@ Line = tuple[str, str, float, bool]
 
 def table(runs: int) -> Iterator[Line]:
     for case in CASES:
-        done, doa, s = found(case, runs)
+        done, doa, s = simulate(case, runs)
         rmse = errors(case, done, doa)
         low, high = np.percentile(rmse, [10, 90])
         median = float(np.median(rmse))
@@ -185,7 +185,9 @@ def table(runs: int) -> Iterator[Line]:
             level = nmse_db(done, s)
             yield f"{case.name}: NMSE, dB", f"{level:.1f}", limit, level < limit
         if case.name == "SNR 10":
-            wrong = np.array([run.coefficients[3000:] for run in done]) - unit(TWO).padded
+            wrong = (
+                np.array([run.coefficients[3000:] for run in done]) - unit(TWO).coefficient_matrix
+            )
             rms = float(np.sqrt((wrong**2).mean()))
             yield f"{case.name}: AR coefficients", f"{rms:.3f}", 0.03, rms < 0.03
 
@@ -222,9 +224,10 @@ def speech(folder: Path, seeds: int = 6) -> Iterator[Line]:
                 rng = np.random.default_rng(seed)
                 tracker = ARKalmanQRDRLS(
                     noisy, motion, doa=doa[0] + np.deg2rad(rng.choice([-10, 10], 2)),
-                    ar_forgetting=0.99, ridge=5.0, gate=0.3, adapt_drive=False,
+                    gate=0.3, regression=RegressionSettings(ar_forgetting=0.99, ridge=5.0),
+                    noise=NoiseSettings(adapt_process_noise=False),
                 )  # fmt: skip
-                run = tracker.run(heard(noisy, doa, s[None].astype(complex), rng)[0])
+                run = tracker.run(received(noisy, doa, s[None].astype(complex), rng)[0])
                 wrong = (run.doa - doa)[100 * 30 + 29 :: 30]
                 rmse.append(np.rad2deg(np.sqrt((wrong**2).mean())))
             median = float(np.median(rmse))
@@ -241,15 +244,15 @@ def speed() -> Iterator[Line]:
     rng, n, N = np.random.default_rng(0), 3000, 30
     motion = unit(TWO)
     model = ArraySnapshot(SensorArray.symmetric([0.25]), wavelength=1.0, noise=0.1)
-    z = heard(model, directions(case, n), signals(motion, n, 40, rng), rng)
+    z = received(model, directions(case, n), signals(motion, n, 40, rng), rng)
     tracker = ARKalmanQRDRLS(model, motion, doa=np.deg2rad([-25.0, 35.0]), interval=N)
-    given = asked(tracker, z[0])
+    given = filter_arguments(tracker, z[0])
     times = {
-        "filterpy": clocked(lambda: filterpy(tracker, z[0]), n / N, 3),
-        "kalman": clocked(lambda: filtered(given), n / N, 9),
-        "run": clocked(lambda: copy.deepcopy(tracker).run(z[0]), n / N, 9),
-        "loop": clocked(lambda: stepped(copy.deepcopy(tracker), z[0]), n / N, 5),
-        "batch": clocked(lambda: tracker.run_batch(z), n / N * len(z), 3),
+        "filterpy": cpu_time(lambda: filterpy(tracker, z[0]), n / N, 3),
+        "kalman": cpu_time(lambda: filtered(given), n / N, 9),
+        "run": cpu_time(lambda: copy.deepcopy(tracker).run(z[0]), n / N, 9),
+        "loop": cpu_time(lambda: step_by_step(copy.deepcopy(tracker), z[0]), n / N, 5),
+        "batch": cpu_time(lambda: tracker.run_batch(z), n / N * len(z), 3),
     }
     ratio = times["kalman"] / times["filterpy"]
     yield (f"Kalman part {times['kalman']:.3f} ms, filterpy {times['filterpy']:.3f} ms: ratio",
@@ -259,8 +262,8 @@ def speed() -> Iterator[Line]:
     yield "run_batch of 40, ms per run", f"{times['batch']:.3f}", 0.3, times["batch"] <= 0.3
 
 
-def clocked(work: Callable[[], object], n: float, repeats: int) -> float:
-    """Return the best CPU time of a piece of work, ms for one of n."""
+def cpu_time(work: Callable[[], object], n: float, repeats: int) -> float:
+    """Return the least CPU time of `work` over the repeats, ms per n-th part."""
     best = np.inf
     for _ in range(repeats):
         started = time.process_time()
@@ -270,21 +273,21 @@ def clocked(work: Callable[[], object], n: float, repeats: int) -> float:
 
 
 def matrices(tracker: ARKalmanQRDRLS) -> tuple[Float, ...]:
-    motion = tracker.motion
-    places = blocks(motion.orders, lag_by_lag=True)
+    layout, motion = tracker.layout, tracker.motion
+    Q = layout.process_noise(np.array(motion.noise))
     A = tracker.manifold.real_steering(tracker.estimate.doa).T
-    return places.transition(motion.padded), places.drive(np.array(motion.noise)), A
+    return layout.transition(motion.coefficient_matrix), Q, A
 
 
-def asked(tracker: ARKalmanQRDRLS, z: Complex) -> list[Any]:
-    """Return what the tracker's filter is given in each interval of a run."""
+def filter_arguments(tracker: ARKalmanQRDRLS, z: Complex) -> list[Any]:
+    """Return the arguments of the steady filter in each interval of a run."""
     given: list[Any] = []
 
-    def noted(*arguments: Any) -> tuple[Float, Float]:
+    def recorder(*arguments: Any) -> tuple[Float, Float]:
         given.append(arguments)
         return steady_filter(*arguments)
 
-    with mock.patch("arrivals.trackers.autoregressive.interval_filter.steady_filter", noted):
+    with mock.patch("arrivals.trackers.autoregressive.interval_filter.steady_filter", recorder):
         copy.deepcopy(tracker).run(z)
     return given
 
@@ -310,7 +313,7 @@ def filterpy(tracker: ARKalmanQRDRLS, z: Complex) -> None:
         kf.update(row)
 
 
-def stepped(tracker: ARKalmanQRDRLS, z: Complex) -> None:
+def step_by_step(tracker: ARKalmanQRDRLS, z: Complex) -> None:
     for snapshot in z:
         tracker.predict()
         tracker.update(snapshot)
@@ -335,11 +338,10 @@ def main() -> None:
         folder = Path(os.environ["ARRIVALS_DATA"]) / "speech"
     if options.only in (None, "table"):
         show(table(options.runs))
-    if options.only in (None, "speech"):
-        if folder is not None:
-            show(speech(folder))
-        elif options.only:
-            parser.error("give --speech DIR, or set ARRIVALS_DATA")
+    if options.only == "speech" and folder is None:
+        parser.error("give --speech DIR, or set ARRIVALS_DATA")
+    if options.only in (None, "speech") and folder is not None:
+        show(speech(folder))
     if options.only in (None, "speed"):
         show(speed())
 

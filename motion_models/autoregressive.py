@@ -1,4 +1,4 @@
-"""Sources whose samples are autoregressive."""
+"""Autoregressive models of the samples of several sources."""
 
 from __future__ import annotations
 
@@ -10,27 +10,32 @@ from numpy.typing import ArrayLike
 
 from arrivals.motion_models.base import LinearMotionModel
 from arrivals.motion_models.combined import block_diagonal
-from arrivals.motion_models.companion_form import CompanionLayout, blocks, radius, stationary
+from arrivals.motion_models.companion_form import (
+    CompanionLayout,
+    companion_layout,
+    pole_radius,
+    solve_lyapunov,
+)
 from arrivals.typing import Complex, Float
 from arrivals.validation import positive, real, state
 
 
 @dataclass(frozen=True)
 class AutoregressiveSources(LinearMotionModel):
-    """Samples of sources, each a weighted sum of its last ones plus white noise.
+    """Autoregressive sources: each sample is a weighted sum of earlier ones plus white noise.
 
     s_k(j) = Σ_i a_ki s_k(j-i) + v_k(j). The state of source k is [s_k(j), ..., s_k(j-p_k)]: one
-    lag more than the order, so that a filter's covariance holds those between a sample and all
-    that it depends on.
+    lag more than the order, so that the covariance of a filter contains those between a sample
+    and all samples that it depends on.
 
     Parameters
     ----------
     coefficients : sequence of sequences of float
-        a_k of each source, which may differ in order.
+        a_k of each source; orders may differ.
     noise : float or sequence of float
-        q_k, variance of v_k; that of both parts together where sources are complex.
+        q_k, innovation variance: the variance of v_k, of both parts together for complex sources.
     real_valued : bool
-        Whether the sources are real (speech) rather than complex with independent parts.
+        True for real sources (speech), False for complex ones with independent parts.
 
     Raises
     ------
@@ -39,7 +44,7 @@ class AutoregressiveSources(LinearMotionModel):
 
     Notes
     -----
-    Shapes: states (..., dim_x), real: source after source for real ones, [Re; Im] of that for
+    Shapes: states (..., dim_x), real: source by source for real sources, [Re; Im] of that for
     complex ones. `complex_state` and `signals` give the complex view. Steps are one sample long.
 
     References
@@ -73,17 +78,17 @@ class AutoregressiveSources(LinearMotionModel):
             )
         for k, row in enumerate(rows):
             if not np.isfinite(row).all():
-                raise ValueError(f"coefficients must be finite; source {k} has {list(row)}")
-            largest = float(radius(np.array(row)))
+                raise ValueError(f"coefficients of source {k} must be finite; got {list(row)}")
+            largest = float(pole_radius(np.array(row)))
             if not largest < 1:
                 raise ValueError(
-                    f"the coefficients of source {k}, {list(row)}, are unstable: a pole at the "
-                    f"radius {largest:.6g}, which must be below 1"
+                    f"coefficients of source {k} must be stable, all poles inside the unit "
+                    f"circle; got {list(row)}, unstable with a pole at the radius {largest:.6g}"
                 )
         given = self.noise
         noise = [float(q) for q in given] if np.ndim(given) else [given] * len(rows)  # type: ignore[union-attr]
         if len(noise) != len(rows):
-            raise ValueError(f"noise must be one number or {len(rows)}, one a source; got {given}")
+            raise ValueError(f"noise must be 1 or {len(rows)} numbers, one a source; got {given}")
         object.__setattr__(self, "coefficients", rows)
         object.__setattr__(self, "noise", tuple(positive("noise", q) for q in noise))
         object.__setattr__(self, "real_valued", bool(self.real_valued))
@@ -99,25 +104,25 @@ class AutoregressiveSources(LinearMotionModel):
         return len(self.coefficients)
 
     @property
-    def blocks(self) -> CompanionLayout:
-        """Where the lags of the sources stand in the state of real sources."""
-        return blocks(self.orders)
+    def layout(self) -> CompanionLayout:
+        """Indices of the lags in the state of real sources."""
+        return companion_layout(self.orders)
 
     @property
     def n_parts(self) -> int:
-        """1 for real sources; 2, real and imaginary part, for complex ones."""
+        """Number of real parts of a sample: 1 for real sources, 2 for complex ones."""
         return 1 if self.real_valued else 2
 
     @property
     def dim_x(self) -> int:
-        """Lags of all sources, twice for complex ones."""
-        return self.n_parts * self.blocks.dim
+        """Number of lags of all sources, twice that for complex ones."""
+        return self.n_parts * self.layout.dim
 
     @property
     def state_names(self) -> tuple[str, ...]:
         """source_0_lag_0, ...; with _re and _im of complex sources."""
-        names = [""] * self.blocks.dim
-        for k, (order, lags) in enumerate(zip(self.orders, self.blocks.lags, strict=True)):
+        names = [""] * self.layout.dim
+        for k, (order, lags) in enumerate(zip(self.orders, self.layout.lags, strict=True)):
             for i in range(order + 1):
                 names[lags[i]] = f"source_{k}_lag_{i}"
         if self.real_valued:
@@ -125,8 +130,8 @@ class AutoregressiveSources(LinearMotionModel):
         return tuple(f"{name}_{part}" for part in ("re", "im") for name in names)
 
     @property
-    def padded(self) -> Float:
-        """The coefficients as (n_sources, largest order), zero where a source has fewer."""
+    def coefficient_matrix(self) -> Float:
+        """Coefficients, (n_sources, largest order), zero beyond the order of a source."""
         table = np.zeros((self.n_sources, max(self.orders)))
         for row, own in zip(table, self.coefficients, strict=True):
             row[: len(own)] = own
@@ -134,31 +139,31 @@ class AutoregressiveSources(LinearMotionModel):
 
     @property
     def power(self) -> Float:
-        """Variance of each source, (n_sources,), once it is stationary."""
+        """Stationary variance of each source, (n_sources,)."""
         P = self.stationary_covariance()
-        n = self.blocks.dim
-        return np.asarray(self.n_parts * P[:n, :n].diagonal()[self.blocks.first])
+        n = self.layout.dim
+        return np.asarray(self.n_parts * P[:n, :n].diagonal()[self.layout.first])
 
     def F(self, x: ArrayLike | None = None, dt: float = 1.0) -> Float:
-        """Return the block companion matrix, (dim_x, dim_x), whatever the state."""
+        """Return the block companion matrix, (dim_x, dim_x), the same for every state."""
         _one_sample(dt)
-        return self._each_part(self.blocks.transition(self.padded))
+        return self._each_part(self.layout.transition(self.coefficient_matrix))
 
     def Q(self, dt: float = 1.0) -> Float:
-        """Return q_k at the current samples; half of it in each part of complex sources."""
+        """Return the process noise: q_k at the current samples, half in each complex part."""
         _one_sample(dt)
-        return self._each_part(self.blocks.drive(np.array(self.noise)) / self.n_parts)
+        return self._each_part(self.layout.process_noise(np.array(self.noise)) / self.n_parts)
 
     def stationary_covariance(self) -> Float:
-        """Return the covariance of the state after a long time, (dim_x, dim_x)."""
-        return stationary(self.F(), self.Q())
+        """Return the stationary covariance of the state, (dim_x, dim_x)."""
+        return solve_lyapunov(self.F(), self.Q())
 
     def complex_state(self, x: ArrayLike) -> Complex:
-        """Return states (..., dim_x) as complex ones, (..., dim_x / 2); of real sources, as is."""
+        """Return states (..., dim_x) as complex ones: (..., dim_x / 2), or (..., dim_x) if real."""
         x = state(x, self.dim_x)
         if self.real_valued:
             return x.astype(np.complex128)
-        n = self.blocks.dim
+        n = self.layout.dim
         return np.asarray(x[..., :n] + 1j * x[..., n:])
 
     def signals(self, x: ArrayLike) -> Complex:
@@ -169,10 +174,10 @@ class AutoregressiveSources(LinearMotionModel):
         >>> AutoregressiveSources([[0.9], [0.5]]).signals([1.0, 0, 2.0, 0, 0.5, 0, -1.0, 0])
         array([1.+0.5j, 2.-1.j ])
         """
-        return np.asarray(self.complex_state(x)[..., self.blocks.first])
+        return np.asarray(self.complex_state(x)[..., self.layout.first])
 
     def scaled(self, power: ArrayLike) -> AutoregressiveSources:
-        """Return the same spectra with other powers, one for all sources or (n_sources,).
+        """Return sources of the same spectra with other powers, a number or (n_sources,).
 
         Examples
         --------
@@ -188,4 +193,4 @@ class AutoregressiveSources(LinearMotionModel):
 
 def _one_sample(dt: float) -> None:
     if dt != 1:
-        raise ValueError(f"autoregressive sources move by whole samples, dt=1; got dt={dt}")
+        raise ValueError(f"dt must be 1, one sample, for autoregressive sources; got {dt}")

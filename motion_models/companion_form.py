@@ -1,4 +1,4 @@
-"""Autoregressive sources side by side: where their lags stand in one state, and its matrices."""
+"""State layout and block companion matrices of several autoregressive sources."""
 
 from __future__ import annotations
 
@@ -12,65 +12,65 @@ from arrivals.typing import Bool, Float, Int
 
 @dataclass(frozen=True, eq=False)
 class CompanionLayout:
-    """Places in a state in which source k has p_k + 1 lags, the current sample first.
+    """Indices of the lags in a state in which source k has p_k + 1 lags, the newest first.
 
     Attributes
     ----------
     orders : tuple of int
         p_k; P below is the largest.
     first : ndarray of int, shape (n_sources,)
-        Places of the current samples.
+        Indices of the current samples.
     lags : ndarray of int, shape (n_sources, P + 1)
-        Places of all lags; the source's last one stands in for those that it does not have.
+        Indices of all lags; the last lag of a source is repeated in place of missing ones.
     used : ndarray of bool, shape (n_sources, P)
         Which coefficients a source has.
-    columns : ndarray of int, shape (n_sources, P + 1)
-        `lags` with the current sample last: what a regression predicts from what.
+    regression_columns : ndarray of int, shape (n_sources, P + 1)
+        `lags` with the current sample last: the regressors, then the target, of an AR regression.
     shift : ndarray, shape (dim, dim)
-        What moves every lag on by one.
-    order, back : ndarray of int, shape (dim,)
-        Number, source by source, of the lag at each place; and the place of each number.
+        Matrix that moves every lag on by one.
+    permutation, inverse_permutation : ndarray of int, shape (dim,)
+        Source-by-source index of each entry of the state, and the index of each such entry.
     """
 
     orders: tuple[int, ...]
     first: Int
     lags: Int
     used: Bool
-    columns: Int
+    regression_columns: Int
     shift: Float
-    order: Int
-    back: Int
+    permutation: Int
+    inverse_permutation: Int
 
     @property
     def dim(self) -> int:
-        """Entries of the state."""
+        """Number of entries of the state."""
         return len(self.shift)
 
     def transition(self, coefficients: Float) -> Float:
-        """Return F of coefficients a (..., n_sources, P): block companion, (..., dim, dim)."""
+        """Return the block companion matrix F, (..., dim, dim), of a (..., n_sources, P)."""
         F = np.zeros((*coefficients.shape[:-2], self.dim, self.dim))
         F += self.shift
         source, lag = np.nonzero(self.used)
         F[..., self.first[source], self.lags[source, lag]] = coefficients[..., source, lag]
         return F
 
-    def drive(self, noise: Float) -> Float:
-        """Return Q of driving variances q (..., n_sources): q_k at the current samples."""
-        Q = np.zeros((*noise.shape[:-1], self.dim, self.dim))
-        Q[..., self.first, self.first] = noise
+    def process_noise(self, variance: Float) -> Float:
+        """Return Q of innovation variances q (..., n_sources): q_k at the current samples."""
+        Q = np.zeros((*variance.shape[:-1], self.dim, self.dim))
+        Q[..., self.first, self.first] = variance
         return Q
 
 
 @lru_cache(maxsize=256)
-def blocks(orders: tuple[int, ...], lag_by_lag: bool = False) -> CompanionLayout:
-    """Return the places for sources of the given orders, counted source by source or lag by lag.
+def companion_layout(orders: tuple[int, ...], lag_by_lag: bool = False) -> CompanionLayout:
+    """Return the layout of sources of the given orders, source by source or lag by lag.
 
     Examples
     --------
-    >>> blocks((1, 2)).lags
+    >>> companion_layout((1, 2)).lags
     array([[0, 1, 1],
            [2, 3, 4]])
-    >>> blocks((1, 2)).transition(np.array([[0.5, 0.0], [0.9, -0.2]]))
+    >>> companion_layout((1, 2)).transition(np.array([[0.5, 0.0], [0.9, -0.2]]))
     array([[ 0.5,  0. ,  0. ,  0. ,  0. ],
            [ 1. ,  0. ,  0. ,  0. ,  0. ],
            [ 0. ,  0. ,  0.9, -0.2,  0. ],
@@ -78,28 +78,30 @@ def blocks(orders: tuple[int, ...], lag_by_lag: bool = False) -> CompanionLayout
            [ 0. ,  0. ,  0. ,  1. ,  0. ]])
     """
     p = np.array(orders)[:, None]
-    source, lag = np.nonzero(np.arange(p.max() + 1) <= p)  # of the entries source by source
+    source, lag = np.nonzero(np.arange(p.max() + 1) <= p)  # of each entry, source by source
     by_lag = np.lexsort((source, lag))
-    order = by_lag if lag_by_lag else np.arange(len(source))
-    places = np.full((len(orders), int(p.max()) + 1), -1)
-    places[source[order], lag[order]] = np.arange(len(source))
-    lags = np.take_along_axis(places, np.minimum(np.arange(p.max() + 1), p), axis=1)
-    used = places[:, 1:] >= 0
+    permutation = by_lag if lag_by_lag else np.arange(len(source))
+    index = np.full((len(orders), int(p.max()) + 1), -1)
+    index[source[permutation], lag[permutation]] = np.arange(len(source))
+    lags = np.take_along_axis(index, np.minimum(np.arange(p.max() + 1), p), axis=1)
+    used = index[:, 1:] >= 0
     shift = np.zeros((len(source), len(source)))
-    shift[places[:, 1:][used], places[:, :-1][used]] = 1.0
-    columns = np.roll(lags, -1, axis=1)
-    back = np.argsort(order)
-    for array in (lags, used, columns, shift, order, back):
+    shift[index[:, 1:][used], index[:, :-1][used]] = 1.0
+    regression_columns = np.roll(lags, -1, axis=1)
+    inverse_permutation = np.argsort(permutation)
+    for array in (lags, used, regression_columns, shift, permutation, inverse_permutation):
         array.setflags(write=False)
-    return CompanionLayout(orders, lags[:, 0], lags, used, columns, shift, order, back)
+    return CompanionLayout(
+        orders, lags[:, 0], lags, used, regression_columns, shift, permutation, inverse_permutation
+    )
 
 
-def radius(coefficients: Float) -> Float:
+def pole_radius(coefficients: Float) -> Float:
     """Return the largest modulus of the poles of AR models with coefficients (..., p).
 
     Examples
     --------
-    >>> radius(np.array([[0.5, 0.0], [0.0, -0.81]])).round(6)
+    >>> pole_radius(np.array([[0.5, 0.0], [0.0, -0.81]])).round(6)
     array([0.5, 0.9])
     """
     p = coefficients.shape[-1]
@@ -118,16 +120,16 @@ def stabilised(coefficients: Float, limit: float = 0.995) -> Float:
     array([[0.995],
            [0.3  ]])
     """
-    shrink = np.minimum(limit / np.maximum(radius(coefficients), limit), 1.0)
+    shrink = np.minimum(limit / np.maximum(pole_radius(coefficients), limit), 1.0)
     return np.asarray(coefficients * shrink[..., None] ** np.arange(1, coefficients.shape[-1] + 1))
 
 
-def stationary(F: Float, Q: Float) -> Float:
+def solve_lyapunov(F: Float, Q: Float) -> Float:
     """Return P = F P Fᵀ + Q of a stable F, by doubling: half of the sum at once.
 
     Examples
     --------
-    >>> stationary(np.array([[0.5]]), np.array([[0.75]]))
+    >>> solve_lyapunov(np.array([[0.5]]), np.array([[0.75]]))
     array([[1.]])
     """
     P, power = Q, F

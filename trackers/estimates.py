@@ -99,22 +99,43 @@ class DirectionEstimate(Estimate):
 
 @dataclass(frozen=True, eq=False)
 class SourceEstimate(DirectionEstimate):
-    """Directions, and the autoregressive models of what the sources send.
+    """Directions of arrival and autoregressive models of the sources.
 
     Parameters
     ----------
+    doa : ndarray, shape (n_found,)
+        Directions of arrival, rad.
+    std : ndarray, shape (n_found,)
+        Their standard deviations, rad; NaN where the method gives none.
+    existence : ndarray, shape (n_found,)
+        Probability that the source is active; NaN where the method gives none.
+    amplitude : ndarray, shape (n_found,)
+        Latest complex sample of each source.
+    label : ndarray of int, shape (n_found,)
+        Index of the source in the motion model.
+    converged : bool
+        False if an iterative method stopped before it met its tolerance.
+    iterations : int
+        Iterations of this step; 0 for a method without.
+    noise : float
+        Estimated variance of the noise at one sensor; NaN where the method gives none.
     coefficients : ndarray, shape (n_found, largest order)
-        Zero where a source's order is less.
-    driving_noise : ndarray, shape (n_found,)
-        Variance of what drives each source.
+        AR coefficients, zero beyond the order of a source.
+    innovation_variance : ndarray, shape (n_found,)
+        Variance of the innovations of each source.
+
+    Examples
+    --------
+    >>> SourceEstimate.empty(coefficients=np.zeros((0, 2))).n_found
+    0
     """
 
     coefficients: Float = field(default_factory=lambda: np.zeros((0, 0)))
-    driving_noise: Float = field(default_factory=lambda: np.zeros(0))
+    innovation_variance: Float = field(default_factory=lambda: np.zeros(0))
 
     per_source: ClassVar[dict[str, Any]] = DirectionEstimate.per_source | {
         "coefficients": np.nan,
-        "driving_noise": np.nan,
+        "innovation_variance": np.nan,
     }
 
 

@@ -35,9 +35,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-SPEECH = {"forgetting": 0.98, "ar_forgetting": 0.99, "ridge": 5.0, "gate": 0.3,
-          "adapt_drive": False}  # fmt: skip
-PLAIN = {"correction": False}
+SPEECH = {"regression__forgetting": 0.98, "regression__ar_forgetting": 0.99,
+          "regression__ridge": 5.0, "gate": 0.3, "noise__adapt_process_noise": False}  # fmt: skip
+PLAIN = {"regression__correction": False}
 FEW = 8  # trials of the subspace methods, which go snapshot by snapshot
 
 
@@ -54,8 +54,8 @@ class Experiment(NamedTuple):
 
 def cases() -> list[Experiment]:
     """Return the report's figures, part by part."""
-    still, fast = {"forgetting": 0.95}, {"forgetting": 0.9, "interval": 3}
-    quiet = {"forgetting": 0.99}
+    still, fast = {"regression__forgetting": 0.95}, {"regression__forgetting": 0.9, "interval": 3}
+    quiet = {"regression__forgetting": 0.99}
     doubled = (0.5, 0.5)
     drawn = "converges"
     both = [
@@ -79,7 +79,7 @@ def cases() -> list[Experiment]:
     for m in (2, 3, 4):
         scene = MoreSensors(distances=tuple(0.25 * n for n in range(1, m + 1)))
         claim = "less biased, lower variance"
-        both.append(Experiment(6, f"M = {m}", scene, {"forgetting": 0.97}, 10, claim))
+        both.append(Experiment(6, f"M = {m}", scene, {"regression__forgetting": 0.97}, 10, claim))
     both.append(Experiment(7, "order 3", ThirdOrder(), still, 10, "no significant effect"))
     for snr_db in (30.0, 10.0, 5.0):
         spoken = SpeechField(snr_db=snr_db)
@@ -194,7 +194,8 @@ def run_tracker(trials: list[Trial], case: Experiment) -> list[Run]:
     truth = trials[0].truth[0]
     order = np.argsort(np.argsort(truth))
     start = truth + np.deg2rad(case.offset_deg) * np.where(order % 2, 1, -1)
-    tracker = trials[0].tracker("ar_kalman_qrd_rls", doa=start, **case.params)
+    tracker = trials[0].tracker("ar_kalman_qrd_rls", doa=start).set_params(**case.params)
+    tracker = type(tracker)(**tracker.get_params(deep=False))
     return tracker.run_batch(np.array([trial.measurements for trial in trials]))
 
 
@@ -219,7 +220,9 @@ def _ar_error(trials: list[Trial], runs: list[Run]) -> float:
     motion: Any = trials[0].motion
     if motion.real_valued:
         return float("nan")
-    return float(np.sqrt(np.mean([(r.coefficients[-1] - motion.padded) ** 2 for r in runs])))
+    return float(
+        np.sqrt(np.mean([(r.coefficients[-1] - motion.coefficient_matrix) ** 2 for r in runs]))
+    )
 
 
 def _unlabelled(trials: list[Trial], name: str, case: Experiment, scored: slice) -> float:
@@ -227,8 +230,11 @@ def _unlabelled(trials: list[Trial], name: str, case: Experiment, scored: slice)
     d = case.scene.distances
     if not np.allclose(d, d[0] * np.arange(1, len(d) + 1)):
         return float("nan")
-    params = {"n_sources": case.scene.n_sources, "forgetting": case.params["forgetting"],
-              "interval": scored.step}  # fmt: skip
+    params = {
+        "n_sources": case.scene.n_sources,
+        "forgetting": case.params["regression__forgetting"],
+        "interval": scored.step,
+    }
     errors = []
     for trial in trials:
         run = create(name, measurement=trial.measurement, **params).run(trial.measurements)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.motion_models.companion_form import radius, stationary
+from arrivals.motion_models.companion_form import pole_radius, solve_lyapunov
 from arrivals.typing import Complex, Float
 from arrivals.validation import count, real
 
@@ -90,7 +90,7 @@ def stationary_covariance(a: ArrayLike, q: float) -> Float:
     p = len(a)
     if a.ndim != 1 or p == 0 or not np.isfinite(a).all():
         raise ValueError(f"coefficients must be finite numbers a_1 ... a_p; got {a.tolist()}")
-    largest = float(radius(a))
+    largest = float(pole_radius(a))
     if largest >= 1:
         raise ValueError(
             f"an AR process needs roots inside the unit circle; {a.tolist()} has one of modulus "
@@ -98,7 +98,7 @@ def stationary_covariance(a: ArrayLike, q: float) -> Float:
         )
     F, Q = np.eye(p, k=-1), np.zeros((p, p))
     F[0], Q[0, 0] = a, q
-    return stationary(F, Q)
+    return solve_lyapunov(F, Q)
 
 
 def _real_signal(

@@ -18,7 +18,7 @@ from arrivals.motion_models import (
     select_order,
     yule_walker,
 )
-from arrivals.motion_models.companion_form import blocks, radius, stabilised
+from arrivals.motion_models.companion_form import companion_layout, pole_radius, stabilised
 from arrivals.typing import Float
 
 RAGGED = AutoregressiveSources([[0.7, -0.4, 0.2], [0.9], [0.3, 0.3]], [0.5, 1.0, 2.0])
@@ -36,14 +36,14 @@ def ar(coefficients: list[float], n: int, seed: int = 0) -> Float:
 def test_each_source_follows_its_own_recursion(model: AutoregressiveSources) -> None:
     x = np.random.default_rng(1).standard_normal((4, 5, model.dim_x))
     s, new = model.complex_state(x), model.complex_state(model.f(x))
-    for k, first in enumerate(model.blocks.first):
+    for k, first in enumerate(model.layout.first):
         a = model.coefficients[k]
         expected = sum(a[i] * s[..., first + i] for i in range(len(a)))
         np.testing.assert_allclose(new[..., first], expected, atol=1e-14)
         np.testing.assert_array_equal(
             new[..., first + 1 : first + 1 + len(a)], s[..., first : first + len(a)]
         )
-    np.testing.assert_array_equal(model.signals(x), s[..., model.blocks.first])
+    np.testing.assert_array_equal(model.signals(x), s[..., model.layout.first])
     np.testing.assert_allclose(model.f(x), x @ model.F().T, atol=1e-14)
 
 
@@ -74,12 +74,12 @@ def test_it_is_a_motion_of_filterpys_filter() -> None:
 
 
 def test_lags_counted_in_either_order_are_the_same_state() -> None:
-    one, other = blocks(RAGGED.orders), blocks(RAGGED.orders, lag_by_lag=True)
-    F = one.transition(RAGGED.padded)
-    G = other.transition(RAGGED.padded)
-    np.testing.assert_array_equal(G, F[np.ix_(other.order, other.order)])
+    one, other = companion_layout(RAGGED.orders), companion_layout(RAGGED.orders, lag_by_lag=True)
+    F = one.transition(RAGGED.coefficient_matrix)
+    G = other.transition(RAGGED.coefficient_matrix)
+    np.testing.assert_array_equal(G, F[np.ix_(other.permutation, other.permutation)])
     np.testing.assert_array_equal(other.first, range(3))
-    np.testing.assert_array_equal(other.order[other.back], range(one.dim))
+    np.testing.assert_array_equal(other.permutation[other.inverse_permutation], range(one.dim))
 
 
 @given(st.lists(st.floats(-2, 2), min_size=1, max_size=5))
@@ -87,8 +87,8 @@ def test_stabilised_models_are_stable_and_stable_ones_stay(a: list[float]) -> No
     coefficients = np.array(a)
     found = stabilised(coefficients)
     # the poles of nearly degenerate companions carry eps^(1/p) of rounding
-    assert radius(found) <= 0.995 + 2e-3
-    if radius(coefficients) < 0.995:
+    assert pole_radius(found) <= 0.995 + 2e-3
+    if pole_radius(coefficients) < 0.995:
         np.testing.assert_array_equal(found, coefficients)
 
 
@@ -107,17 +107,21 @@ WRONG: list[tuple[Callable[[], object], type[Exception], str]] = [
     (
         lambda: AutoregressiveSources([[0.5], [1.2]]),
         ValueError,
-        r"source 1, \[1.2\], are unstable.*1.2, which must be below 1",
+        r"of source 1 must be stable.*got \[1.2\], unstable with a pole at the radius 1.2",
     ),
-    (lambda: AutoregressiveSources([[np.nan]]), ValueError, "must be finite; source 0"),
+    (lambda: AutoregressiveSources([[np.nan]]), ValueError, "of source 0 must be finite"),
     (
         lambda: AutoregressiveSources([[0.5j]]),  # type: ignore[list-item]
         TypeError,
         "real numbers",
     ),
     (lambda: AutoregressiveSources([[0.5]], 0.0), ValueError, "noise must be finite and positive"),
-    (lambda: AutoregressiveSources([[0.5]], [1.0, 1.0]), ValueError, "noise must be one number"),
-    (lambda: RAGGED.F(dt=0.5), ValueError, "whole samples, dt=1; got dt=0.5"),
+    (
+        lambda: AutoregressiveSources([[0.5]], [1.0, 1.0]),
+        ValueError,
+        "noise must be 1 or 1 numbers",
+    ),
+    (lambda: RAGGED.F(dt=0.5), ValueError, "dt must be 1, one sample, for .* sources; got 0.5"),
     (lambda: RAGGED.f([1.0]), ValueError, r"shape \(\.\.\., 18\)"),
     (lambda: yule_walker([1.0, 2.0], 2), ValueError, "2 lags need more than 2 samples"),
     (lambda: yule_walker(np.ones(9), 2), ValueError, "must vary"),

@@ -1,95 +1,70 @@
-"""Directions and signals of autoregressive sources: Kalman filter and regularised QRD-RLS."""
+"""Directions and signals of autoregressive sources: Kalman filter and regularized QRD-RLS."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache
-from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
-from arrivals.measurement_models.manifolds.symmetric_line import ArrayManifold
 from arrivals.motion_models.autoregressive import AutoregressiveSources
-from arrivals.trackers.autoregressive.belief import (
-    Settings,
-    SourceBelief,
-    covariance_outside,
-    inside,
-    measured,
-    outside,
-    repeated,
-)
-from arrivals.trackers.autoregressive.history import History, closes
-from arrivals.trackers.autoregressive.processing import (
-    NOTHING,
-    BlockProcessor,
-    frame,
-    frames,
-    wanted,
-)
-from arrivals.trackers.base import Tracker
+from arrivals.trackers.autoregressive.belief import SourceBelief
+from arrivals.trackers.autoregressive.initialization import check_directions, manifold_of
+from arrivals.trackers.autoregressive.interval import finish_interval
+from arrivals.trackers.autoregressive.interval_filter import assumed_noise, filter_interval
+from arrivals.trackers.autoregressive.processing import BlockProcessor
+from arrivals.trackers.autoregressive.regressions import estimate_ar_models, estimate_directions
+from arrivals.trackers.autoregressive.settings import NoiseSettings, RegressionSettings
+from arrivals.trackers.autoregressive.snapshots import completes_interval, to_snapshot
+from arrivals.trackers.autoregressive.steady_state import StateSpace
 from arrivals.trackers.estimates import SourceEstimate
+from arrivals.trackers.gaussian.linalg import transposed
 from arrivals.trackers.registry import register
-from arrivals.trackers.run import Run
-from arrivals.typing import Complex, Float
-from arrivals.validation import count, covariance, instance, not_negative, positive, real, shaped
-
-SEPARATE = 1e-6  # rad
+from arrivals.typing import Float
+from arrivals.validation import count, instance, not_negative, positive
 
 
 @register("ar_kalman_qrd_rls")
-class ARKalmanQRDRLS(Tracker):
-    """Directions of autoregressive sources, and what each of them sends.
+class ARKalmanQRDRLS(BlockProcessor):
+    """Directions of autoregressive sources, and their signals.
 
-    In each interval of snapshots: a Kalman filter estimates the sources' samples with the present
-    directions and AR models; a regression of the snapshots on them gives new directions; one of
-    the samples on their past, new AR models. There may be more sources than sensors.
+    In each interval of snapshots, a Kalman filter estimates the samples of the sources with the
+    present directions and AR models; a regression of the snapshots on them gives new directions,
+    and one of the samples on earlier samples new AR models. There may be more sources than sensors.
 
     Parameters
     ----------
     measurement : ArraySnapshot
-        A line, symmetric about a centre sensor; its noise is where the estimate of it starts.
+        A line, symmetric about a centre sensor; its noise is the initial estimate.
     motion : AutoregressiveSources
-        Where the estimates of the AR models start; its powers, those that the sources are
-        expected to have over a long time, should be right within 10 dB. Real-valued sources are
-        heard with half of the noise.
+        Initial AR models; their powers, the expected long-term powers of the sources, should be
+        right within 10 dB. Real-valued sources are received with half of the noise.
     doa : sequence of float, optional
-        Directions to start from, one a source, rad: nearer to their own source than to the next.
-        If None, the likeliest places on a grid for the first 60 snapshots or so that are not
-        silent by the gate; all placings are tried: 210 of two sources, 2730 of three and 32760
-        of four that differ.
+        Initial directions, one a source, rad: nearer to their own source than to the next. If
+        None, the maximum-likelihood directions on a grid for the first 60 snapshots or so with
+        power above the gate; all placements are tried: 210 of two sources, 2730 of three and
+        32760 of four with different models.
     interval : int
-        Snapshots N of an interval.
-    forgetting, ar_forgetting : float
-        λ and λ_a, per snapshot, of directions and AR models.
-    ridge, ar_ridge : float
-        μ and μ_a, which draw to the present values; in snapshots at a source's long-term power.
-    gate : float
-        γ: a source below this part of its long-term power is silent, and its direction stays.
+        N, snapshots of an interval.
     inner : int
-        How often an interval is gone through.
-    correction : bool
-        Whether the covariance of the estimated samples enters the regressions. Without it, the
-        plain regression of the report, directions are biased where there is noise.
-    adapt_drive, adapt_noise : bool
-        Whether to estimate the driving and the measurement noise. A driving noise that is not
-        estimated keeps its relation to the source's long-term power, as is right for speech.
-    r_start, tau : float
-        Noise at the start in terms of the sources' mean power, and in how many intervals it falls
-        by e, where acquisition needs it: many sources, or little noise. 0: none.
+        Iterations of each interval.
+    gate : float
+        γ: a source below this fraction of its long-term power is inactive and keeps its direction.
     memory : float
-        Intervals that a source's long-term power is the mean of, pauses included.
+        Intervals over which the long-term power of a source is averaged, pauses included.
+    regression : RegressionSettings
+        Forgetting, ridge and covariance correction of the two regressions.
+    noise : NoiseSettings
+        Estimation of the innovation variances and of the measurement noise.
 
     Attributes
     ----------
     x, P : ndarray, shape (dim_x,), (dim_x, dim_x)
-        Mean and covariance of the sources' samples, as `motion` arranges them.
+        Mean and covariance of the samples of the sources, as `motion` arranges them.
     signals : ndarray of complex, shape (interval, n_sources)
-        The sources' samples in the last interval; in a `Run`, of all steps.
+        Samples of the sources in the last interval; in a `Run`, of all steps.
 
     Raises
     ------
@@ -99,19 +74,20 @@ class ARKalmanQRDRLS(Tracker):
 
     Notes
     -----
-    A measurement is a complex snapshot, (n_sensors,), NaN where a sensor gave none, and None for
-    one that is missing. The belief moves at the end of an interval; if the last snapshot of it is
-    missing, at the next `predict`. `dt` is the time between snapshots, in any unit.
+    A measurement is a complex snapshot, (n_sensors,), NaN where a sensor has no data, and None if
+    all of it is missing. The belief changes at the end of an interval; if the last snapshot of it
+    is missing, at the next `predict`. `dt` is the time between snapshots, in any unit.
 
-    Labels are the sources' numbers in `motion`. `std` is NaN. `existence` is 1 for a source that
-    sounded in the last interval and 0 for a silent one, where there is a gate, else NaN.
+    Labels are the indices of the sources in `motion`. `std` is NaN. `existence` is 1 for a source
+    active in the last interval and 0 for an inactive one if there is a gate, else NaN.
 
     A pair of sensors one of which is missing is left out of that snapshot.
 
     References
     ----------
-    Gu, Chan, Zhu and Swamy, IEEE TCAS-II 60(1), 46-50, 2013. The covariance rows, the targets of
-    the regularisation, the gate and the noise estimates: ours.
+    Gu, Chan, Zhu and Swamy, IEEE TCAS-II 60(1), 46-50, 2013; equation numbers are those of
+    Magakian's report on it. The covariance rows, the targets of the regularization, the gate and
+    the noise estimates: ours.
 
     Examples
     --------
@@ -138,230 +114,134 @@ class ARKalmanQRDRLS(Tracker):
         *,
         doa: Sequence[float] | Float | None = None,
         interval: int = 30,
-        forgetting: float = 0.98,
-        ar_forgetting: float = 0.998,
-        ridge: float = 0.01,
-        ar_ridge: float = 0.01,
-        gate: float = 0.0,
         inner: int = 1,
-        correction: bool = True,
-        adapt_drive: bool = True,
-        adapt_noise: bool = True,
-        r_start: float = 0.0,
-        tau: float = 25.0,
+        gate: float = 0.0,
         memory: float = 1000.0,
+        regression: RegressionSettings = RegressionSettings(),  # noqa: B008
+        noise: NoiseSettings = NoiseSettings(),  # noqa: B008
     ) -> None:
         self.measurement = instance("measurement", measurement, ArraySnapshot)
         self.motion = instance("motion", motion, AutoregressiveSources)
         self.doa, self.interval = doa, count("interval", interval)
-        self.forgetting, self.ar_forgetting = forgetting, ar_forgetting
-        self.ridge, self.ar_ridge = positive("ridge", ridge), positive("ar_ridge", ar_ridge)
-        self.gate, self.inner = not_negative("gate", gate), count("inner", inner)
-        self.correction, self.adapt_drive, self.adapt_noise = correction, adapt_drive, adapt_noise
-        self.r_start, self.tau = not_negative("r_start", r_start), positive("tau", tau)
+        self.inner, self.gate = count("inner", inner), not_negative("gate", gate)
         self.memory = positive("memory", memory)
-        _manifold(measurement)  # refuses an array that does not fit
-        for name in ("forgetting", "ar_forgetting"):
-            if not 0 < positive(name, getattr(self, name)) < 1:
-                raise ValueError(f"{name} must lie in (0, 1); got {getattr(self, name)}")
+        self.regression = instance("regression", regression, RegressionSettings)
+        self.noise = instance("noise", noise, NoiseSettings)
+        manifold_of(measurement)  # raises for an array that does not fit
         if max(self.motion.orders) > self.interval:
             raise ValueError(
                 f"an AR order must not be longer than the interval, {self.interval} snapshots; "
                 f"got {max(self.motion.orders)}"
             )
         if doa is not None:
-            _check_directions(doa, self.motion.n_sources)
+            check_directions(doa, self.motion.n_sources)
         self.restart()
 
-    def restart(self) -> None:
-        """Forget what was heard, and start again from `doa` and the models."""
-        shape = (1, 0, self.measurement.array.n_sensors)
-        self.x, self.P = np.zeros(self.motion.dim_x), self.motion.stationary_covariance()
-        self._known_x, self._known_P = self.x, self.P
-        self._sources = None if self.doa is None else self._program.begun(np.zeros(shape))
-        most = wanted(self._sources, self.interval)
-        self.frames = np.full((most, shape[-1]), NOTHING)
-        self.n_pending = 0
-        self.signals = np.full((self.interval, self.motion.n_sources), NOTHING)
-
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
-        """Close an interval whose last snapshot was missing; the sources move within intervals."""
+        """Process an interval whose last snapshot is missing; sources move within intervals.
+
+        Parameters
+        ----------
+        u : None or 0
+            Not used: there is no control.
+        dt : float
+            Time between snapshots.
+        """
         if dt != 1.0:
             positive("dt", dt)
-        self._close_if_full()
+        self.process_if_full()
 
     def update(self, z: ArrayLike | None) -> None:
-        """Take one snapshot, (n_sensors,), complex; with the last of an interval, work it off."""
-        new = frame(z, self.measurement.array.n_sensors)
-        self._close_if_full()
-        self.frames = np.concatenate([self.frames[1:], new[None]])
-        self.n_pending += 1
-        if self._full() and closes(new):
-            self._moved(self._pending())
+        """Add one snapshot; the last of an interval updates the belief by Algorithm 1.
+
+        Parameters
+        ----------
+        z : array_like of complex, shape (n_sensors,)
+            NaN where a sensor has no data, None if all of it is missing.
+        """
+        snapshot = to_snapshot(z, self.measurement.array.n_sensors)
+        self.process_if_full()
+        self.append(snapshot)
+        if completes_interval(snapshot):
+            self.process_if_full()
+
+    def update_interval(self, belief: SourceBelief, y: Float) -> tuple[SourceBelief, Float]:
+        """Return the belief after an interval, and the states: Algorithm 1 of the report.
+
+        Parameters
+        ----------
+        belief : SourceBelief
+            Before the interval, with leading batch axes.
+        y : ndarray, shape (..., interval * n_parts, n_sensors)
+            Transformed snapshots (5), real; NaN where missing.
+
+        Returns
+        -------
+        belief : SourceBelief
+        X : ndarray, shape (..., interval * n_parts, n)
+        """
+        new, regression = belief, self.regression
+        for _ in range(self.inner):
+            # line 8: X(j) = F X(j-1) + V(j), y = A_T Γ X(j) + e(j)   (3), (5)
+            model = self.state_space(belief, new)
+            filtered = filter_interval(belief, y, model, regression)
+            # lines 11-15: rows of A_T by least squares, then directions   (6), (7)
+            rows, doa = estimate_directions(belief, filtered, model.A, self.manifold, regression)
+            # line 10: AR coefficients and innovation variances   (1)
+            factor, weight, a, q = estimate_ar_models(
+                belief, new, filtered, self.layout, regression
+            )
+            q = q if self.noise.adapt_process_noise else new.q
+            new = replace(
+                new, doa=doa, a=a, q=q, manifold_factor=rows, ar_factor=factor, ar_weight=weight
+            )
+        # inactive sources keep their directions; r and long-term powers
+        new = finish_interval(belief, new, filtered, self.noise, self.gate, self.memory)
+        return new, filtered.X
+
+    def state_space(self, belief: SourceBelief, new: SourceBelief) -> StateSpace:
+        """Return F, Q (3) and A_T (5) of `new`, and r of `belief`."""
+        F, Q = self.layout.transition(new.a), self.layout.process_noise(new.q)
+        A = transposed(self.manifold.real_steering(new.doa))
+        return StateSpace(F, Q, A, assumed_noise(belief, self.noise))
+
+    def filter_states(self, belief: SourceBelief, y: Float) -> Float:
+        """Return the states in transformed snapshots under the models of `belief`."""
+        return filter_interval(belief, y, self.state_space(belief, belief), self.regression).X
 
     @property
     def estimate(self) -> SourceEstimate:
-        """Directions, AR models and the latest samples of the sources, as of the last interval."""
-        s, n, p = self._sources, self.motion.n_sources, max(self.motion.orders)
-        if s is None:
+        """Directions, AR models and latest samples of the sources, as of the last interval."""
+        b, n, p = self.belief, self.motion.n_sources, max(self.motion.orders)
+        if b is None:
             return SourceEstimate.empty(coefficients=np.zeros((0, p)))
         return SourceEstimate(
-            doa=s.doa[0],
+            doa=b.doa[0],
             std=np.full(n, np.nan),
-            existence=s.active[0].astype(float) if self.gate > 0 else np.full(n, np.nan),
+            existence=b.active[0].astype(float) if self.gate > 0 else np.full(n, np.nan),
             amplitude=self.motion.signals(self.x),
             label=np.arange(n),
-            noise=float(s.r[0]),
-            coefficients=s.a[0],
-            driving_noise=s.q[0],
+            noise=float(b.r[0]),
+            coefficients=b.a[0],
+            innovation_variance=b.q[0],
         )
 
     @property
     def coefficients(self) -> Float:
-        """AR coefficients, (n_sources, largest order), zero where a source's order is less."""
-        return self.motion.padded if self._sources is None else self._sources.a[0]
+        """AR coefficients, (n_sources, largest order), zero beyond the order of a source."""
+        return self.motion.coefficient_matrix if self.belief is None else self.belief.a[0]
 
     @property
-    def driving_noise(self) -> Float:
-        """Variances of what drives the sources, (n_sources,)."""
-        return np.array(self.motion.noise) if self._sources is None else self._sources.q[0]
+    def innovation_variance(self) -> Float:
+        """Variances of the innovations of the sources, (n_sources,)."""
+        return np.array(self.motion.noise) if self.belief is None else self.belief.q[0]
 
     @property
-    def noise(self) -> float:
+    def noise_variance(self) -> float:
         """Variance of the noise of one sensor."""
-        return self.measurement.noise if self._sources is None else float(self._sources.r[0])
+        return self.measurement.noise if self.belief is None else float(self.belief.r[0])
 
     @property
     def power(self) -> Float:
         """Long-term powers of the sources, (n_sources,)."""
-        return self.motion.power if self._sources is None else self._sources.power[0]
-
-    def run(self, measurements: Iterable[ArrayLike | None], dt: float = 1.0) -> Run:
-        """Take snapshots, (n_steps, n_sensors), from the present state, interval by interval.
-
-        Numbers are those of `predict` and `update` for each snapshot. `run.signals` (n_steps,
-        n_sources) are the sources' samples; those after the last full interval are provisional:
-        they belong to the present directions and models.
-        """
-        positive("dt", dt)
-        started = time.perf_counter()
-        z = np.concatenate(
-            [self._pending(), frames(measurements, self.measurement.array.n_sensors)]
-        )
-        history = self._moved(z, open_end=True)
-        history.signals.append(self._program.provisional(self._sources, self._pending()[None]))
-        return history.run(0, dt, time.perf_counter() - started)
-
-    def run_batch(
-        self, measurements: Iterable[Iterable[ArrayLike | None]], dt: float = 1.0
-    ) -> list[Run]:
-        """Run independent sequences at once, as one array program over the leading axis.
-
-        The tracker itself stays as it is.
-
-        Parameters
-        ----------
-        measurements : array_like, shape (n_sequences, n_steps, n_sensors)
-            Sequences of different lengths are run one by one; so are those of which one holds
-            nothing to find the first directions in.
-        dt : float
-            Time between snapshots.
-        """
-        positive("dt", dt)
-        sequences = [frames(each, self.measurement.array.n_sensors) for each in measurements]
-        if len({len(z) for z in sequences}) != 1:
-            return super().run_batch(sequences, dt)
-        started = time.perf_counter()
-        z = np.array([np.concatenate([self._pending(), sequence]) for sequence in sequences])
-        program, s = self._program, self._now()
-        first = measured(z[:, : len(self.frames)], self.manifold, self.motion.n_parts)
-        if s is None and program.telling(first) is None:
-            return super().run_batch(sequences, dt)
-        s = None if s is None else repeated(s, len(z))
-        s, done, history = program.history(s, z, self.n_pending)
-        history.signals.append(program.provisional(s, z[:, done:]))
-        elapsed = (time.perf_counter() - started) / len(z)
-        return [history.run(n, dt, elapsed) for n in range(len(z))]
-
-    def set_params(self, **params: Any) -> Self:
-        """Change parameters by name; keep the belief where it still fits, else start again."""
-        before = self._layout()
-        super().set_params(**params)
-        if self._layout() != before:
-            self.restart()
-        return self
-
-    # -- snapshots ---------------------------------------------------------------------------------
-
-    def _pending(self) -> Complex:
-        return self.frames[len(self.frames) - self.n_pending :]
-
-    def _layout(self) -> tuple[Any, ...]:
-        """Return what the shapes of the belief depend on."""
-        motion = self.motion
-        return motion.orders, motion.real_valued, self.measurement.array.n_sensors, self.interval
-
-    # -- intervals ---------------------------------------------------------------------------------
-
-    def _full(self) -> bool:
-        return self.n_pending == wanted(self._sources, self.interval)
-
-    def _close_if_full(self) -> None:
-        if self._full():
-            self._moved(self._pending())
-
-    def _moved(self, z: Complex, open_end: bool = False) -> History:
-        """Work off snapshots, (n_snapshots, n_sensors), pending ones in front; keep the rest."""
-        s, done, history = self._program.history(self._now(), z[None], self.n_pending, open_end)
-        if s is not None and history.moved:
-            self._sources = s
-            self.x = outside(s.x[0], self.motion)
-            self.P = covariance_outside(s.P[0], self.motion)
-            self._known_x, self._known_P = self.x, self.P
-            self.signals = history.signals[-1][0]
-        self.n_pending = len(z) - done
-        gone = len(self.frames) - self.n_pending
-        self.frames = np.concatenate([np.full((gone, z.shape[1]), NOTHING), z[done:]])
-        return history
-
-    def _now(self) -> SourceBelief | None:
-        """Return the present belief, with `x` and `P` if they were assigned."""
-        if self._sources is None or (self.x is self._known_x and self.P is self._known_P):
-            return self._sources
-        n = self.motion.dim_x
-        x, P = inside(shaped("x", self.x, n), covariance("P", self.P, n), self.motion)
-        return replace(self._sources, x=x[None], P=P[None])
-
-    @property
-    def manifold(self) -> ArrayManifold:
-        """The real response of the array."""
-        return _manifold(self.measurement)
-
-    @property
-    def _program(self) -> BlockProcessor:
-        doa = None if self.doa is None else real("doa", self.doa)
-        options = Settings(
-            self.forgetting, self.ar_forgetting, self.ridge, self.ar_ridge, self.gate, self.inner,
-            self.correction, self.adapt_drive, self.adapt_noise, self.r_start, self.tau,
-            self.memory,
-        )  # fmt: skip
-        return BlockProcessor(
-            self.motion, self.manifold, self.interval, doa, options, self.x, self.P
-        )
-
-
-@lru_cache(maxsize=64)
-def _manifold(model: ArraySnapshot) -> ArrayManifold:
-    return ArrayManifold(model.array, model.plain_wavelength("ar_kalman_qrd_rls"), model.noise)
-
-
-def _check_directions(doa: ArrayLike, n_sources: int) -> None:
-    values = shaped("doa", doa, n_sources)
-    if not (np.abs(values) <= np.pi / 2).all():
-        raise ValueError(f"doa must lie within ±π/2 rad; got {values.tolist()}")
-    gaps = np.diff(np.sort(values))
-    if len(gaps) and gaps.min() < SEPARATE:
-        raise ValueError(
-            f"two initial directions must be at least {SEPARATE:g} rad apart, or their sources "
-            f"cannot be told from each other; got {values.tolist()}"
-        )
+        return self.motion.power if self.belief is None else self.belief.power[0]

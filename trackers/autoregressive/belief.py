@@ -1,7 +1,7 @@
-"""What is believed of autoregressive sources between two intervals, and how it begins.
+"""Belief about autoregressive sources between two intervals, and conversions of its layout.
 
-Everything has leading batch axes. Samples of complex sources are two real rows each, real and
-imaginary part; states are counted lag by lag, the sources' current samples first.
+All arrays have leading batch axes. A sample of a complex source is two real rows, real and
+imaginary part; internal states are arranged lag by lag, the current samples first.
 """
 
 from __future__ import annotations
@@ -10,57 +10,45 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from arrivals.measurement_models.array_snapshot import LARGEST
 from arrivals.measurement_models.manifolds.symmetric_line import ArrayManifold
 from arrivals.motion_models.autoregressive import AutoregressiveSources
 from arrivals.motion_models.combined import block_diagonal
-from arrivals.motion_models.companion_form import blocks
+from arrivals.motion_models.companion_form import companion_layout
 from arrivals.trackers.autoregressive.qrd_rls import ridge_rows
+from arrivals.trackers.autoregressive.settings import RegressionSettings
 from arrivals.typing import Bool, Complex, Float, Int
 
 
 @dataclass(frozen=True, eq=False)
-class Settings:
-    """The parameters of the tracker that an interval asks for; see there."""
-
-    forgetting: float
-    ar_forgetting: float
-    ridge: float
-    ar_ridge: float
-    gate: float
-    inner: int
-    correction: bool
-    adapt_drive: bool
-    adapt_noise: bool
-    r_start: float
-    tau: float
-    memory: float
-
-
-@dataclass(frozen=True, eq=False)
 class SourceBelief:
-    """All that is believed between two intervals.
+    """Belief between two intervals.
 
     Attributes
     ----------
-    x : ndarray, shape (..., parts, n)
+    x : ndarray, shape (..., n_parts, n)
+        Mean of the state.
     P : ndarray, shape (..., n, n)
-    doa, q, power : ndarray, shape (..., n_sources)
-        Directions, rad; driving variances; long-term powers.
+        Covariance of the state; of complex states, E|x - mean|².
+    doa : ndarray, shape (..., n_sources)
+        Directions, rad.
     a : ndarray, shape (..., n_sources, p)
         AR coefficients.
+    q : ndarray, shape (..., n_sources)
+        Innovation variances.
     r : ndarray, shape (...)
         Variance of the complex noise of one sensor.
-    rows : ndarray, shape (..., n_sources, n_sources + 2 n_pairs)
-        Factor of the regression for the manifold's rows.
-    models : ndarray, shape (..., n_sources, p + 1, p + 1)
-        Factors of those for the AR coefficients.
-    weight : ndarray, shape (...)
-        Σ λ_a^age of the samples in `models`.
+    power : ndarray, shape (..., n_sources)
+        Long-term powers.
+    manifold_factor : ndarray, shape (..., n_sources, n_sources + 2 n_pairs)
+        Triangular factor of the regression for the rows of the manifold.
+    ar_factor : ndarray, shape (..., n_sources, p + 1, p + 1)
+        Triangular factors of the regressions for the AR coefficients.
+    ar_weight : ndarray, shape (...)
+        Σ λ_a^age of the samples in `ar_factor`.
     active : ndarray of bool, shape (..., n_sources)
-        Who was heard in the last interval.
+        Sources above the gate in the last interval.
     n : ndarray of int, shape (...)
-        Intervals so far.
+        Number of intervals so far.
     """
 
     x: Float
@@ -70,109 +58,90 @@ class SourceBelief:
     q: Float
     r: Float
     power: Float
-    rows: Float
-    models: Float
-    weight: Float
+    manifold_factor: Float
+    ar_factor: Float
+    ar_weight: Float
     active: Bool
     n: Int
 
 
-def beginning(
+def initialize_belief(
     doa: Float,
     x: Float,
     P: Float,
     motion: AutoregressiveSources,
     manifold: ArrayManifold,
-    o: Settings,
+    regression: RegressionSettings,
 ) -> SourceBelief:
-    """Return what is believed before anything is heard.
+    """Return the belief before the first interval: line 1 of Algorithm 1.
 
     Parameters
     ----------
     doa : ndarray, shape (n_batch, n_sources)
-        rad.
-    x, P : ndarray, shape (n_batch, parts, n), (n_batch, n, n)
+        Directions, rad.
+    x, P : ndarray, shape (n_batch, n_parts, n), (n_batch, n, n)
     motion : AutoregressiveSources
     manifold : ArrayManifold
-    o : Options
+    regression : RegressionSettings
     """
-    lead = len(doa)
+    n_batch = len(doa)
 
-    def each(value: Float) -> Float:
-        return np.repeat(np.asarray(value, dtype=np.float64)[None], lead, axis=0)
+    def repeat(value: Float) -> Float:
+        return np.repeat(np.asarray(value, dtype=np.float64)[None], n_batch, axis=0)
 
-    a, power = each(motion.padded), each(motion.power)
+    a, power = repeat(motion.coefficient_matrix), repeat(motion.power)
     target = np.delete(manifold.real_steering(doa), manifold.centre, axis=-1)
-    ridge = np.broadcast_to(o.ar_ridge * power[..., None], a.shape)
-    models = ridge_rows(ridge, a[..., None])
+    ridge = np.broadcast_to(regression.ar_ridge * power[..., None], a.shape)
+    rows = ridge_rows(ridge, a[..., None])
     return SourceBelief(
         x=x,
         P=P,
         doa=doa,
         a=a,
-        q=each(np.array(motion.noise)),
-        r=np.full(lead, float(manifold.noise)),
+        q=repeat(np.array(motion.noise)),
+        r=np.full(n_batch, float(manifold.noise)),
         power=power,
-        rows=ridge_rows(o.ridge * power, target),
-        models=np.concatenate([models, np.zeros_like(models[..., :1, :])], axis=-2),
-        weight=np.zeros(lead),
+        manifold_factor=ridge_rows(regression.ridge * power, target),
+        ar_factor=np.concatenate([rows, np.zeros_like(rows[..., :1, :])], axis=-2),
+        ar_weight=np.zeros(n_batch),
         active=np.ones(doa.shape, dtype=np.bool_),
-        n=np.zeros(lead, dtype=np.int64),
+        n=np.zeros(n_batch, dtype=np.int64),
     )
 
 
-def measured(z: Complex, manifold: ArrayManifold, parts: int) -> Float:
-    """Return transformed snapshots as real rows, NaN where missing.
-
-    Parameters
-    ----------
-    z : ndarray, shape (..., n_snapshots, n_sensors)
-        Not finite where missing.
-    manifold : ArrayManifold
-    parts : int
-        2, or 1 to leave the imaginary part out.
-
-    Returns
-    -------
-    ndarray, shape (..., n_snapshots * parts, n_sensors)
-        Both rows of a pair are missing if one of its sensors is.
-    """
-    there = np.abs(z) < LARGEST
-    gaps = not there.all()
-    y = manifold.transform(np.where(there, z, 0) if gaps else z)
-    if gaps:
-        y[(~there @ (manifold.T != 0)) > 0] = complex(np.nan, np.nan)
-    rows = np.stack([y.real, y.imag][:parts], axis=-2)
-    return np.asarray(rows.reshape(*y.shape[:-2], -1, y.shape[-1]), dtype=np.float64)
-
-
-def inside(x: Float, P: Float, motion: AutoregressiveSources) -> tuple[Float, Float]:
-    """Return a state as trackers show it, (dim_x,), as (parts, n) and (n, n), lag by lag."""
-    parts, places = motion.n_parts, blocks(motion.orders, lag_by_lag=True)
-    n, order = places.dim, places.order
-    both = sum(P[i * n : (i + 1) * n, i * n : (i + 1) * n] for i in range(parts))
-    return x.reshape(parts, n)[:, order], np.asarray(both)[order[:, None], order]
-
-
-def outside(x: Float, motion: AutoregressiveSources) -> Float:
-    """Return states (..., parts, n), lag by lag, as trackers show them: (..., dim_x)."""
-    back = blocks(motion.orders, lag_by_lag=True).back
-    return x[..., back].reshape(*x.shape[:-2], -1)
-
-
-def covariance_outside(P: Float, motion: AutoregressiveSources) -> Float:
-    """Return a covariance (n, n), lag by lag, as trackers show it: (dim_x, dim_x)."""
-    back = blocks(motion.orders, lag_by_lag=True).back
-    each = P[back[:, None], back] / motion.n_parts
-    return each if motion.real_valued else block_diagonal(each, each)
-
-
-def joined(X: Float, parts: int, n_sources: int) -> Complex:
-    """Return states' rows (..., n_samples * parts, n) as signals, (..., n_samples, n_sources)."""
-    rows = X[..., :n_sources].reshape(*X.shape[:-2], -1, parts, n_sources)
-    return np.asarray(rows[..., 0, :] + 1j * (rows[..., 1, :] if parts == 2 else 0.0))
-
-
-def repeated(s: SourceBelief, n: int) -> SourceBelief:
+def repeat_belief(belief: SourceBelief, n: int) -> SourceBelief:
     """Return a belief n times."""
-    return SourceBelief(**{name: np.repeat(value, n, axis=0) for name, value in vars(s).items()})
+    fields = {name: np.repeat(value, n, axis=0) for name, value in vars(belief).items()}
+    return SourceBelief(**fields)
+
+
+def select_beliefs(belief: SourceBelief, index: Bool) -> SourceBelief:
+    """Return the belief of the members of a batch that a mask selects."""
+    return SourceBelief(**{name: value[index] for name, value in vars(belief).items()})
+
+
+def to_internal(x: Float, P: Float, motion: AutoregressiveSources) -> tuple[Float, Float]:
+    """Return a tracker's state, (dim_x,), lag by lag: (n_parts, n) and (n, n)."""
+    n_parts, layout = motion.n_parts, companion_layout(motion.orders, lag_by_lag=True)
+    n, order = layout.dim, layout.permutation
+    total = sum(P[i * n : (i + 1) * n, i * n : (i + 1) * n] for i in range(n_parts))
+    return x.reshape(n_parts, n)[:, order], np.asarray(total)[order[:, None], order]
+
+
+def to_state_vector(x: Float, motion: AutoregressiveSources) -> Float:
+    """Return internal states (..., n_parts, n) as `motion` arranges them: (..., dim_x)."""
+    order = companion_layout(motion.orders, lag_by_lag=True).inverse_permutation
+    return x[..., order].reshape(*x.shape[:-2], -1)
+
+
+def to_state_covariance(P: Float, motion: AutoregressiveSources) -> Float:
+    """Return an internal covariance (n, n) as `motion` arranges it: (dim_x, dim_x)."""
+    order = companion_layout(motion.orders, lag_by_lag=True).inverse_permutation
+    part = P[order[:, None], order] / motion.n_parts
+    return part if motion.real_valued else block_diagonal(part, part)
+
+
+def to_signals(X: Float, n_parts: int, n_sources: int) -> Complex:
+    """Return states (..., n_samples * n_parts, n) as signals (..., n_samples, n_sources)."""
+    rows = X[..., :n_sources].reshape(*X.shape[:-2], -1, n_parts, n_sources)
+    return np.asarray(rows[..., 0, :] + 1j * (rows[..., 1, :] if n_parts == 2 else 0.0))

@@ -1,4 +1,4 @@
-"""Recordings of autoregressive sources, worked off interval by interval, as runs over time."""
+"""Results of intervals over time, as runs."""
 
 from __future__ import annotations
 
@@ -8,90 +8,86 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arrivals.motion_models.autoregressive import AutoregressiveSources
-from arrivals.trackers.autoregressive.belief import SourceBelief, outside
+from arrivals.trackers.autoregressive.belief import SourceBelief, to_state_vector
+from arrivals.trackers.autoregressive.snapshots import completes_interval
 from arrivals.trackers.estimates import SourceEstimate
 from arrivals.trackers.run import Run
-from arrivals.typing import Bool, Complex, Int
+from arrivals.typing import Complex, Int
+
+FIELDS = ("x", "doa", "a", "q", "r", "active")
 
 
 class History:
-    """What independent sequences of snapshots tell, interval after interval.
+    """Beliefs and signals of independent sequences of snapshots, interval by interval.
 
     Parameters
     ----------
     z : ndarray, shape (n_sequences, n_snapshots, n_sensors)
         All snapshots, those that were pending before the run in front.
-    pending : int
-        How many those are.
+    n_pending : int
+        Number of snapshots that were pending.
     motion : AutoregressiveSources
     gated : bool
-        Whether silent sources are told from others.
+        True if inactive sources are distinguished from active ones.
     """
 
     def __init__(
-        self, z: Complex, pending: int, motion: AutoregressiveSources, gated: bool
+        self, z: Complex, n_pending: int, motion: AutoregressiveSources, gated: bool
     ) -> None:
-        self.z, self.pending, self.motion, self.gated = z, pending, motion, gated
-        self.found: list[bool] = []
+        self.z, self.n_pending, self.motion, self.gated = z, n_pending, motion, gated
+        self.detected: list[bool] = []
         self.beliefs: list[dict[str, NDArray[Any]]] = []
-        self.shown_from: list[Int] = []
+        self.first_steps: list[Int] = []
         self.signals: list[Complex] = []
 
-    def add(self, s: SourceBelief | None, end: int) -> None:
-        """Note what is believed after the first `end` snapshots."""
-        K, lead = self.motion.n_sources, (len(self.z),)
-        belief = {
-            "x": np.zeros((*lead, self.motion.dim_x)) if s is None else outside(s.x, self.motion),
-            "doa": np.full((*lead, K), np.nan) if s is None else s.doa,
-            "a": np.full((*lead, K, max(self.motion.orders)), np.nan) if s is None else s.a,
-            "q": np.full((*lead, K), np.nan) if s is None else s.q,
-            "r": np.full(lead, np.nan) if s is None else s.r,
-            "active": np.full((*lead, K), np.nan) if s is None else s.active.astype(float),
+    def add(self, belief: SourceBelief | None, end: int) -> None:
+        """Append the belief after the first `end` snapshots."""
+        lead = (len(self.z),)
+        last = completes_interval(self.z[:, end - 1]) if end else np.zeros(lead, dtype=np.bool_)
+        self.detected.append(belief is not None)
+        self.beliefs.append(self._unknown(lead) if belief is None else self._known(belief))
+        self.first_steps.append(end - self.n_pending - last)
+
+    def _known(self, belief: SourceBelief) -> dict[str, NDArray[Any]]:
+        x, active = to_state_vector(belief.x, self.motion), belief.active.astype(float)
+        return {name: getattr(belief, name) for name in FIELDS} | {"x": x, "active": active}
+
+    def _unknown(self, lead: tuple[int, ...]) -> dict[str, NDArray[Any]]:
+        K, p = self.motion.n_sources, max(self.motion.orders)
+        unknown = {name: np.full((*lead, K), np.nan) for name in ("doa", "q", "active")}
+        return unknown | {
+            "x": np.zeros((*lead, self.motion.dim_x)),
+            "a": np.full((*lead, K, p), np.nan),
+            "r": np.full(lead, np.nan),
         }
-        last = closes(self.z[:, end - 1]) if end else np.zeros(lead, dtype=np.bool_)
-        self.found.append(s is not None)
-        self.beliefs.append(belief)
-        self.shown_from.append(end - self.pending - last)
 
     @property
-    def moved(self) -> bool:
-        """Whether there was an interval to work off."""
+    def has_intervals(self) -> bool:
+        """True if an interval was processed."""
         return len(self.beliefs) > 1
 
     def run(self, n: int, dt: float, elapsed: float) -> Run:
-        """Return the run of sequence n, less what was pending before."""
-        n_steps, K = self.z.shape[1] - self.pending, self.motion.n_sources
-        shown_from = [steps[n] for steps in self.shown_from]
-        now = np.searchsorted(shown_from, np.arange(n_steps), side="right") - 1
-        found = np.array(self.found)[now]
-        column = {name: np.array([b[name][n] for b in self.beliefs])[now] for name in ("x", "doa",
-                  "a", "q", "r", "active")}  # fmt: skip
+        """Return the run of sequence n, without the snapshots that were pending before."""
+        n_steps, K = self.z.shape[1] - self.n_pending, self.motion.n_sources
+        first_steps = [steps[n] for steps in self.first_steps]
+        latest = np.searchsorted(first_steps, np.arange(n_steps), side="right") - 1
+        detected = np.array(self.detected)[latest]
+        column = {name: np.array([b[name][n] for b in self.beliefs])[latest] for name in FIELDS}
         amplitude = self.motion.signals(column["x"])
-        amplitude[~found] = complex(np.nan, np.nan)
+        amplitude[~detected] = complex(np.nan, np.nan)
         fields = {
             "doa": column["doa"],
             "std": np.full((n_steps, K), np.nan),
             "existence": column["active"] if self.gated else np.full((n_steps, K), np.nan),
             "amplitude": amplitude,
-            "label": np.where(found[:, None], np.arange(K), -1),
+            "label": np.where(detected[:, None], np.arange(K), -1),
             "converged": np.ones(n_steps, dtype=np.bool_),
             "iterations": np.zeros(n_steps, dtype=np.int64),
             "noise": column["r"],
             "coefficients": column["a"],
-            "driving_noise": column["q"],
+            "innovation_variance": column["q"],
         }
         signals = np.concatenate([np.zeros((0, K), complex), *(part[n] for part in self.signals)])
         time = dt * np.arange(n_steps, dtype=np.float64)
-        extras = {"signals": signals[self.pending :]}
-        return Run(SourceEstimate, fields, column["x"], found * K, time, elapsed, extras)
-
-
-def closes(z: Complex) -> Bool:
-    """Tell whether snapshots (..., n_sensors), the last of an interval, are there to close it.
-
-    Examples
-    --------
-    >>> closes(np.array([[np.nan, 1j], [np.nan, np.nan]]))
-    array([ True, False])
-    """
-    return np.asarray(np.isfinite(z).any(axis=-1))
+        extras = {"signals": signals[self.n_pending :]}
+        return Run(SourceEstimate, fields, column["x"], detected * K, time, elapsed, extras)

@@ -1,53 +1,59 @@
-"""Where autoregressive sources are at the start: the likeliest places on a grid."""
+"""Maximum-likelihood initial directions of autoregressive sources on a grid."""
 
 from __future__ import annotations
 
+from functools import lru_cache
 from itertools import permutations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.manifolds.symmetric_line import ArrayManifold
 from arrivals.motion_models.autoregressive import AutoregressiveSources
-from arrivals.motion_models.companion_form import blocks, stationary
-from arrivals.trackers.autoregressive.steady_state import fixed_gain, steady_state, transposed
+from arrivals.motion_models.companion_form import companion_layout, solve_lyapunov
+from arrivals.trackers.autoregressive.steady_state import StateSpace, fixed_gain, steady_state
+from arrivals.trackers.gaussian.linalg import transposed
 from arrivals.typing import Float
+from arrivals.validation import shaped
 
 GRID = np.deg2rad(np.arange(-70.0, 71.0, 10.0))
-WIDEST = 1.0  # wavelengths: what lies farther out is too sharp for the grid
-LEAST_NOISE = 0.05  # of a source's power: the grid is no better than that
-CHUNK = 512
+MAX_DISTANCE = 1.0  # wavelengths: the response of pairs farther out is too sharp for the grid
+MIN_NOISE_RATIO = 0.05  # noise over the power of a source: the accuracy of the grid
+MIN_SEPARATION = 1e-6  # rad
+CHUNK = 512  # hypotheses filtered at once
 
 
-def placings(sources: AutoregressiveSources, grid: Float) -> Float:
-    """Return all placings of the sources on a grid, (n, n_sources); equal sources in one order.
+def direction_hypotheses(sources: AutoregressiveSources, grid: Float) -> Float:
+    """Return all placements of the sources on a grid, (n, n_sources); equal sources in one order.
 
     Examples
     --------
-    >>> placings(AutoregressiveSources([[0.5], [0.9]]), np.array([0.0, 1.0])).tolist()
+    >>> direction_hypotheses(AutoregressiveSources([[0.5], [0.9]]), np.array([0.0, 1.0])).tolist()
     [[0.0, 1.0], [1.0, 0.0]]
-    >>> placings(AutoregressiveSources([[0.5], [0.5]]), np.array([0.0, 1.0])).tolist()
+    >>> direction_hypotheses(AutoregressiveSources([[0.5], [0.5]]), np.array([0.0, 1.0])).tolist()
     [[0.0, 1.0]]
     """
-    found = np.array(list(permutations(range(len(grid)), sources.n_sources)))
+    index = np.array(list(permutations(range(len(grid)), sources.n_sources)))
     models = list(zip(sources.coefficients, np.array(sources.noise).tolist(), strict=True))
     for k, model in enumerate(models):
         if model in models[:k]:
             twin = max(i for i in range(k) if models[i] == model)
-            found = found[found[:, twin] < found[:, k]]
-    return np.asarray(grid[found])
+            index = index[index[:, twin] < index[:, k]]
+    return np.asarray(grid[index])
 
 
 def log_likelihood(
     y: Float, doa: Float, sources: AutoregressiveSources, manifold: ArrayManifold, noise: float
 ) -> Float:
-    """Return the Kalman filter's log-likelihood of placings, up to a constant and a factor.
+    """Return the Kalman filter's log-likelihood of directions, up to a constant and a factor.
 
     Parameters
     ----------
-    y : ndarray, shape (n_samples * parts, n_sensors)
-        Transformed snapshots, without gaps.
+    y : ndarray, shape (n_samples * n_parts, n_sensors)
+        Transformed snapshots without missing data.
     doa : ndarray, shape (n, n_sources)
-        rad.
+        Hypotheses, rad.
     sources : AutoregressiveSources
     manifold : ArrayManifold
     noise : float
@@ -57,48 +63,72 @@ def log_likelihood(
     -----
     At the steady gain, from a state of zero.
     """
-    places, parts, k = blocks(sources.orders, lag_by_lag=True), sources.n_parts, doa.shape[-1]
-    F, Q = places.transition(sources.padded), places.drive(np.array(sources.noise, np.float64))
-    near = np.r_[manifold.distances <= max(WIDEST, manifold.distances[0])]
+    layout, n_parts = companion_layout(sources.orders, lag_by_lag=True), sources.n_parts
+    k = doa.shape[-1]
+    F = layout.transition(sources.coefficient_matrix)
+    Q = layout.process_noise(np.array(sources.noise, np.float64))
+    near = np.r_[manifold.distances <= max(MAX_DISTANCE, manifold.distances[0])]
     rows = np.r_[near, True, near]
     A: Float = transposed(manifold.real_steering(doa))[..., rows, :]
     y = y[:, rows]
-    r = np.full((len(doa), 1, 1), noise * parts / 2)
-    P = np.broadcast_to(stationary(F, Q), (len(doa), *F.shape))
-    K, P = steady_state(P, F, Q, A, r)
-    Phi = F - K @ (A @ F[:k])
-    x = np.zeros((len(doa), parts, len(F)))
-    X = fixed_gain(x, Phi, y @ transposed(K), parts)
-    before = np.concatenate([x, X[:, :-parts]], axis=-2)
+    r = np.full((len(doa), 1, 1), noise * n_parts / 2)
+    P = np.broadcast_to(solve_lyapunov(F, Q), (len(doa), *F.shape))
+    K, P = steady_state(P, StateSpace(F, Q, A, r))
+    # x(j) = (I - K H) F x(j-1) + K y(j)
+    x = np.zeros((len(doa), n_parts, len(F)))
+    X = fixed_gain(x, F - K @ (A @ F[:k]), y @ transposed(K), n_parts)
+    # e = y - H F x(j-1), S = H (F P F' + Q) H' + r I
+    before = np.concatenate([x, X[:, :-n_parts]], axis=-2)
     e = y - before @ transposed(A @ F[:k])
     S = A @ (F @ P @ F.T + Q)[..., :k, :k] @ transposed(A) + r * np.eye(A.shape[-2])
+    # ln p = -Σ e' S^-1 e - n ln |S|
     white = np.asarray(np.linalg.solve(S, np.swapaxes(e, -1, -2)), dtype=np.float64)
     misfit = (e * transposed(white)).sum(axis=(-2, -1))
-    return np.asarray(-misfit - len(y) / parts * np.linalg.slogdet(S)[1])
+    return np.asarray(-misfit - len(y) / n_parts * np.linalg.slogdet(S)[1])
 
 
-def acquired(y: Float, sources: AutoregressiveSources, manifold: ArrayManifold) -> Float:
-    """Return the likeliest directions of the sources, (n_sources,), rad.
+def acquire_directions(y: Float, sources: AutoregressiveSources, manifold: ArrayManifold) -> Float:
+    """Return the maximum-likelihood directions of the sources, (n_sources,), rad.
 
-    All placings on a grid of 10 degrees, then on one of 5 about the best.
+    All placements on a grid of 10 degrees, then on one of 5 degrees around the best (4.7).
 
     Parameters
     ----------
-    y : ndarray, shape (n_samples * parts, n_sensors)
-        Transformed snapshots, without gaps.
+    y : ndarray, shape (n_samples * n_parts, n_sensors)
+        Transformed snapshots without missing data.
     sources : AutoregressiveSources
-        What tells them apart: labels follow their models.
+        Their models assign the labels.
     manifold : ArrayManifold
-        Its noise counts as a twentieth of the sources' power at least.
+        Its noise counts as at least a twentieth of the power of the sources.
     """
-    noise = max(manifold.noise, LEAST_NOISE * float(sources.power.mean()))
+    noise = max(manifold.noise, MIN_NOISE_RATIO * float(sources.power.mean()))
 
-    def best(doa: Float) -> Float:
+    def most_likely(doa: Float) -> Float:
         chunks = np.split(doa, range(CHUNK, len(doa), CHUNK))
-        found = [log_likelihood(y, chunk, sources, manifold, noise) for chunk in chunks]
-        return np.asarray(doa[np.argmax(np.concatenate(found))])
+        values = [log_likelihood(y, chunk, sources, manifold, noise) for chunk in chunks]
+        return np.asarray(doa[np.argmax(np.concatenate(values))])
 
-    doa = best(placings(sources, GRID))
+    doa = most_likely(direction_hypotheses(sources, GRID))
     steps = np.deg2rad([-5.0, 0.0, 5.0])
     around = np.stack(np.meshgrid(*[steps] * len(doa), indexing="ij"), axis=-1)
-    return best(doa + around.reshape(-1, len(doa)))
+    return most_likely(doa + around.reshape(-1, len(doa)))
+
+
+@lru_cache(maxsize=64)
+def manifold_of(measurement: ArraySnapshot) -> ArrayManifold:
+    """Return the real response of a symmetric line; raise a ValueError for any other array."""
+    wavelength = measurement.plain_wavelength("ar_kalman_qrd_rls")
+    return ArrayManifold(measurement.array, wavelength, measurement.noise)
+
+
+def check_directions(doa: ArrayLike, n_sources: int) -> None:
+    """Raise a ValueError if initial directions are out of range or coincide."""
+    values = shaped("doa", doa, n_sources)
+    if not (np.abs(values) <= np.pi / 2).all():
+        raise ValueError(f"doa must lie within ±π/2 rad; got {values.tolist()}")
+    separations = np.diff(np.sort(values))
+    if len(separations) and separations.min() < MIN_SEPARATION:
+        raise ValueError(
+            f"doa must be at least {MIN_SEPARATION:g} rad apart for distinct sources; "
+            f"got {values.tolist()}"
+        )

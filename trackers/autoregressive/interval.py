@@ -1,6 +1,6 @@
-"""One interval of the AR Kalman filter with QRD-RLS: signals, then manifold, then AR models.
+"""End of an interval: activity of the sources, measurement noise and long-term powers.
 
-Everything has leading batch axes; see `source_states`.
+All arrays have leading batch axes, as in `belief`.
 """
 
 from __future__ import annotations
@@ -9,91 +9,76 @@ from dataclasses import replace
 
 import numpy as np
 
-from arrivals.measurement_models.manifolds.symmetric_line import ArrayManifold
-from arrivals.motion_models.companion_form import CompanionLayout
-from arrivals.trackers.autoregressive.belief import Settings, SourceBelief
-from arrivals.trackers.autoregressive.interval_filter import FilteredInterval, filtered
-from arrivals.trackers.autoregressive.regressions import TINY, autoregression, directions
-from arrivals.trackers.autoregressive.steady_state import transposed
+from arrivals.trackers.autoregressive.belief import SourceBelief
+from arrivals.trackers.autoregressive.interval_filter import FilteredInterval
+from arrivals.trackers.autoregressive.regressions import TINY
+from arrivals.trackers.autoregressive.settings import NoiseSettings
 from arrivals.typing import Float
 
-LEAST_NOISE = 1e-8  # of the largest source's power: the least measurement noise
-AUDIBLE = 0.5  # of the noise: a source below the gate's part of that is silent in any case
-PRIOR = 20.0  # intervals that the powers at the start count for
+MIN_NOISE = 1e-8  # measurement noise over the power of the strongest source
+MIN_GATED_POWER = 0.5  # of the noise: the gate of a source is a fraction of at least this power
+PRIOR_INTERVALS = 20.0  # intervals that the initial powers count for
 
 
-def interval(
-    s: SourceBelief, y: Float, manifold: ArrayManifold, blocks: CompanionLayout, o: Settings
-) -> tuple[SourceBelief, Float]:
-    """Return the belief after an interval, and the states after each of its samples.
+def finish_interval(
+    belief: SourceBelief,
+    new: SourceBelief,
+    filtered: FilteredInterval,
+    noise: NoiseSettings,
+    gate: float,
+    memory: float,
+) -> SourceBelief:
+    """Return the belief after an interval: inactive sources keep their directions.
 
     Parameters
     ----------
-    s : Sources
-    y : ndarray, shape (..., n_samples * parts, n_sensors)
-        Transformed snapshots, real; NaN where missing.
-    manifold : ArrayManifold
-    blocks : Blocks
-        Lag by lag.
-    o : Options
-
-    References
-    ----------
-    Gu, Chan, Zhu and Swamy, 2013, algorithm 1, with our corrections: states of one lag more, rows
-    for the covariance of the states in both regressions, and targets of the regularisation.
+    belief, new : SourceBelief
+        Before the interval, and with the estimates of the regressions.
+    filtered : FilteredInterval
+    noise : NoiseSettings
+    gate, memory : float
+        As in `ARKalmanQRDRLS`.
     """
-    new = s
-    for _ in range(o.inner):
-        A = transposed(manifold.real_steering(new.doa))
-        heard = filtered(s, new, y, A, blocks, o)
-        rows, doa = directions(s, heard, A, manifold, o)
-        models, weight, a, q = autoregression(s, new, heard, blocks, o)
-        new = replace(new, doa=doa, a=a, q=q, rows=rows, models=models, weight=weight)
-    return settled(s, new, heard, o), heard.X
-
-
-def settled(
-    s: SourceBelief, new: SourceBelief, heard: FilteredInterval, o: Settings
-) -> SourceBelief:
-    """Take over the state, hold those sources that are silent, and learn noise and powers."""
-    loud = sounding(heard.X, s.doa.shape[-1], s.x.shape[-2])
-    something = np.asarray(heard.kept < 1)[..., None]
-    least = o.gate * np.maximum(s.power, AUDIBLE * s.r[..., None])
-    active = np.logical_and((loud > least) | (o.gate == 0), something)
-    anyone = np.asarray(active.any(axis=-1))
-    power = np.where(something, learned_power(s, loud, o), s.power)
+    current = source_power(filtered.X, belief.doa.shape[-1], belief.x.shape[-2])
+    has_data = np.asarray(filtered.decay < 1)[..., None]
+    # active_k: mean |s_k|² > γ times the long-term power   (sec. 5)
+    least = gate * np.maximum(belief.power, MIN_GATED_POWER * belief.r[..., None])
+    active = np.logical_and((current > least) | (gate == 0), has_data)
+    any_active = np.asarray(active.any(axis=-1))[..., None, None]
+    power = np.where(has_data, update_power(belief, current, memory), belief.power)
+    scaled_q = belief.q * power / belief.power
     return replace(
         new,
-        x=heard.X[..., -s.x.shape[-2] :, :],
-        P=heard.P,
-        doa=np.where(active, new.doa, s.doa),
-        rows=np.where(anyone[..., None, None], new.rows, s.rows),
-        r=learned_noise(s, heard, o),
+        x=filtered.X[..., -belief.x.shape[-2] :, :],
+        P=filtered.P,
+        doa=np.where(active, new.doa, belief.doa),
+        manifold_factor=np.where(any_active, new.manifold_factor, belief.manifold_factor),
+        r=update_noise(belief, filtered) if noise.adapt_measurement_noise else belief.r,
         power=power,
-        q=new.q if o.adapt_drive else s.q * power / s.power,
+        q=new.q if noise.adapt_process_noise else scaled_q,
         active=active,
-        n=s.n + 1,
+        n=belief.n + 1,
     )
 
 
-def sounding(X: Float, n_sources: int, parts: int) -> Float:
-    """Return the mean power of each source's samples, (..., n_sources)."""
+def source_power(X: Float, n_sources: int, n_parts: int) -> Float:
+    """Return the mean power of the samples of each source, (..., n_sources)."""
     signals = X[..., :n_sources]
-    return np.asarray((signals * signals).sum(axis=-2) * (parts / X.shape[-2]))
+    return np.asarray((signals * signals).sum(axis=-2) * (n_parts / X.shape[-2]))
 
 
-def learned_noise(s: SourceBelief, heard: FilteredInterval, o: Settings) -> Float:
-    """Return r <- 0.9 r + 0.1 E|y - A s|², (4.5) of the report's notation."""
-    if not o.adapt_noise:
-        return s.r
-    new: Float = np.where(np.isnan(heard.noise), s.r, heard.noise)
-    return np.asarray(np.maximum(0.9 * s.r + 0.1 * new, LEAST_NOISE * s.power.max(axis=-1)))
+def update_noise(belief: SourceBelief, filtered: FilteredInterval) -> Float:
+    """Return r <- 0.9 r + 0.1 E|y - A s|² (4.5); r without measurements."""
+    new: Float = np.where(np.isnan(filtered.noise), belief.r, filtered.noise)
+    least = MIN_NOISE * belief.power.max(axis=-1)
+    return np.asarray(np.maximum(0.9 * belief.r + 0.1 * new, least))
 
 
-def learned_power(s: SourceBelief, loud: Float, o: Settings) -> Float:
-    """Return each source's mean power over the last `memory` intervals, pauses included.
+def update_power(belief: SourceBelief, current: Float, memory: float) -> Float:
+    """Return the mean power of each source over the last `memory` intervals, pauses included.
 
-    What is known at the start counts as much as the first `PRIOR` intervals.
+    The initial powers count as much as the first `PRIOR_INTERVALS` intervals.
     """
-    share = 1 / np.minimum(s.n + PRIOR, max(o.memory, PRIOR))[..., None]
-    return np.asarray(np.maximum(s.power + share * (loud - s.power), TINY))
+    n = np.minimum(belief.n + PRIOR_INTERVALS, max(memory, PRIOR_INTERVALS))
+    power = belief.power + (1 / n)[..., None] * (current - belief.power)
+    return np.asarray(np.maximum(power, TINY))

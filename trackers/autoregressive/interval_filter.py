@@ -1,6 +1,6 @@
-"""The Kalman filter of an interval (sec. 2): the sources' samples, and what regressions ask for.
+"""Kalman filter of one interval, and the statistics for the regressions.
 
-Everything has leading batch axes; see `source_states`.
+All arrays have leading batch axes, as in `belief`.
 """
 
 from __future__ import annotations
@@ -9,137 +9,135 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from arrivals.motion_models.companion_form import CompanionLayout
-from arrivals.trackers.autoregressive.belief import Settings, SourceBelief
-from arrivals.trackers.autoregressive.qrd_rls import ages
-from arrivals.trackers.autoregressive.steady_state import exact_filter, steady_filter, transposed
+from arrivals.trackers.autoregressive.belief import SourceBelief, select_beliefs
+from arrivals.trackers.autoregressive.qrd_rls import forgetting_weights
+from arrivals.trackers.autoregressive.settings import NoiseSettings, RegressionSettings
+from arrivals.trackers.autoregressive.steady_state import StateSpace, exact_filter, steady_filter
+from arrivals.trackers.gaussian.linalg import transposed
 from arrivals.typing import Bool, Float
 
 
 @dataclass(frozen=True, eq=False)
 class FilteredInterval:
-    """What the Kalman filter makes of an interval.
+    """Filtered states of an interval, and weighted sums for the regressions.
 
     Attributes
     ----------
-    X : ndarray, shape (..., n_samples * parts, n)
+    X : ndarray, shape (..., n_samples * n_parts, n)
         States after each sample.
     P : ndarray, shape (..., n, n)
-        Covariance after the last.
-    y : ndarray, shape (..., n_samples * parts, n_sensors)
-        Measurements, by their expectations where they are missing.
+        Covariance after the last sample.
+    y : ndarray, shape (..., n_samples * n_parts, n_sensors)
+        Measurements; expected values where they are missing.
     weights, ar_weights : ndarray, shape (..., n_samples)
-        √λ^age and √λ_a^age; 0 where nothing was measured.
-    kept, ar_kept : ndarray, shape (...)
-        λ and λ_a to the number of snapshots.
-    cov, ar_cov : ndarray, shape (..., n, n)
+        √λ^age and √λ_a^age; 0 for samples without valid data.
+    decay, ar_decay : ndarray, shape (...)
+        λ and λ_a to the power of the number of snapshots with valid data.
+    covariance, ar_covariance : ndarray, shape (..., n, n)
         Covariances of the states, summed with the squares of these weights.
-    unheard : ndarray, shape (..., n_sources, n_sensors)
-        That sum over the samples that a sensor misses, times its response.
+    missing_covariance : ndarray, shape (..., n_sources, n_sensors)
+        The same sum over the samples that a sensor misses, times its response.
     noise : ndarray, shape (...)
-        Mean of E|y - A s|² given the measurements; NaN if there is none.
+        Mean of E|y - A s|² given the measurements; NaN without measurements.
     """
 
     X: Float
     P: Float
     y: Float
     weights: Float
-    kept: Float
+    decay: Float
     ar_weights: Float
-    ar_kept: Float
-    cov: Float
-    ar_cov: Float
-    unheard: Float
+    ar_decay: Float
+    covariance: Float
+    ar_covariance: Float
+    missing_covariance: Float
     noise: Float
 
 
-def filtered(
-    s: SourceBelief, now: SourceBelief, y: Float, A: Float, blocks: CompanionLayout, o: Settings
+def filter_interval(
+    belief: SourceBelief, y: Float, model: StateSpace, regression: RegressionSettings
 ) -> FilteredInterval:
-    """Filter an interval from the state s, with the models that are believed now."""
-    F, Q = blocks.transition(now.a), blocks.drive(now.q)
-    whole: Bool = np.asarray(np.isfinite(y).all(axis=(-2, -1)))
-    r = noise_now(s, o)
-    if whole.all():
-        return without_gaps(s, y, F, Q, A, r, o)
-    if not whole.any():
-        return with_gaps(s, y, F, Q, A, r, o)
-    one, other = (
-        job(only(s, some), y[some], F[some], Q[some], A[some], r[some], o)
-        for some, job in ((whole, without_gaps), (~whole, with_gaps))
+    """Filter an interval, (..., n_samples * n_parts, n_sensors), from the state of `belief`."""
+    complete: Bool = np.asarray(np.isfinite(y).all(axis=(-2, -1)))
+    if complete.all():
+        return filter_complete(belief, y, model, regression)
+    if not complete.any():
+        return filter_with_gaps(belief, y, model, regression)
+    first, second = (
+        filter_interval(
+            select_beliefs(belief, mask), y[mask], StateSpace(*(v[mask] for v in model)), regression
+        )
+        for mask in (complete, ~complete)
     )
-    return merged(whole, one, other)
+    return merge_batches(complete, first, second)
 
 
-def only(s: SourceBelief, some: Bool) -> SourceBelief:
-    """Return the belief of some members of a batch."""
-    return SourceBelief(**{name: value[some] for name, value in vars(s).items()})
-
-
-def merged(first: Bool, one: FilteredInterval, other: FilteredInterval) -> FilteredInterval:
-    """Return the results of two parts of a batch as those of the whole."""
+def merge_batches(
+    mask: Bool, first: FilteredInterval, second: FilteredInterval
+) -> FilteredInterval:
+    """Return the results of the members in `mask` and of the others as those of the batch."""
     fields = {}
-    for name, value in vars(one).items():
-        both = np.empty((len(first), *value.shape[1:]))
-        both[first], both[~first] = value, getattr(other, name)
-        fields[name] = both
+    for name, value in vars(first).items():
+        merged = np.empty((len(mask), *value.shape[1:]))
+        merged[mask], merged[~mask] = value, getattr(second, name)
+        fields[name] = merged
     return FilteredInterval(**fields)
 
 
-def without_gaps(
-    s: SourceBelief, y: Float, F: Float, Q: Float, A: Float, r: Float, o: Settings
+def filter_complete(
+    belief: SourceBelief, y: Float, model: StateSpace, regression: RegressionSettings
 ) -> FilteredInterval:
-    """Filter at the steady gain."""
-    X, P = steady_filter(s.x, s.P, y, F, Q, A, r)
-    parts, k = s.x.shape[-2], A.shape[-1]
-    heard = np.ones((*y.shape[:-2], y.shape[-2] // parts))
-    w, kept = ages(heard, o.forgetting)
-    v, ar_kept = ages(heard, o.ar_forgetting)
+    """Filter an interval without missing data at the steady gain."""
+    X, P = steady_filter(belief.x, belief.P, y, model)
+    A, n_parts, k = model.A, belief.x.shape[-2], model.A.shape[-1]
+    valid = np.ones((*y.shape[:-2], y.shape[-2] // n_parts))
+    w, decay = forgetting_weights(valid, regression.forgetting)
+    v, ar_decay = forgetting_weights(valid, regression.ar_forgetting)
     errors = y - X[..., :k] @ transposed(A)
-    spread = (A @ P[..., :k, :k] * A).sum(axis=(-2, -1)) / A.shape[-2]
-    noise = parts * (errors * errors).mean(axis=(-2, -1)) + spread
+    variance = (A @ P[..., :k, :k] * A).sum(axis=(-2, -1)) / A.shape[-2]
+    noise = n_parts * (errors * errors).mean(axis=(-2, -1)) + variance
     return FilteredInterval(
-        X, P, y, w, kept, v, ar_kept,
+        X, P, y, w, decay, v, ar_decay,
         (w * w).sum(axis=-1)[..., None, None] * P,
         (v * v).sum(axis=-1)[..., None, None] * P,
         np.zeros((*A.shape[:-2], k, A.shape[-2])),
-        noise * (2 / parts),
+        noise * (2 / n_parts),
     )  # fmt: skip
 
 
-def with_gaps(
-    s: SourceBelief, y: Float, F: Float, Q: Float, A: Float, r: Float, o: Settings
+def filter_with_gaps(
+    belief: SourceBelief, y: Float, model: StateSpace, regression: RegressionSettings
 ) -> FilteredInterval:
-    """Filter sample by sample, with what was measured of each."""
-    X, Ps = exact_filter(s.x, s.P, y, F, Q, A, r)
-    parts, k = s.x.shape[-2], A.shape[-1]
-    pairs = y.reshape(*y.shape[:-2], -1, parts, y.shape[-1])
-    there = np.isfinite(pairs).all(axis=-2)
-    heard = np.asarray(there.any(axis=-1), dtype=np.float64)
-    w, kept = ages(heard, o.forgetting)
-    v, ar_kept = ages(heard, o.ar_forgetting)
+    """Filter an interval sample by sample, each with its valid measurements."""
+    X, Ps = exact_filter(belief.x, belief.P, y, model)
+    A, n_parts, k = model.A, belief.x.shape[-2], model.A.shape[-1]
+    samples = y.reshape(*y.shape[:-2], -1, n_parts, y.shape[-1])
+    valid = np.isfinite(samples).all(axis=-2)
+    any_valid = np.asarray(valid.any(axis=-1), dtype=np.float64)
+    w, decay = forgetting_weights(any_valid, regression.forgetting)
+    v, ar_decay = forgetting_weights(any_valid, regression.ar_forgetting)
     expected = X[..., :k] @ transposed(A)
-    y = np.where(np.repeat(there, parts, axis=-2), y, expected)
-    Pss = Ps[..., :k, :k]
-    errors = ((y - expected) ** 2).reshape(pairs.shape).sum(axis=-2)
-    spread = np.einsum("...mk,...jkl,...ml->...jm", A, Pss, A)
-    n = there.sum(axis=(-2, -1))
-    noise = ((errors + spread) * there).sum(axis=(-2, -1)) / np.where(n > 0, n, np.nan)
-    missing = (w * w)[..., None] * ~there
-    unheard = np.einsum("...jm,...jkl,...ml->...km", missing, Pss, A)
+    y = np.where(np.repeat(valid, n_parts, axis=-2), y, expected)
+    P_s = Ps[..., :k, :k]
+    errors = ((y - expected) ** 2).reshape(samples.shape).sum(axis=-2)
+    variance = np.einsum("...mk,...jkl,...ml->...jm", A, P_s, A)
+    n = valid.sum(axis=(-2, -1))
+    noise = ((errors + variance) * valid).sum(axis=(-2, -1)) / np.where(n > 0, n, np.nan)
+    missing = (w * w)[..., None] * ~valid
     return FilteredInterval(
-        X, Ps[..., -1, :, :], y, w, kept, v, ar_kept,
+        X, Ps[..., -1, :, :], y, w, decay, v, ar_decay,
         np.einsum("...j,...jkl->...kl", w * w, Ps),
         np.einsum("...j,...jkl->...kl", v * v, Ps),
-        unheard,
-        noise * (2 / parts),
+        np.einsum("...jm,...jkl,...ml->...km", missing, P_s, A),
+        noise * (2 / n_parts),
     )  # fmt: skip
 
 
-def noise_now(s: SourceBelief, o: Settings) -> Float:
-    """Return the noise that the filter assumes, (..., 1, 1): inflated during acquisition."""
-    r = s.r
-    if o.r_start > 0:
-        r = np.maximum(r, o.r_start * s.power.mean(axis=-1) * np.exp(-s.n / o.tau))
-    half = s.x.shape[-2] / 2
-    return np.asarray(half * r[..., None, None])  # of real sources, half is in the other part
+def assumed_noise(belief: SourceBelief, settings: NoiseSettings) -> Float:
+    """Return r of one real part, (..., 1, 1), at least r_start exp(-n/τ) during acquisition."""
+    r = belief.r
+    if settings.r_start > 0:
+        least = settings.r_start * belief.power.mean(axis=-1)
+        r = np.maximum(r, least * np.exp(-belief.n / settings.tau))
+    half = belief.x.shape[-2] / 2  # of real sources, half of the noise is in the other part
+    return np.asarray(half * r[..., None, None])

@@ -1,181 +1,286 @@
-"""Snapshots in, intervals worked off: the loop of sec. 5 over a recording, or over many at once."""
+"""Trackers that process snapshots interval by interval, in one or many recordings."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+import time
+from abc import abstractmethod
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.manifolds.symmetric_line import ArrayManifold
 from arrivals.motion_models.autoregressive import AutoregressiveSources
-from arrivals.motion_models.companion_form import CompanionLayout, blocks
+from arrivals.motion_models.companion_form import CompanionLayout, companion_layout
 from arrivals.trackers.autoregressive.belief import (
-    Settings,
     SourceBelief,
-    beginning,
-    inside,
-    joined,
-    measured,
+    initialize_belief,
+    repeat_belief,
+    to_internal,
+    to_signals,
+    to_state_covariance,
+    to_state_vector,
 )
-from arrivals.trackers.autoregressive.history import History, closes
-from arrivals.trackers.autoregressive.initialization import acquired
-from arrivals.trackers.autoregressive.interval import interval
-from arrivals.trackers.autoregressive.interval_filter import filtered
-from arrivals.trackers.autoregressive.steady_state import transposed
+from arrivals.trackers.autoregressive.history import History
+from arrivals.trackers.autoregressive.initialization import acquire_directions, manifold_of
+from arrivals.trackers.autoregressive.settings import RegressionSettings
+from arrivals.trackers.autoregressive.snapshots import (
+    MISSING,
+    completes_interval,
+    to_real_rows,
+    to_snapshots,
+)
+from arrivals.trackers.base import Tracker
+from arrivals.trackers.run import Run
 from arrivals.typing import Complex, Float
+from arrivals.validation import covariance, positive, real, shaped
 
-ACQUISITION = 60  # snapshots that the first directions are looked for in
-NOTHING = complex(np.nan, np.nan)
+ACQUISITION = 60  # snapshots for the initial directions
 
 
-def wanted(s: SourceBelief | None, interval: int) -> int:
-    """Return the snapshots that are worked off next: an interval, or all that acquisition takes.
+def samples_needed(belief: SourceBelief | None, interval: int) -> int:
+    """Return the number of snapshots processed next: an interval, or those of acquisition.
 
     Examples
     --------
-    >>> wanted(None, 25)
+    >>> samples_needed(None, 25)
     75
     """
-    return interval * (1 if s is not None else -(-ACQUISITION // interval))
+    return interval * (1 if belief is not None else -(-ACQUISITION // interval))
 
 
-def frame(z: ArrayLike | None, n: int) -> Complex:
-    """Return one snapshot of n sensors as complex numbers, a copy; NaN if it is missing.
+class BlockProcessor(Tracker):
+    """Bookkeeping of intervals: pending snapshots, acquisition, runs and batches.
 
-    Examples
-    --------
-    >>> frame(None, 2), frame([1.0, 2j], 2)
-    (array([nan+nanj, nan+nanj]), array([1.+0.j, 0.+2.j]))
-    """
-    array = np.asarray(np.nan if z is None else z)
-    if array.dtype.kind not in "biufc":
-        raise TypeError(f"a snapshot must hold complex numbers; got {array.dtype}")
-    if array.ndim == 0 and np.isnan(array):
-        return np.full(n, NOTHING)
-    if array.shape != (n,):
-        raise ValueError(
-            f"a snapshot must have shape ({n},), one number a sensor; got {array.shape}"
-        )
-    return np.array(array, dtype=np.complex128)
-
-
-def frames(measurements: Iterable[ArrayLike | None], n: int) -> Complex:
-    """Return snapshots of n sensors as complex numbers, (n_steps, n)."""
-    if isinstance(measurements, np.ndarray) and measurements.shape[1:] == (n,):
-        if measurements.dtype.kind not in "biufc":
-            raise TypeError(f"snapshots must hold complex numbers; got {measurements.dtype}")
-        return measurements.astype(np.complex128)
-    return np.array([frame(z, n) for z in measurements], np.complex128).reshape(-1, n)
-
-
-@dataclass(frozen=True, eq=False)
-class BlockProcessor:
-    """The tracker's parameters, and what it does with snapshots.
+    A method defines `update_interval` and `filter_states`.
 
     Attributes
     ----------
-    motion : AutoregressiveSources
-    manifold : ArrayManifold
-    interval : int
-    doa : ndarray, shape (n_sources,), or None
-    options : Options
-    x, P : ndarray, shape (dim_x,), (dim_x, dim_x)
-        State to begin with, as trackers show it.
+    belief : SourceBelief or None
+        Belief after the last interval; None before acquisition.
+    snapshots : ndarray of complex, shape (n, n_sensors)
+        Buffer of the latest snapshots, as many as acquisition, or an interval, needs.
+    n_pending : int
+        How many of them came after the last interval.
     """
 
+    measurement: ArraySnapshot
     motion: AutoregressiveSources
-    manifold: ArrayManifold
+    doa: Sequence[float] | Float | None
     interval: int
-    doa: Float | None
-    options: Settings
-    x: Float
-    P: Float
+    gate: float
+    regression: RegressionSettings
 
-    def history(
-        self, s: SourceBelief | None, z: Complex, pending: int, open_end: bool = False
+    @abstractmethod
+    def update_interval(self, belief: SourceBelief, y: Float) -> tuple[SourceBelief, Float]:
+        """Return the belief after an interval of transformed snapshots, and the states."""
+
+    @abstractmethod
+    def filter_states(self, belief: SourceBelief, y: Float) -> Float:
+        """Return the states in transformed snapshots under the models of `belief`."""
+
+    def restart(self) -> None:
+        """Discard all data, and start again from `doa` and the models."""
+        n_sensors = self.measurement.array.n_sensors
+        self.x, self.P = np.zeros(self.motion.dim_x), self.motion.stationary_covariance()
+        self._known_x, self._known_P = self.x, self.P
+        no_rows = np.zeros((1, 0, n_sensors))
+        self.belief = None if self.doa is None else self.initial_belief(no_rows)
+        self.snapshots = np.full((samples_needed(self.belief, self.interval), n_sensors), MISSING)
+        self.n_pending = 0
+        self.signals = np.full((self.interval, self.motion.n_sources), MISSING)
+
+    def set_params(self, **params: Any) -> Self:
+        """Change parameters by name; keep the belief if it still fits, else start again."""
+        before = self._shapes()
+        super().set_params(**params)
+        if self._shapes() != before:
+            self.restart()
+        return self
+
+    def _shapes(self) -> tuple[Any, ...]:
+        """Return the parameters that define the shapes of the belief."""
+        motion = self.motion
+        return motion.orders, motion.real_valued, self.measurement.array.n_sensors, self.interval
+
+    @property
+    def manifold(self) -> ArrayManifold:
+        """Real response of the array."""
+        return manifold_of(self.measurement)
+
+    @property
+    def layout(self) -> CompanionLayout:
+        """Layout of the internal state, lag by lag."""
+        return companion_layout(self.motion.orders, lag_by_lag=True)
+
+    # Intervals
+
+    def append(self, snapshot: Complex) -> None:
+        """Add a snapshot, (n_sensors,), to the pending ones."""
+        self.snapshots = np.concatenate([self.snapshots[1:], snapshot[None]])
+        self.n_pending += 1
+
+    def process_if_full(self) -> None:
+        """Process the pending snapshots if they fill the next interval, or acquisition."""
+        if self.n_pending == samples_needed(self.belief, self.interval):
+            self._process(self._pending())
+
+    def _pending(self) -> Complex:
+        return self.snapshots[len(self.snapshots) - self.n_pending :]
+
+    def _process(self, z: Complex, open_end: bool = False) -> History:
+        """Process snapshots, (n_snapshots, n_sensors), pending ones in front; keep the rest."""
+        belief, done, history = self._process_intervals(self._present_belief(), z[None], open_end)
+        if belief is not None and history.has_intervals:
+            self.belief = belief
+            self.x = to_state_vector(belief.x[0], self.motion)
+            self.P = to_state_covariance(belief.P[0], self.motion)
+            self._known_x, self._known_P = self.x, self.P
+            self.signals = history.signals[-1][0]
+        self.n_pending = len(z) - done
+        past = np.full((len(self.snapshots) - self.n_pending, z.shape[1]), MISSING)
+        self.snapshots = np.concatenate([past, z[done:]])
+        return history
+
+    def _present_belief(self) -> SourceBelief | None:
+        """Return the present belief, with `x` and `P` if they were assigned."""
+        if self.belief is None or (self.x is self._known_x and self.P is self._known_P):
+            return self.belief
+        n = self.motion.dim_x
+        x, P = to_internal(shaped("x", self.x, n), covariance("P", self.P, n), self.motion)
+        return replace(self.belief, x=x[None], P=P[None])
+
+    def _process_intervals(
+        self, belief: SourceBelief | None, z: Complex, open_end: bool = False
     ) -> tuple[SourceBelief | None, int, History]:
-        """Work off snapshots, (n_sequences, n_snapshots, n_sensors).
+        """Process snapshots (n_sequences, n_snapshots, n_sensors), pending ones in front.
 
-        Parameters
-        ----------
-        s : Sources or None
-            What is believed of each sequence; None while nothing is.
-        z : ndarray
-            The first `pending` of them are known already.
-        pending : int
-        open_end : bool
-            Leave an interval at the end that its last snapshot does not close.
-
-        Returns
-        -------
-        s : Sources or None
-        done : int
-            Snapshots worked off.
-        history : History
+        With `open_end`, an interval at the end that its last snapshot does not complete is left
+        out. Returns the belief, the number of processed snapshots, and the history.
         """
-        history = History(z, pending, self.motion, self.options.gate > 0)
-        history.add(s, 0)
+        history = History(z, self.n_pending, self.motion, self.gate > 0)
+        history.add(belief, 0)
         done = 0
-        while (end := done + wanted(s, self.interval)) <= z.shape[1]:
-            if open_end and end == z.shape[1] and not closes(z[0, -1]):
+        while (end := done + samples_needed(belief, self.interval)) <= z.shape[1]:
+            if open_end and end == z.shape[1] and not completes_interval(z[0, -1]):
                 break
-            s, done = self._heard(s, z[:, done:end], end, history), end
-        return s, done, history
+            belief, done = self._process_block(belief, z[:, done:end], end, history), end
+        return belief, done, history
 
-    def _heard(
-        self, s: SourceBelief | None, z: Complex, end: int, history: History
+    def _process_block(
+        self, belief: SourceBelief | None, z: Complex, end: int, history: History
     ) -> SourceBelief | None:
-        """Work off the intervals that snapshots consist of, the first once they tell where."""
-        y = measured(z, self.manifold, self.motion.n_parts)
-        s = self.begun(y) if s is None else s
-        if s is None:
-            history.signals.append(self._nothing(z))
+        """Process a block of intervals; the first block once it contains usable data."""
+        y = self._rows(z)
+        belief = self.initial_belief(y) if belief is None else belief
+        if belief is None:
+            history.signals.append(self._no_signals(z))
             return None
         for part in np.split(y, z.shape[1] // self.interval, axis=1):
-            s, X = interval(s, part, self.manifold, self.places, self.options)
-            history.add(s, end)
-            history.signals.append(joined(X, self.motion.n_parts, self.motion.n_sources))
-        return s
+            belief, X = self.update_interval(belief, part)
+            history.add(belief, end)
+            history.signals.append(to_signals(X, self.motion.n_parts, self.motion.n_sources))
+        return belief
 
-    def provisional(self, s: SourceBelief | None, z: Complex) -> Complex:
-        """Return the signals in snapshots that are no interval yet."""
-        if s is None or z.shape[1] == 0:
-            return self._nothing(z)
-        y = measured(z, self.manifold, self.motion.n_parts)
-        A = transposed(self.manifold.real_steering(s.doa))
-        X = filtered(s, s, y, A, self.places, self.options).X
-        return joined(X, self.motion.n_parts, self.motion.n_sources)
+    def _provisional_signals(self, belief: SourceBelief | None, z: Complex) -> Complex:
+        """Return the signals in snapshots that do not fill an interval yet."""
+        if belief is None or z.shape[1] == 0:
+            return self._no_signals(z)
+        X = self.filter_states(belief, self._rows(z))
+        return to_signals(X, self.motion.n_parts, self.motion.n_sources)
 
-    def begun(self, y: Float) -> SourceBelief | None:
-        """Return the belief to start from: where `doa` says, or where measurements do."""
+    def _no_signals(self, z: Complex) -> Complex:
+        return np.full((*z.shape[:2], self.motion.n_sources), MISSING)
+
+    def _rows(self, z: Complex) -> Float:
+        return to_real_rows(z, self.manifold, self.motion.n_parts)
+
+    # Acquisition
+
+    def initial_belief(self, y: Float) -> SourceBelief | None:
+        """Return the belief at the start, with directions from `doa` or from the rows y."""
         n = len(y)
-        doa = None if self.doa is None else np.tile(self.doa, (n, 1))
-        if doa is None:
-            telling = self.telling(y)
-            if telling is None:
+        if self.doa is None:
+            usable = self.usable_rows(y)
+            if usable is None:
                 return None
-            doa = np.array([acquired(rows, self.motion, self.manifold) for rows in telling])
-        x, P = inside(self.x, self.P, self.motion)
+            doa = np.array([acquire_directions(r, self.motion, self.manifold) for r in usable])
+        else:
+            doa = np.tile(real("doa", self.doa), (n, 1))
+        x, P = to_internal(self.x, self.P, self.motion)
         x, P = (np.repeat(value[None], n, axis=0) for value in (x, P))
-        return beginning(doa, x, P, self.motion, self.manifold, self.options)
+        return initialize_belief(doa, x, P, self.motion, self.manifold, self.regression)
 
-    def telling(self, y: Float) -> list[Float] | None:
-        """Return the rows of each sequence to look for directions in; None if one has none.
+    def usable_rows(self, y: Float) -> list[Float] | None:
+        """Return the complete rows of each sequence; None if a sequence has no usable ones.
 
-        Where there is a gate, they must be louder than what it lets pass.
+        With a gate, their mean power must exceed it.
         """
         rows = [one[np.isfinite(one).all(axis=-1)] for one in y]
-        least = self.options.gate * self.motion.power.sum() / self.motion.n_parts
+        least = self.gate * self.motion.power.sum() / self.motion.n_parts
         if all(len(one) > 0 and np.mean(one**2) > least for one in rows):
             return rows
         return None
 
-    @property
-    def places(self) -> CompanionLayout:
-        """Where the lags stand in a state."""
-        return blocks(self.motion.orders, lag_by_lag=True)
+    # Runs
 
-    def _nothing(self, z: Complex) -> Complex:
-        return np.full((*z.shape[:2], self.motion.n_sources), NOTHING)
+    def run(self, measurements: Iterable[ArrayLike | None], dt: float = 1.0) -> Run:
+        """Track snapshots from the present state, interval by interval.
+
+        Parameters
+        ----------
+        measurements : array_like of complex, shape (n_steps, n_sensors), or any iterable
+        dt : float
+            Time between snapshots.
+
+        Returns
+        -------
+        Run
+            The numbers of `predict` and `update` for each snapshot. `run.signals` (n_steps,
+            n_sources) are the samples of the sources; those after the last full interval are
+            provisional: they belong to the present directions and models.
+        """
+        positive("dt", dt)
+        started = time.perf_counter()
+        snapshots = to_snapshots(measurements, self.measurement.array.n_sensors)
+        history = self._process(np.concatenate([self._pending(), snapshots]), open_end=True)
+        history.signals.append(self._provisional_signals(self.belief, self._pending()[None]))
+        return history.run(0, dt, time.perf_counter() - started)
+
+    def run_batch(
+        self, measurements: Iterable[Iterable[ArrayLike | None]], dt: float = 1.0
+    ) -> list[Run]:
+        """Track independent sequences at once, as one array program over the leading axis.
+
+        The tracker itself is not changed.
+
+        Parameters
+        ----------
+        measurements : array_like, shape (n_sequences, n_steps, n_sensors)
+            Sequences of different lengths are tracked one by one; so are all if one of them has
+            no data for the initial directions.
+        dt : float
+            Time between snapshots.
+
+        Returns
+        -------
+        list of Run
+        """
+        positive("dt", dt)
+        sequences = [to_snapshots(each, self.measurement.array.n_sensors) for each in measurements]
+        if len({len(z) for z in sequences}) != 1:
+            return super().run_batch(sequences, dt)
+        started = time.perf_counter()
+        z = np.array([np.concatenate([self._pending(), sequence]) for sequence in sequences])
+        belief = self._present_belief()
+        first = self._rows(z[:, : samples_needed(belief, self.interval)])
+        if belief is None and self.usable_rows(first) is None:
+            return super().run_batch(sequences, dt)
+        belief = None if belief is None else repeat_belief(belief, len(z))
+        belief, done, history = self._process_intervals(belief, z)
+        history.signals.append(self._provisional_signals(belief, z[:, done:]))
+        elapsed = (time.perf_counter() - started) / len(z)
+        return [history.run(n, dt, elapsed) for n in range(len(z))]

@@ -1,4 +1,4 @@
-"""Recursive least squares by QR decomposition: forgetting, ridge, many right-hand sides."""
+"""Recursive least squares by QR decomposition, with forgetting and a ridge."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ from arrivals.parameters import Configurable
 from arrivals.typing import Float
 from arrivals.validation import count, positive, real
 
-# Kernels. A factor [R | U] is triangular, (..., n_coef + n_rhs, n_coef + n_rhs): RᵀR is the Gram
-# matrix of the regressors, R⁻¹U the solution, and what stands below U the residuals.
+# A factor [R | U] is triangular, (..., n_coef + n_rhs, n_coef + n_rhs): RᵀR is the Gram matrix of
+# the regressors, R⁻¹U the solution, and the block below U the factor of the residuals.
 
 
-def folded(factor: Float, *rows: Float) -> Float:
-    """Return the triangular factor of a factor and more rows, (..., n, n).
+def append_rows(factor: Float, *rows: Float) -> Float:
+    """Return the triangular factor of a factor with more rows, (..., n, n).
 
     Examples
     --------
-    >>> np.abs(folded(np.zeros((1, 1)), np.array([[3.0], [4.0]]))).round(12)
+    >>> np.abs(append_rows(np.zeros((1, 1)), np.array([[3.0], [4.0]]))).round(12)
     array([[5.]])
     """
     stack = np.concatenate([factor, *rows], axis=-2)
     return np.asarray(np.linalg.qr(stack, mode="r"))
 
 
-def solution(factor: Float, n_coef: int) -> Float:
+def solve_factor(factor: Float, n_coef: int) -> Float:
     """Return W = R⁻¹U of a factor: (..., n_coef, n_rhs)."""
     R, U = factor[..., :n_coef, :n_coef], factor[..., :n_coef, n_coef:]
     return np.asarray(np.linalg.solve(R, U))
@@ -37,9 +37,9 @@ def ridge_rows(weight: ArrayLike, target: Float) -> Float:
     Parameters
     ----------
     weight : array_like, shape (..., n_coef)
-        One for each coefficient.
+        One number for each coefficient.
     target : ndarray, shape (..., n_coef, n_rhs)
-        What the solution is drawn to.
+        Solution without data.
     """
     n = target.shape[-2]
     eye = np.broadcast_to(np.eye(n), (*target.shape[:-1], n))
@@ -47,17 +47,17 @@ def ridge_rows(weight: ArrayLike, target: Float) -> Float:
     return np.asarray(root * np.concatenate([eye, target], axis=-1))
 
 
-def ages(heard: Float, forgetting: float) -> tuple[Float, Float]:
-    """Return √λ^age of samples (..., n) and λ^n, where only those heard (1, not 0) count.
+def forgetting_weights(valid: Float, forgetting: float) -> tuple[Float, Float]:
+    """Return √λ^age of samples (..., n) and λ^n, counting only valid samples (1, not 0).
 
     Examples
     --------
-    >>> ages(np.array([1.0, 0.0, 1.0]), 0.25)
+    >>> forgetting_weights(np.array([1.0, 0.0, 1.0]), 0.25)
     (array([0.5, 0. , 1. ]), array(0.0625))
     """
-    until = np.cumsum(heard, axis=-1)
+    until = np.cumsum(valid, axis=-1)
     n = until[..., -1:]
-    return heard * forgetting ** ((n - until) / 2), np.asarray(forgetting ** n[..., 0])
+    return valid * forgetting ** ((n - until) / 2), np.asarray(forgetting ** n[..., 0])
 
 
 def huber_weight(error: ArrayLike, threshold: float) -> Float:
@@ -73,29 +73,32 @@ def huber_weight(error: ArrayLike, threshold: float) -> Float:
 
 
 class QRDRLS(Configurable):
-    """Least squares over samples that come in time, the old ones forgotten bit by bit.
+    """Regularized recursive least squares with exponential forgetting, by QR decomposition.
 
-    Minimises Σ λ^age (y - xᵀW)² + μ |W - target|² for each right-hand side, all with the same
-    regressors. A block of samples gives what the samples give one after the other.
+    Minimizes Σ λ^age (y - xᵀW)² + μ |W - target|² for each right-hand side, all with the same
+    regressors. A block of samples gives the result of the samples one after the other.
 
     Parameters
     ----------
-    n_coef, n_rhs : int
-        Regressors, and right-hand sides.
+    n_coef : int
+        Number of regressors.
+    n_rhs : int
+        Number of right-hand sides.
     forgetting : float
-        λ per sample, in (0, 1].
+        λ, forgetting factor per sample, in (0, 1].
     ridge : float
-        μ; above 0, so that there is a solution from the start.
+        μ, weight of the target; above 0, so that there is a solution from the start.
     target : array_like, shape (..., n_coef, n_rhs), optional
-        Zero if None: the leaky form. A target assigned later is approached as the old one is
-        forgotten.
+        Solution without data. Zero if None: the leaky form. A target assigned later is approached
+        as the old one is forgotten.
     huber : float, optional
-        Error beyond which a sample counts less: the root of the mean square over its right-hand
-        sides, before the block that it comes in.
+        Error beyond which a sample has less weight: the root mean square over its right-hand
+        sides, with the solution before its block.
 
     Attributes
     ----------
     factor : ndarray, shape (..., n_coef + n_rhs, n_coef + n_rhs)
+        Triangular factor [R | U].
     weight : ndarray, shape (...)
         Σ λ^age of the samples.
 
@@ -106,10 +109,9 @@ class QRDRLS(Configurable):
 
     Notes
     -----
-    Leading axes are independent problems; they come with `target`, or with the first samples.
-    Of complex samples both parts are equations for the same real solution. Signs of the factor's
-    rows are arbitrary: compare
-    solutions.
+    Leading axes are independent problems; `target` or the first samples define them.
+    Both parts of complex samples are equations for the same real solution. Signs of the rows of
+    the factor are arbitrary: compare solutions.
 
     References
     ----------
@@ -141,6 +143,7 @@ class QRDRLS(Configurable):
         if huber is not None:
             positive("huber", huber)
         goal = self._goal()
+        # R = √μ I, U = √μ target   (3.1)
         first = ridge_rows(np.full(goal.shape[:-1], self.ridge), goal)
         below = np.zeros((*goal.shape[:-2], self.n_rhs, self.n_coef + self.n_rhs))
         self.factor = np.concatenate([first, below], axis=-2)
@@ -153,51 +156,59 @@ class QRDRLS(Configurable):
         weights: ArrayLike | None = None,
         extra_rows: ArrayLike | None = None,
     ) -> None:
-        """Take in samples in the order of time.
+        """Update the factor by a block of samples in the order of time.
 
         Parameters
         ----------
         X : array_like, shape (..., n_samples, n_coef)
             Regressors.
         Y : array_like, shape (..., n_samples, n_rhs)
+            Right-hand sides.
         weights : array_like, shape (..., n_samples), optional
-            Of the squared errors; 1 if None. A sample of weight 0 still takes its time.
+            Weights of the squared errors; 1 if None. A sample of weight 0 still ages the others.
         extra_rows : array_like, shape (..., n_rows, n_coef + n_rhs), optional
-            Rows [x | y] that are not samples, taken as they are, such as the Cholesky factor of
-            the regressors' error covariance.
+            Rows [x | y] that are not samples and do not age, such as the Cholesky factor of the
+            error covariance of the regressors.
+
+        Raises
+        ------
+        ValueError
+            If shapes do not fit or a weight is negative.
         """
-        parts = 2 if np.iscomplexobj(X) or np.iscomplexobj(Y) else 1
-        X, Y = self._rows("X", X, self.n_coef, parts), self._rows("Y", Y, self.n_rhs, parts)
+        n_parts = 2 if np.iscomplexobj(X) or np.iscomplexobj(Y) else 1
+        X, Y = self._rows("X", X, self.n_coef, n_parts), self._rows("Y", Y, self.n_rhs, n_parts)
         if X.shape[:-1] != Y.shape[:-1]:
             raise ValueError(f"X and Y must have as many samples; got {X.shape} and {Y.shape}")
-        n = X.shape[-2] // parts
-        w = np.ones(n) if weights is None else real("weights", weights)
-        if w.shape[-1:] != (n,) or not (w >= 0).all():
-            raise ValueError(f"weights must be {n} numbers, not negative; got {weights!r}")
-        w = np.repeat(w, parts, axis=-1)
-        if self.huber is not None:
-            error = np.sqrt(parts * ((Y - X @ self.solve()) ** 2).mean(axis=-1))
-            w = w * huber_weight(error, self.huber)
-        age = np.repeat(self.forgetting ** np.arange(n - 1, -1, -1.0), parts)
-        kept = self.forgetting**n
+        w, n = self._weights(weights, X, Y, n_parts), X.shape[-2] // n_parts
+        # [√λ^n [R | U]; √(w λ^age) [x | y]; √(μ (1 - λ^n)) [I | target]]   (3.2)
+        age = np.repeat(self.forgetting ** np.arange(n - 1, -1, -1.0), n_parts)
+        decay = self.forgetting**n
         data = np.sqrt(w * age)[..., None] * np.concatenate([X, Y], axis=-1)
         goal = np.broadcast_to(self._goal(), (*X.shape[:-2], self.n_coef, self.n_rhs))
-        rows = [data, ridge_rows(np.full(goal.shape[:-1], self.ridge * (1 - kept)), goal)]
+        rows = [data, ridge_rows(np.full(goal.shape[:-1], self.ridge * (1 - decay)), goal)]
         if extra_rows is not None:
             extra = self._rows("extra_rows", extra_rows, self.n_coef + self.n_rhs, 1)
             rows.append(np.broadcast_to(extra, (*X.shape[:-2], *extra.shape[-2:])))
         old = np.broadcast_to(self.factor, (*X.shape[:-2], *self.factor.shape[-2:]))
-        self.factor = folded(np.sqrt(kept) * old, *rows)
-        self.weight = kept * self.weight + (w * age).sum(axis=-1) / parts
+        self.factor = append_rows(np.sqrt(decay) * old, *rows)
+        self.weight = decay * self.weight + (w * age).sum(axis=-1) / n_parts
 
     def solve(self) -> Float:
-        """Return W, (..., n_coef, n_rhs)."""
-        return solution(self.factor, self.n_coef)
+        """Return the solution W = R⁻¹ U.
+
+        Returns
+        -------
+        ndarray, shape (..., n_coef, n_rhs)
+        """
+        return solve_factor(self.factor, self.n_coef)
 
     def residual_power(self) -> Float:
-        """Return the mean square of the errors, (..., n_rhs); NaN before there is a sample.
+        """Return the mean square of the errors, the penalty of the ridge included.
 
-        What the ridge costs is included.
+        Returns
+        -------
+        ndarray, shape (..., n_rhs)
+            NaN before the first sample.
         """
         below = self.factor[..., self.n_coef :, self.n_coef :]
         weight = np.where(self.weight > 0, self.weight, np.nan)
@@ -211,12 +222,24 @@ class QRDRLS(Configurable):
                              f"got {goal.shape}")  # fmt: skip
         return goal
 
-    def _rows(self, name: str, value: ArrayLike, n: int, parts: int) -> Float:
-        """Return samples as real rows, (..., parts n_samples, n): both parts of complex ones."""
+    def _weights(self, weights: ArrayLike | None, X: Float, Y: Float, n_parts: int) -> Float:
+        """Return the weights of the rows, (..., n_parts n_samples), with those of Huber."""
+        n = X.shape[-2] // n_parts
+        w = np.ones(n) if weights is None else real("weights", weights)
+        if w.shape[-1:] != (n,) or not (w >= 0).all():
+            raise ValueError(f"weights must be {n} numbers, not negative; got {weights!r}")
+        w = np.repeat(w, n_parts, axis=-1)
+        if self.huber is None:
+            return w
+        error = np.sqrt(n_parts * ((Y - X @ self.solve()) ** 2).mean(axis=-1))
+        return np.asarray(w * huber_weight(error, self.huber))
+
+    def _rows(self, name: str, value: ArrayLike, n: int, n_parts: int) -> Float:
+        """Return samples as real rows, (..., n_parts n_samples, n)."""
         array = np.asarray(value)
         if array.ndim < 2 or array.shape[-1] != n:
             raise ValueError(f"{name} must have shape (..., n_samples, {n}); got {array.shape}")
-        if parts == 1:
+        if n_parts == 1:
             return real(name, array)
         both = np.stack([array.real, array.imag], axis=-2)
         return real(name, both.reshape(*array.shape[:-2], -1, n))

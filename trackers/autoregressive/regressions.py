@@ -1,6 +1,6 @@
-"""The regressions of an interval: rows of the manifold (sec. 3) and AR models (sec. 4).
+"""Regressions of an interval: rows of the manifold (sec. 3) and AR models (sec. 4).
 
-Everything has leading batch axes; see `source_states`.
+All arrays have leading batch axes, as in `belief`.
 """
 
 from __future__ import annotations
@@ -9,117 +9,138 @@ import numpy as np
 
 from arrivals.measurement_models.manifolds.symmetric_line import ArrayManifold
 from arrivals.motion_models.companion_form import CompanionLayout, stabilised
-from arrivals.trackers.autoregressive.belief import Settings, SourceBelief
+from arrivals.trackers.autoregressive.belief import SourceBelief
 from arrivals.trackers.autoregressive.interval_filter import FilteredInterval
-from arrivals.trackers.autoregressive.qrd_rls import folded, ridge_rows, solution
-from arrivals.trackers.autoregressive.steady_state import transposed
+from arrivals.trackers.autoregressive.qrd_rls import append_rows, ridge_rows, solve_factor
+from arrivals.trackers.autoregressive.settings import RegressionSettings
+from arrivals.trackers.gaussian.linalg import transposed
 from arrivals.typing import Float
 
-FLOOR = 1e-4  # of a source's power: the least driving noise
+MIN_INNOVATION = 1e-4  # innovation variance over the power of the source
 TINY = np.finfo(np.float64).tiny
 
 
-def directions(
-    s: SourceBelief, heard: FilteredInterval, A: Float, manifold: ArrayManifold, o: Settings
+def estimate_directions(
+    belief: SourceBelief,
+    filtered: FilteredInterval,
+    A: Float,
+    manifold: ArrayManifold,
+    regression: RegressionSettings,
 ) -> tuple[Float, Float]:
-    """Return the factor of the manifold's rows, and the directions that they tell."""
-    k, parts, centre = A.shape[-1], s.x.shape[-2], manifold.centre
-    target = np.delete(transposed(A), centre, axis=-1)  # the row of ones stays what it is
-    w = np.repeat(heard.weights, parts, axis=-1)[..., None]
-    data = w * np.concatenate([heard.X[..., :k], np.delete(heard.y, centre, axis=-1)], axis=-1)
-    parts_of_stack = [np.sqrt(heard.kept)[..., None, None] * s.rows, data]
-    if o.correction:
-        parts_of_stack.append(covariance_rows(heard, k, centre))
-    ridge = o.ridge * (1 - heard.kept)[..., None] * s.power
-    factor = folded(*parts_of_stack, ridge_rows(ridge, target))[..., :k, :]
-    W = solution(factor, k)
+    """Return the factor of the regression for the rows of A_T, and the directions: (6), (7)."""
+    k, n_parts, centre = A.shape[-1], belief.x.shape[-2], manifold.centre
+    target = np.delete(transposed(A), centre, axis=-1)  # the row of ones is never estimated
+    # [√λ^N [R | U]; w_j [s_j | y_j]; [Lᵀ | 0]; √(μ (1 - λ^N)) [I | A_Tᵀ]]   (3.2)
+    w = np.repeat(filtered.weights, n_parts, axis=-1)[..., None]
+    y = np.delete(filtered.y, centre, axis=-1)
+    old = np.sqrt(filtered.decay)[..., None, None] * belief.manifold_factor
+    stack = [old, w * np.concatenate([filtered.X[..., :k], y], axis=-1)]
+    if regression.correction:
+        stack.append(covariance_rows(filtered, k, centre))
+    ridge = regression.ridge * (1 - filtered.decay)[..., None] * belief.power
+    factor = append_rows(*stack, ridge_rows(ridge, target))[..., :k, :]
+    # W = R⁻¹ U, φ_m = atan2(sin row, cos row), θ = arcsin(φ_m / 2π d_m)   (3.4), (7)
+    W = solve_factor(factor, k)
     M = manifold.n_pairs
     doa = manifold.doa(np.arctan2(W[..., M:], W[..., :M]))
-    return factor, cautious(s.doa, doa, float(manifold.distances[-1]))
+    return factor, limit_phase_step(belief.doa, doa, float(manifold.distances[-1]))
 
 
-def cautious(before: Float, after: Float, widest: float) -> Float:
-    """Keep sin β from moving by more than half a turn of the outermost pair's phase.
+def limit_phase_step(before: Float, after: Float, largest_distance: float) -> Float:
+    """Limit the change of sin θ to half a turn of the phase of the outermost pair.
 
-    More is a leap to where the outer pairs are ambiguous, as a poor start may suggest.
+    A larger change is a jump to an ambiguity of the outer pairs, which a poor start can cause.
     """
-    if widest <= 0.25:
+    if largest_distance <= 0.25:
         return after
-    u, most = np.sin(before), 0.5 / widest
-    return np.asarray(np.arcsin(np.clip(np.sin(after), u - most, u + most)))
+    u, limit = np.sin(before), 0.5 / largest_distance
+    return np.asarray(np.arcsin(np.clip(np.sin(after), u - limit, u + limit)))
 
 
-def covariance_rows(heard: FilteredInterval, k: int, centre: int) -> Float:
-    """Return the rows [Lᵀ | 0], L Lᵀ the samples' summed error covariance.
+def covariance_rows(filtered: FilteredInterval, k: int, centre: int) -> Float:
+    """Return the rows [Lᵀ | 0], L Lᵀ = Σ w² P_ss (3.3).
 
     They make the true directions a fixed point: the estimated samples are regressors with errors.
-    Where a sensor misses samples, the same errors are in what stands for its measurement.
+    Where a sensor misses samples, the same errors are in the expected values in their place.
     """
-    L = root(heard.cov[..., :k, :k])
-    rest = np.linalg.solve(L, np.delete(heard.unheard, centre, axis=-1))
-    return np.concatenate([transposed(L), rest], axis=-1)
+    L = cholesky_root(filtered.covariance[..., :k, :k])
+    missing = np.linalg.solve(L, np.delete(filtered.missing_covariance, centre, axis=-1))
+    return np.concatenate([transposed(L), missing], axis=-1)
 
 
-def root(C: Float) -> Float:
-    """Return a matrix L with L Lᵀ = C, made a little more than positive semidefinite."""
+def cholesky_root(C: Float) -> Float:
+    """Return a matrix L with L Lᵀ = C, for C made slightly more than positive semidefinite."""
     eye = np.eye(C.shape[-1])
     return np.asarray(np.linalg.cholesky(C * (1 + 1e-12 * eye) + TINY * eye))
 
 
-def autoregression(
-    s: SourceBelief,
-    now: SourceBelief,
-    heard: FilteredInterval,
-    blocks: CompanionLayout,
-    o: Settings,
+def estimate_ar_models(
+    belief: SourceBelief,
+    present: SourceBelief,
+    filtered: FilteredInterval,
+    layout: CompanionLayout,
+    regression: RegressionSettings,
 ) -> tuple[Float, Float, Float, Float]:
-    """Return factors and weight of the AR regressions, coefficients, and driving variances."""
-    p = blocks.used.shape[-1]
-    parts = s.x.shape[-2]
-    w = np.repeat(heard.ar_weights, parts, axis=-1)[..., None, None]
-    samples = lagged(s, heard.X, blocks, o.correction)
-    if not blocks.used.all():
-        samples = samples * present(blocks)
-    data = np.swapaxes(w * samples, -3, -2)
-    stack = [np.sqrt(heard.ar_kept)[..., None, None, None] * s.models, data]
-    if o.correction:
-        stack.append(transposed(root(lag_covariance(heard.ar_cov, blocks))))
-    ridge = o.ar_ridge * (1 - heard.ar_kept)[..., None, None] * s.power[..., None]
-    ridge = np.broadcast_to(ridge, now.a.shape)
-    models = folded(*stack, ridge_rows(ridge, now.a[..., None]))
-    weight = heard.ar_kept * s.weight + (heard.ar_weights**2).sum(axis=-1)
-    a = stabilised(solution(models, p)[..., 0])
-    if not o.adapt_drive:
-        return models, weight, a, now.q
-    q = models[..., -1, -1] ** 2 / np.maximum(weight, TINY)[..., None]
-    return models, weight, a, np.maximum(q, FLOOR * s.power)
+    """Return factors and weight of the AR regressions, coefficients, and innovation variances.
 
-
-def lagged(s: SourceBelief, X: Float, blocks: CompanionLayout, same: bool) -> Float:
-    """Return [s(j-1) ... s(j-p) | s(j)] of all sources, (..., rows, n_sources, p + 1).
-
-    All as believed after sample j; or, without the correction, the lags as before it.
+    Parameters
+    ----------
+    belief : SourceBelief
+        Before the interval.
+    present : SourceBelief
+        Its coefficients are the target of the regularization.
+    filtered : FilteredInterval
+    layout : CompanionLayout
+    regression : RegressionSettings
     """
-    if same:
-        return X[..., blocks.columns]
-    before = np.concatenate([s.x, X[..., : -s.x.shape[-2], :]], axis=-2)
-    lags, now = before[..., blocks.lags[:, :-1]], X[..., blocks.lags[:, :1]]
-    return np.concatenate([lags, now], axis=-1)
+    # [√λ_a^N [R | U]; w_j [s(j-1) ... s(j-p) | s(j)]; Lᵀ; √(μ_a (1 - λ_a^N)) [I | a]]   (4.1, 4.2)
+    w = np.repeat(filtered.ar_weights, belief.x.shape[-2], axis=-1)[..., None, None]
+    samples = regression_samples(belief, filtered.X, layout, regression.correction)
+    if not layout.used.all():
+        samples = samples * regression_mask(layout)
+    old = np.sqrt(filtered.ar_decay)[..., None, None, None] * belief.ar_factor
+    stack = [old, np.swapaxes(w * samples, -3, -2)]
+    if regression.correction:
+        covariance = regression_covariance(filtered.ar_covariance, layout)
+        stack.append(transposed(cholesky_root(covariance)))
+    ridge = regression.ar_ridge * (1 - filtered.ar_decay)[..., None, None] * belief.power[..., None]
+    ridge = np.broadcast_to(ridge, present.a.shape)
+    factor = append_rows(*stack, ridge_rows(ridge, present.a[..., None]))
+    weight = filtered.ar_decay * belief.ar_weight + (filtered.ar_weights**2).sum(axis=-1)
+    # a = R⁻¹ U, poles inside 0.995   (4.4);  q = ρ² / Σ w²   (4.3)
+    a = stabilised(solve_factor(factor, layout.used.shape[-1])[..., 0])
+    q = factor[..., -1, -1] ** 2 / np.maximum(weight, TINY)[..., None]
+    return factor, weight, a, np.maximum(q, MIN_INNOVATION * belief.power)
 
 
-def lag_covariance(P: Float, blocks: CompanionLayout) -> Float:
-    """Return the covariances of the columns of `lagged`, (..., n_sources, p + 1, p + 1).
+def regression_samples(
+    belief: SourceBelief, X: Float, layout: CompanionLayout, same_posterior: bool
+) -> Float:
+    """Return [s(j-1) ... s(j-p) | s(j)] of all sources, (..., n_rows, n_sources, p + 1).
 
-    A lag that a source does not have is 1 by itself.
+    All given sample j; or, without the correction, the lags given sample j - 1.
     """
-    C = P[..., blocks.columns[:, :, None], blocks.columns[:, None, :]]
-    if blocks.used.all():
+    if same_posterior:
+        return X[..., layout.regression_columns]
+    before = np.concatenate([belief.x, X[..., : -belief.x.shape[-2], :]], axis=-2)
+    lags, current = before[..., layout.lags[:, :-1]], X[..., layout.lags[:, :1]]
+    return np.concatenate([lags, current], axis=-1)
+
+
+def regression_covariance(P: Float, layout: CompanionLayout) -> Float:
+    """Return the covariances of `regression_samples`, (..., n_sources, p + 1, p + 1).
+
+    A lag beyond the order of a source has variance 1 and no correlation.
+    """
+    columns = layout.regression_columns
+    C = P[..., columns[:, :, None], columns[:, None, :]]
+    if layout.used.all():
         return C
-    there = present(blocks)
-    both = there[:, :, None] * there[:, None, :]
-    return np.asarray(C * both + np.eye(there.shape[-1]) * (1 - both))
+    mask = regression_mask(layout)
+    both = mask[:, :, None] * mask[:, None, :]
+    return np.asarray(C * both + np.eye(mask.shape[-1]) * (1 - both))
 
 
-def present(blocks: CompanionLayout) -> Float:
-    """Return 1 for the columns of `lagged` that a source has, 0 for others."""
-    return np.concatenate([blocks.used, np.ones((len(blocks.used), 1))], axis=-1)
+def regression_mask(layout: CompanionLayout) -> Float:
+    """Return 1 for the columns of `regression_samples` that a source has, 0 for others."""
+    return np.concatenate([layout.used, np.ones((len(layout.used), 1))], axis=-1)

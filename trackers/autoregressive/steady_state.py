@@ -1,97 +1,83 @@
-"""The Kalman filter over a block of samples whose models do not change in it.
+"""Kalman filter over a block of samples with constant models.
 
 The gain does not depend on the data: the Riccati recursion runs to its steady state, then all
-samples are filtered at once. All functions have leading batch axes. A measurement sees the first k
-entries of a state, y = A x[:k] + e, e ~ (0, r I).
+samples are filtered at once. All functions have leading batch axes.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
+from arrivals.trackers.gaussian.equations import predict_gaussian, update_leading
+from arrivals.trackers.gaussian.linalg import transposed
 from arrivals.typing import Bool, Float
 
-TOLERANCE = 1e-4  # of what the last step changed, where the gain counts as steady
-MOST_STEPS, STRIDE = 250, 5
+STEADY_TOLERANCE = 1e-4  # relative change of P per step below which the gain counts as steady
+MAX_STEPS, STRIDE = 250, 5  # steps of the Riccati recursion, and steps between two checks
 
 
-def transposed(A: Float) -> Float:
-    """Return Aᵀ of stacked matrices."""
-    return np.swapaxes(A, -1, -2)
+class StateSpace(NamedTuple):
+    """Linear model x' = F x + v, y = A x[:k] + e, with v ~ (0, Q) and e ~ (0, r I).
 
-
-def corrected(P: Float, A: Float, r: Float) -> tuple[Float, Float]:
-    """Return gain and covariance after a measurement.
-
-    Parameters
-    ----------
-    P : ndarray, shape (..., n, n)
-        Predicted covariance.
-    A : ndarray, shape (..., m, k)
-    r : ndarray, shape (..., 1, 1)
-
-    Notes
-    -----
-    Aᵀ (A P_ss Aᵀ + r I)⁻¹ = (r I + AᵀA P_ss)⁻¹ Aᵀ: only k x k matrices are factored.
+    Shapes: F, Q (..., n, n), A (..., m, k), r (..., 1, 1).
     """
-    m, k = A.shape[-2:]
-    seen, At = P[..., :k], transposed(A)
-    AtA = At @ A
-    inner = AtA @ seen[..., :k, :] + r * np.eye(k)
-    solved = np.linalg.solve(inner, np.concatenate([At, AtA], axis=-1))
-    P = P - seen @ solved[..., m:] @ transposed(seen)
-    return seen @ solved[..., :m], (P + transposed(P)) / 2
+
+    F: Float
+    Q: Float
+    A: Float
+    r: Float
 
 
-def steady_state(P: Float, F: Float, Q: Float, A: Float, r: Float) -> tuple[Float, Float]:
+def steady_state(P: Float, model: StateSpace) -> tuple[Float, Float]:
     """Return the steady gain K (..., n, m) and covariance P after a measurement (..., n, n).
 
     Parameters
     ----------
     P : ndarray, shape (..., n, n)
-        Where the recursion starts.
-    F, Q : ndarray, shape (..., n, n)
-    A : ndarray, shape (..., m, k)
-    r : ndarray, shape (..., 1, 1)
+        Start of the recursion.
+    model : StateSpace
 
     Examples
     --------
     >>> one = np.ones((1, 1))
-    >>> K, P = steady_state(one, one, one, one, one)
+    >>> K, P = steady_state(one, StateSpace(one, one, one, one))
     >>> K.round(4), P.round(4)
     (array([[0.618]]), array([[0.618]]))
     """
-    k, Ft = A.shape[-1], transposed(F)
+    F, Q, A, r = model
+    k = A.shape[-1]
     AtA = transposed(A) @ A
     R = r * np.eye(k)
-    done: Bool | None = None
-    for _ in range(MOST_STEPS // STRIDE):
+    finished: Bool | None = None
+    for _ in range(MAX_STEPS // STRIDE):
         new = P
         for _ in range(STRIDE):
-            old, new = new, F @ new @ Ft + Q
-            seen = new[..., :k]
-            gain = np.linalg.solve(AtA @ seen[..., :k, :] + R, AtA)
-            new = new - seen @ gain @ transposed(seen)
+            old, new = new, predict_gaussian(new, F, Q)
+            P_s = new[..., :k]
+            gain = np.linalg.solve(AtA @ P_s[..., :k, :] + R, AtA)
+            new = new - P_s @ gain @ transposed(P_s)
         change = np.abs(new - old).max(axis=(-1, -2), keepdims=True)
-        steady = np.asarray(change <= TOLERANCE * new.max(axis=(-1, -2), keepdims=True))
-        # a batch goes on until its last member is there; the others wait, as if they were alone
-        P = new if done is None else np.where(done, P, new)
-        done = steady if done is None else done | steady
-        if done.all():
+        steady = np.asarray(change <= STEADY_TOLERANCE * new.max(axis=(-1, -2), keepdims=True))
+        # finished members of a batch wait for the others, with the numbers of a single run
+        P = new if finished is None else np.where(finished, P, new)
+        finished = steady if finished is None else finished | steady
+        if finished.all():
             break
-    return corrected(F @ P @ Ft + Q, A, r)
+    return update_leading(predict_gaussian(P, F, Q), A, r)
 
 
-def fixed_gain(x: Float, Phi: Float, b: Float, parts: int = 1) -> Float:
-    """Return all x_j = Φ x_{j-1} + b_j, by doubling the step: log2 of the samples products.
+def fixed_gain(x: Float, Phi: Float, b: Float, n_parts: int = 1) -> Float:
+    """Return all x_j = Φ x_{j-1} + b_j by doubling: log2(n_samples) matrix products.
 
     Parameters
     ----------
-    x : ndarray, shape (..., parts, n)
-        x_0; `parts` series that share Φ.
+    x : ndarray, shape (..., n_parts, n)
+        x_0; `n_parts` series share Φ.
     Phi : ndarray, shape (..., n, n)
-    b : ndarray, shape (..., n_samples * parts, n)
-        Sample by sample, the parts of one beside each other.
+    b : ndarray, shape (..., n_samples * n_parts, n)
+        Sample by sample, the parts of one sample next to each other.
 
     Examples
     --------
@@ -100,8 +86,8 @@ def fixed_gain(x: Float, Phi: Float, b: Float, parts: int = 1) -> Float:
     """
     Phi = transposed(Phi)
     X = b.copy()
-    X[..., :parts, :] += x @ Phi
-    step = parts
+    X[..., :n_parts, :] += x @ Phi
+    step = n_parts
     while True:
         X[..., step:, :] += X[..., :-step, :] @ Phi
         step *= 2
@@ -110,56 +96,57 @@ def fixed_gain(x: Float, Phi: Float, b: Float, parts: int = 1) -> Float:
         Phi = Phi @ Phi
 
 
-def steady_filter(
-    x: Float, P: Float, y: Float, F: Float, Q: Float, A: Float, r: Float
-) -> tuple[Float, Float]:
+def steady_filter(x: Float, P: Float, y: Float, model: StateSpace) -> tuple[Float, Float]:
     """Return the states after each sample, at the steady gain, and their covariance.
 
     Parameters
     ----------
-    x : ndarray, shape (..., parts, n)
+    x : ndarray, shape (..., n_parts, n)
     P : ndarray, shape (..., n, n)
         Belief before the samples; of complex states, E|x - mean|².
-    y : ndarray, shape (..., n_samples * parts, m)
-        Real and imaginary part beside each other.
-    F, Q, A, r
-        As in `steady_state`.
+    y : ndarray, shape (..., n_samples * n_parts, m)
+        Real and imaginary part next to each other.
+    model : StateSpace
 
     Returns
     -------
-    X : ndarray, shape (..., n_samples * parts, n)
+    X : ndarray, shape (..., n_samples * n_parts, n)
     P : ndarray, shape (..., n, n)
     """
-    K, P = steady_state(P, F, Q, A, r)
-    Phi = F - K @ (A @ F[..., : A.shape[-1], :])  # (I - K H) F
+    F, _, A, _ = model
+    K, P = steady_state(P, model)
+    # x(j) = (I - K H) F x(j-1) + K y(j)
+    Phi = F - K @ (A @ F[..., : A.shape[-1], :])
     return fixed_gain(x, Phi, y @ transposed(K), x.shape[-2]), P
 
 
-def exact_filter(
-    x: Float, P: Float, y: Float, F: Float, Q: Float, A: Float, r: Float
-) -> tuple[Float, Float]:
+def exact_filter(x: Float, P: Float, y: Float, model: StateSpace) -> tuple[Float, Float]:
     """Return the states after each sample and the covariance of each; NaN in y is not used.
 
     Parameters
     ----------
-    As in `steady_filter`.
+    x, P, y, model
+        As in `steady_filter`.
 
     Returns
     -------
-    X : ndarray, shape (..., n_samples * parts, n)
+    X : ndarray, shape (..., n_samples * n_parts, n)
     P : ndarray, shape (..., n_samples, n, n)
     """
-    parts = x.shape[-2]
+    F, Q, A, r = model
+    n_parts, k = x.shape[-2], A.shape[-1]
     X = np.empty((*y.shape[:-1], x.shape[-1]))
-    Ps = np.empty((*y.shape[:-2], y.shape[-2] // parts, *P.shape[-2:]))
+    Ps = np.empty((*y.shape[:-2], y.shape[-2] // n_parts, *P.shape[-2:]))
     for j in range(Ps.shape[-3]):
-        here = slice(parts * j, parts * (j + 1))
-        heard = np.asarray(np.isfinite(y[..., here, :]).all(axis=-2))
-        seen = np.where(heard[..., None], A, 0.0)  # a row of zeros gets no gain
+        rows = slice(n_parts * j, n_parts * (j + 1))
+        valid = np.asarray(np.isfinite(y[..., rows, :]).all(axis=-2))
+        H = np.where(valid[..., None], A, 0.0)  # a row of zeros has no gain
+        # x = F x, P = F P F' + Q
         x = x @ transposed(F)
-        K, P = corrected(F @ P @ transposed(F) + Q, seen, r)
-        innovation = np.where(heard[..., None, :], y[..., here, :], 0.0)
-        innovation = innovation - x[..., : A.shape[-1]] @ transposed(seen)
+        K, P = update_leading(predict_gaussian(P, F, Q), H, r)
+        # x = x + K (y - H x)
+        innovation = np.where(valid[..., None, :], y[..., rows, :], 0.0)
+        innovation = innovation - x[..., :k] @ transposed(H)
         x = x + innovation @ transposed(K)
-        X[..., here, :], Ps[..., j, :, :] = x, P
+        X[..., rows, :], Ps[..., j, :, :] = x, P
     return X, Ps

@@ -16,11 +16,16 @@ from arrivals.files import atomic_write
 from arrivals.measurement_models import ArraySnapshot
 from arrivals.motion_models import AutoregressiveSources, yule_walker
 from arrivals.trackers import ARKalmanQRDRLS, Run
+from arrivals.trackers.autoregressive import NoiseSettings, RegressionSettings
 from arrivals.typing import Complex
 from arrivals.validation import count, positive
 
 # Sec. 5 and 7 of the specification: what speech wants, with its pauses
-FOR_SPEECH = {"ar_forgetting": 0.99, "ridge": 5.0, "gate": 0.3, "adapt_drive": False}
+FOR_SPEECH: dict[str, Any] = {
+    "gate": 0.3,
+    "regression": RegressionSettings(ar_forgetting=0.99, ridge=5.0),
+    "noise": NoiseSettings(adapt_process_noise=False),
+}
 ORDER = 2  # of the AR models that are started from
 QUIET = 0.01  # of the power of a recording: the noise that is started from
 
@@ -129,7 +134,9 @@ def separator(
     noisy, motion = for_recording(params, z, measurement, real_samples)
     plain = {name: value for name, value in params.items() if name in names and name != "motion"}
     tracker = ARKalmanQRDRLS(noisy, motion, **(FOR_SPEECH if real_samples else {}) | plain)
-    return tracker.set_params(**{name: params[name] for name in params if name not in names})
+    tracker.set_params(**{name: params[name] for name in params if name not in names})
+    tracker.restart()
+    return tracker
 
 
 def thinned(run: Run, every: int) -> Run:

@@ -1,10 +1,11 @@
-"""The tracker of the AR Kalman filter with QRD-RLS, for `test_conformance`."""
+"""Conformance cases of the AR Kalman filter with QRD-RLS."""
 
 import numpy as np
 
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.motion_models import AutoregressiveSources
 from arrivals.trackers import ARKalmanQRDRLS
+from arrivals.trackers.autoregressive import NoiseSettings, RegressionSettings
 from arrivals.trackers.conformance import MakeTracker, Measurements
 
 SNAPSHOT = ArraySnapshot(SensorArray.symmetric([0.25, 0.5]), wavelength=1.0, noise=0.1)
@@ -13,8 +14,8 @@ SPEECH = AutoregressiveSources([[0.9], [0.5]], real_valued=True).scaled(1.0)
 DOA = [-0.3, 0.5]
 
 
-def spoilt(motion: AutoregressiveSources, n_steps: int, seed: int = 0) -> Measurements:
-    """Two sources; one sensor fails once, and whole snapshots, once the last of an interval."""
+def with_gaps(motion: AutoregressiveSources, n_steps: int, seed: int = 0) -> Measurements:
+    """Draw two sources; a sample and whole snapshots are missing, once the last of an interval."""
     rng, x, s = np.random.default_rng(seed), np.zeros(motion.dim_x), []
     for _ in range(n_steps):
         x = motion.sample(x, rng)
@@ -27,20 +28,35 @@ def spoilt(motion: AutoregressiveSources, n_steps: int, seed: int = 0) -> Measur
 TRACKERS: list[tuple[str, MakeTracker, Measurements]] = [
     (
         "ar_kalman_qrd_rls",
-        lambda: ARKalmanQRDRLS(SNAPSHOT, RAGGED, doa=DOA, interval=3, r_start=0.3),
-        spoilt(RAGGED, 14),
-    ),
-    (
-        "ar_kalman_qrd_rls",
-        lambda: ARKalmanQRDRLS(SNAPSHOT, RAGGED, doa=DOA, interval=4, correction=False, inner=2),
-        spoilt(RAGGED, 13),
+        lambda: ARKalmanQRDRLS(
+            SNAPSHOT, RAGGED, doa=DOA, interval=3, noise=NoiseSettings(r_start=0.3)
+        ),
+        with_gaps(RAGGED, 14),
     ),
     (
         "ar_kalman_qrd_rls",
         lambda: ARKalmanQRDRLS(
-            SNAPSHOT, SPEECH, doa=DOA, interval=5, gate=0.3, ridge=5.0, adapt_drive=False
+            SNAPSHOT,
+            RAGGED,
+            doa=DOA,
+            interval=4,
+            inner=2,
+            regression=RegressionSettings(correction=False),
         ),
-        spoilt(SPEECH, 21),
+        with_gaps(RAGGED, 13),
     ),
-    ("ar_kalman_qrd_rls", lambda: ARKalmanQRDRLS(SNAPSHOT, interval=20), spoilt(RAGGED, 150)),
+    (
+        "ar_kalman_qrd_rls",
+        lambda: ARKalmanQRDRLS(
+            SNAPSHOT,
+            SPEECH,
+            doa=DOA,
+            interval=5,
+            gate=0.3,
+            regression=RegressionSettings(ridge=5.0),
+            noise=NoiseSettings(adapt_process_noise=False),
+        ),
+        with_gaps(SPEECH, 21),
+    ),
+    ("ar_kalman_qrd_rls", lambda: ARKalmanQRDRLS(SNAPSHOT, interval=20), with_gaps(RAGGED, 150)),
 ]

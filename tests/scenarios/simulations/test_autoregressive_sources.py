@@ -79,8 +79,8 @@ def test_speech_of_ones_own(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("scene", "offset", "params", "most"),
     [
-        (ThreeOnThree(n_intervals=130), 3.0, {"forgetting": 0.99}, 0.4),
-        (FourOnThree(n_intervals=130), 5.0, {"forgetting": 0.99}, 0.8),
+        (ThreeOnThree(n_intervals=130), 3.0, {"regression__forgetting": 0.99}, 0.4),
+        (FourOnThree(n_intervals=130), 5.0, {"regression__forgetting": 0.99}, 0.8),
     ],
 )
 def test_section_7_more_sources_than_a_subspace_method_can_tell(

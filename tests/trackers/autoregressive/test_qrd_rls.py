@@ -1,4 +1,4 @@
-"""Recursive least squares by QR, against least squares solved at once."""
+"""Recursive least squares by QR decomposition: equality with batch least squares."""
 
 from collections.abc import Callable
 
@@ -27,7 +27,7 @@ def scale(factor: Float) -> float:
 
 
 @given(st.floats(0.5, 1.0), st.floats(1e-3, 10.0), st.sampled_from([None, GOAL]))
-def test_block_is_ridge_least_squares_of_the_aged_samples(
+def test_block_update_equals_ridge_least_squares_with_weights(
     forgetting: float, mu: float, goal: Float | None
 ) -> None:
     rls = QRDRLS(3, 2, forgetting=forgetting, ridge=mu, target=goal)
@@ -38,7 +38,7 @@ def test_block_is_ridge_least_squares_of_the_aged_samples(
     np.testing.assert_allclose(rls.solve(), ridge(X, Y, age, mu, goal), rtol=1e-9, atol=1e-11)
 
 
-def test_block_is_sample_after_sample() -> None:
+def test_block_update_equals_sequential_updates() -> None:
     block, sequential = (QRDRLS(3, 2, forgetting=0.97, target=GOAL) for _ in range(2))
     block.update(X, Y)
     for x, y in zip(X, Y, strict=True):
@@ -49,7 +49,7 @@ def test_block_is_sample_after_sample() -> None:
     assert block.weight == pytest.approx(sequential.weight)
 
 
-def test_one_factor_for_many_right_hand_sides_is_one_for_each() -> None:
+def test_several_right_hand_sides_equal_separate_problems() -> None:
     both = QRDRLS(3, 2)
     both.update(X, Y)
     for m in range(2):
@@ -59,7 +59,7 @@ def test_one_factor_for_many_right_hand_sides_is_one_for_each() -> None:
         np.testing.assert_allclose(both.residual_power()[m], alone.residual_power()[0])
 
 
-def test_residual_power_is_the_mean_square_that_is_left() -> None:
+def test_residual_power_equals_mean_square_of_errors() -> None:
     rls = QRDRLS(3, 2, forgetting=1.0, ridge=1e-9)
     assert np.isnan(rls.residual_power()).all()
     rls.update(X, Y)
@@ -67,7 +67,7 @@ def test_residual_power_is_the_mean_square_that_is_left() -> None:
     np.testing.assert_allclose(rls.residual_power(), (left**2).mean(axis=0), rtol=1e-6)
 
 
-def test_covariance_rows_undo_the_bias_of_estimated_regressors() -> None:
+def test_covariance_rows_remove_the_bias_of_estimated_regressors() -> None:
     rng, n = np.random.default_rng(1), 100_000
     y = 2 * rng.standard_normal((n, 1)) + rng.standard_normal((n, 1))  # a = 2, s and e of power 1
     estimated, variance = 0.4 * y, 0.2  # E s given y
@@ -78,7 +78,7 @@ def test_covariance_rows_undo_the_bias_of_estimated_regressors() -> None:
     assert right.solve()[0, 0] == pytest.approx(2.0, abs=0.02)  # five standard errors
 
 
-def test_weights_and_huber_tame_outliers() -> None:
+def test_weights_and_huber_reduce_the_effect_of_outliers() -> None:
     wild = Y.copy()
     wild[5] += 100.0
     kept = np.ones(40)
@@ -95,7 +95,7 @@ def test_weights_and_huber_tame_outliers() -> None:
     assert np.abs(robust.solve() - W).max() < 0.2 < np.abs(plain.solve() - W).max()
 
 
-def test_batches_are_problems_of_their_own() -> None:
+def test_leading_axes_are_independent_problems() -> None:
     batch = QRDRLS(3, 2)
     batch.update(np.stack([X, 2 * X]), np.stack([Y, Y]))
     for n, factor in enumerate((1, 2)):
@@ -104,7 +104,7 @@ def test_batches_are_problems_of_their_own() -> None:
         np.testing.assert_allclose(batch.solve()[n], alone.solve(), atol=1e-14)
 
 
-def test_both_parts_of_complex_samples_are_equations_of_one_age() -> None:
+def test_complex_samples_are_two_equations_of_one_age() -> None:
     rls = QRDRLS(3, 2, forgetting=0.9)
     rls.update(X[:20] + 1j * X[20:], Y[:20] + 1j * Y[20:])
     age = np.repeat(0.9 ** np.arange(19, -1, -1.0), 2)
@@ -130,6 +130,6 @@ WRONG: list[tuple[Callable[[], object], str]] = [
 
 
 @pytest.mark.parametrize(("call", "message"), WRONG, ids=[w[1][:20] for w in WRONG])
-def test_bad_input_is_told(call: Callable[[], object], message: str) -> None:
+def test_invalid_input_raises_with_message(call: Callable[[], object], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         call()
