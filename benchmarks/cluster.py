@@ -1,6 +1,6 @@
-"""A study on a dask cluster of this machine: throughput of 1 and 2 workers, and one that is killed.
+"""Study on a local dask cluster: throughput of 1 and 2 workers, and with one worker killed.
 
-Scheduler and workers are started by their ordinary commands, as processes of their own. Needs
+Scheduler and workers are separate processes, started by their command lines. Needs
 arrivals[cluster].
 """
 
@@ -26,7 +26,7 @@ TRACKERS = ["cbf", "ssbl", "svalse"]
 
 @contextmanager
 def cluster(n_workers: int) -> Iterator[list[subprocess.Popen[bytes]]]:
-    """Start a scheduler and workers, and make them joblib's."""
+    """Start a scheduler and workers as the backend of joblib."""
     from distributed import Client
     from joblib import parallel_config
 
@@ -44,12 +44,12 @@ def cluster(n_workers: int) -> Iterator[list[subprocess.Popen[bytes]]]:
                 client.wait_for_workers(n_workers, timeout=60)
                 yield started[1:]
         finally:
-            for process in reversed(started):  # a worker without its scheduler may not stop
+            for process in reversed(started):  # workers before their scheduler
                 stop(process)
 
 
 def stop(process: subprocess.Popen[bytes]) -> None:
-    """End a process, by force if it must be."""
+    """Terminate a process, or kill it after 10 s."""
     process.terminate()
     try:
         process.wait(timeout=10)
@@ -59,7 +59,7 @@ def stop(process: subprocess.Popen[bytes]) -> None:
 
 
 def numbers(study: Study) -> list[tuple[Any, ...]]:
-    """Return the rows that the seed settles."""
+    """Return the reproducible rows."""
     return [row[:5] for row in study.rows() if row.metric != "cpu_ms"]
 
 
@@ -70,7 +70,7 @@ def main() -> None:
     runs = parser.parse_args().runs
     scenario = create("svalse_fig6")
     options: dict[str, Any] = {"metrics": ["gospa"], "batch": 1}
-    monte_carlo(scenario, TRACKERS, 2, **options)  # the imports
+    monte_carlo(scenario, TRACKERS, 2, **options)  # imports
     started = time.perf_counter()
     here = monte_carlo(scenario, TRACKERS, runs, **options)
     print("| where | runs a second | equal numbers |\n|---|---|---|")

@@ -18,12 +18,10 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 
 from arrivals.measurement_models import InterpolationDelay
-from arrivals.scenarios.reproduce.interpolation.figures import (
-    convergence,
-    moving,
-    rmse_study,
-    table1,
-)
+from arrivals.scenarios.reproduce.interpolation.convergence import convergence
+from arrivals.scenarios.reproduce.interpolation.moving_source import moving
+from arrivals.scenarios.reproduce.interpolation.rmse import rmse_study
+from arrivals.scenarios.reproduce.interpolation.table_1 import table1
 from arrivals.scenarios.reproduce.interpolation.trials import draws, filter_directions, rms, tracker
 from arrivals.scenarios.simulations.sampled_source import InterpolationTone
 from arrivals.trackers import InterpolationEKF

@@ -1,4 +1,4 @@
-"""Memory of `run` over 100 000 steps of 15 sensors: the result, and little beside it."""
+"""Memory of `run` over 100 000 steps of 15 sensors, and of its result."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from arrivals.typing import Complex
 
 
 def snapshots(model: ArraySnapshot, n_steps: int, gaps: bool) -> Iterator[Complex]:
-    """Give two sources, one step at a time, so that the input takes no memory.
+    """Yield snapshots of two sources one by one, so that the input takes no memory.
 
     With gaps, a random half of the sensors is missing from every other step.
     """
@@ -28,11 +28,11 @@ def snapshots(model: ArraySnapshot, n_steps: int, gaps: bool) -> Iterator[Comple
 
 
 def main() -> None:
-    """Print the peak of the process before and after."""
+    """Print the peak memory of the process before and after."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--steps", type=int, default=100_000)
     parser.add_argument("--trackers", nargs="+", default=["cbf", "svalse"])
-    parser.add_argument("--gaps", action="store_true", help="sensors come and go")
+    parser.add_argument("--gaps", action="store_true", help="missing sensors")
     parser.add_argument("--circle", action="store_true", help="32 sensors in place of the line")
     options = parser.parse_args()
     line, circle = SensorArray.ula(15, spacing=0.5), SensorArray.uca(32, radius=2.0)

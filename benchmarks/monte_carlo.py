@@ -1,4 +1,4 @@
-"""The runner of studies: its overhead, two processes beside one, and memory over many runs.
+"""The runner of studies: overhead, speed-up by a second process, memory over many runs.
 
 Limits: two processes at least 1.7 times one, overhead under 5 % of the trackers' time, memory flat.
 """
@@ -11,6 +11,8 @@ import subprocess
 import sys
 import tempfile
 import time
+
+from joblib import parallel_config
 
 from arrivals.scenarios import create, monte_carlo
 from arrivals.scenarios.simulations import SixSources
@@ -27,7 +29,7 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 
 def overhead(runs: int) -> None:
     """Print processor time of the runner beside that of the trackers."""
-    monte_carlo(SixSources(n_steps=2), TRACKERS, 1)  # the imports
+    monte_carlo(SixSources(n_steps=2), TRACKERS, 1)  # imports
     before = resource.getrusage(resource.RUSAGE_SELF).ru_utime
     study = monte_carlo("svalse_fig4", TRACKERS, runs)
     spent = resource.getrusage(resource.RUSAGE_SELF).ru_utime - before
@@ -41,17 +43,18 @@ def two_processes(runs: int) -> None:
     """Print the wall-clock time of one process and of two."""
     scenario, took = create("svalse_fig6"), {}
     for n_jobs in (1, 2):
-        monte_carlo(scenario, ["cbf"], 4, n_jobs=n_jobs, batch=1)  # the processes start
-        started = time.perf_counter()
-        monte_carlo(scenario, ["ssbl", "svalse"], runs, n_jobs=n_jobs, metrics=["gospa"])
-        took[n_jobs] = time.perf_counter() - started
+        with parallel_config(n_jobs=n_jobs):
+            monte_carlo(scenario, ["cbf"], 4, batch=1)  # starts the processes
+            started = time.perf_counter()
+            monte_carlo(scenario, ["ssbl", "svalse"], runs, metrics=["gospa"])
+            took[n_jobs] = time.perf_counter() - started
     ratio = took[1] / took[2]
     print(f"{runs} runs: one process {took[1]:.0f} s, two {took[2]:.0f} s, {ratio:.2f} times "
           f"(limit 1.7: {'pass' if ratio >= 1.7 else 'FAIL'})", flush=True)  # fmt: skip
 
 
 def memory() -> None:
-    """Print the most memory held by studies of few and of many runs."""
+    """Print the peak memory of studies of few and of many runs."""
     used = {}
     for runs in (100, 1000, 10_000):
         with tempfile.TemporaryDirectory() as folder:
@@ -64,7 +67,7 @@ def memory() -> None:
 
 
 def main() -> None:
-    """Print the three."""
+    """Print the three measurements."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=200)
     runs = parser.parse_args().runs

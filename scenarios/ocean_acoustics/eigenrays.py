@@ -1,4 +1,4 @@
-"""The rays that join a source and the sensors of an array: one for each path and crossing."""
+"""Eigenrays between a source and the sensors of an array."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from arrivals.validation import count, number, positive, real
 
 @dataclass(frozen=True, eq=False)
 class Eigenrays:
-    """Rays from a source to sensors, one entry of each array a ray.
+    """Rays from a source to sensors, one array element a ray.
 
     Parameters
     ----------
@@ -25,11 +25,11 @@ class Eigenrays:
     step, sensor : ndarray of int, shape (n_rays,)
         Index of the range and of the depth.
     doa : ndarray, shape (n_rays,)
-        Elevation at the sensor, rad, positive: from above.
+        Elevation at the sensor, rad, positive from above.
     time : ndarray, shape (n_rays,)
-        Of travel, s.
+        Travel time, s.
     pressure : ndarray, shape (n_rays,)
-        Complex, as `normal_modes.mode_field` has it.
+        Complex pressure, in the unit of `normal_modes.mode_field`.
     """
 
     path: NDArray[np.str_]
@@ -41,16 +41,16 @@ class Eigenrays:
 
     def field(self, n_steps: int, n_sensors: int) -> Complex:
         """Return the sum of all rays, (n_steps, n_sensors)."""
-        place = self.step * n_sensors + self.sensor
+        index = self.step * n_sensors + self.sensor
         re, im = (
-            np.bincount(place, part, n_steps * n_sensors)
+            np.bincount(index, part, n_steps * n_sensors)
             for part in (self.pressure.real, self.pressure.imag)
         )
         return np.asarray((re + 1j * im).reshape(n_steps, n_sensors))
 
 
 def path_names(n_bottom: int) -> list[str]:
-    """Return the paths with up to so many bounces off the bottom.
+    """Return the names of the paths with at most `n_bottom` bottom bounces.
 
     Examples
     --------
@@ -75,39 +75,41 @@ def eigenrays(
     n_rays: int = 4000,
     steepest: float = np.deg2rad(60.0),
 ) -> Eigenrays:
-    """Find the rays from a source to each depth and range, by a fan and interpolation.
+    """Compute the rays from a source to each depth and range, by a fan and interpolation.
 
     Parameters
     ----------
     guide : Waveguide
+        Sound-speed profile and layers.
     frequency : float
-        Hz.
+        Frequency, Hz.
     source_depth : float
-        In the water, m.
+        Depth of the source, in the water, m.
     depths : array_like, shape (n_sensors,)
-        In the water, m.
+        Depths of the sensors, in the water, m.
     ranges : array_like, shape (n_steps,)
-        m.
+        Horizontal distances, m.
     n_bottom : int
-        Bounces off the bottom at most.
+        Maximum number of bottom bounces.
     n_rays : int
-        Rays of the fan.
+        Number of rays in the fan.
     steepest : float
-        Grazing angle at the source up to which the fan goes, rad, below π/2.
+        Largest grazing angle of the fan at the source, rad, below π/2.
 
     Returns
     -------
     Eigenrays
+        Paths, angles, times and pressures.
 
     Raises
     ------
     ValueError
-        If a depth does not lie in the water, or a range is not positive.
+        If a depth is not in the water, or a range is not positive.
 
     Notes
     -----
-    The fan starts just beside the horizontal: a direct ray along it is not found. A ray near a
-    caustic has too high a level, as ray theory has it.
+    The fan excludes the horizontal: a direct ray along it is not computed. Ray theory
+    overestimates the level near a caustic.
 
     References
     ----------
@@ -116,11 +118,11 @@ def eigenrays(
 
     Examples
     --------
-    In water of one speed, rays come straight from the images of the source.
+    At constant sound speed, rays are straight lines from the images of the source.
 
     >>> guide = Waveguide([0.0, 100.0], [1500.0, 1500.0])
-    >>> found = eigenrays(guide, 100.0, 20.0, [60.0], [300.0], n_bottom=1)
-    >>> for path, doa, time in zip(found.path, np.rad2deg(found.doa), found.time):
+    >>> rays = eigenrays(guide, 100.0, 20.0, [60.0], [300.0], n_bottom=1)
+    >>> for path, doa, time in zip(rays.path, np.rad2deg(rays.doa), rays.time):
     ...     print(f"{path:3} {doa:6.2f} {time:.4f}", round(1500 * time * np.cos(np.deg2rad(doa))))
     D     7.59 0.2018 300
     S    14.93 0.2070 300
@@ -160,8 +162,8 @@ def _path(
 ) -> tuple[NDArray[Any], ...]:
     """Return path, step, sensor, doa, time and amplitude of the rays of one path."""
     (x_source, t_source), (x_sensor, t_sensor) = fan.at(source_depth), fan.at(depths)
-    x = _travelled(name, x_source, x_sensor, fan.whole_range)
-    t = _travelled(name, t_source, t_sensor, fan.whole_time)
+    x = _path_sum(name, x_source, x_sensor, fan.whole_range)
+    t = _path_sum(name, t_source, t_sensor, fan.whole_time)
     sensor, ray, step = _crossings(x, ranges)
     before, after = x[sensor, ray], x[sensor, ray + 1]
     r, weight = ranges[step], (ranges[step] - before) / (after - before)
@@ -177,18 +179,18 @@ def _path(
     sine = np.sqrt(np.maximum(1 - (np.cos(angle) * c / c_source) ** 2, 1e-9))  # Snell
     down = depths[sensor] > source_depth if name == "D" else name.endswith("S")
     doa = np.where(down, 1, -1) * np.arcsin(sine)
-    # a tube of rays keeps its power
+    # conservation of power in a ray tube
     spread = c / c_source * np.cos(angle) / (r * np.maximum(np.abs(slope), 1e-3) * sine)
-    bounced = _bounced(name, fan.turns_above[ray], fan.turns_below[ray], reflected, slope)
-    amplitude = np.sqrt(spread) / (4 * np.pi) * bounced
+    reflection = _reflection(name, fan.turns_above[ray], fan.turns_below[ray], reflected, slope)
+    amplitude = np.sqrt(spread) / (4 * np.pi) * reflection
     return np.full(len(step), name), step, sensor, doa, time, amplitude
 
 
-def _travelled(name: str, source: Float, sensor: Float, whole: Float) -> Float:
-    """Add up the legs of a path, (n_sensors, n_rays): to the first bounce, across, from the last.
+def _path_sum(name: str, source: Float, sensor: Float, whole: Float) -> Float:
+    """Sum range or time over the legs of a path, (n_sensors, n_rays).
 
-    `source` and `sensor` are what lies between the rays' upper end and these depths, `whole`
-    what lies between their ends.
+    `source` and `sensor` are the values from the upper end of the rays to these depths, `whole`
+    those between the ends. Legs: to the first bounce, between bounces, from the last bounce.
     """
     if name == "D":
         return np.abs(sensor - source)
@@ -197,12 +199,12 @@ def _travelled(name: str, source: Float, sensor: Float, whole: Float) -> Float:
     return first + (len(name) - 1) * whole + last
 
 
-def _bounced(name: str, above: Bool, below: Bool, floor: Complex, slope: Float) -> Complex:
-    """Return what bounces and a caustic do to the pressure of rays (n_rays,).
+def _reflection(name: str, above: Bool, below: Bool, floor: Complex, slope: Float) -> Complex:
+    """Return the factor of bounces and of a caustic on the pressure of rays (n_rays,).
 
-    The surface turns the sign. A ray that turns by itself, `above` or `below`, loses nothing.
-    Range falls with growing angle, or grows after an odd number of turning points, until the ray
-    touches a caustic, after which sound that turns as exp(+jωt) is ahead by π/2.
+    The surface reverses the sign. A turning point, `above` or `below`, has no loss. Range
+    decreases with the angle, or increases after an odd number of turning points, up to a
+    caustic, after which the phase leads by π/2 in the convention exp(+jωt).
     """
     n_surface, n_floor = name.count("S"), name.count("B")
     turned = n_surface * above + n_floor * below
@@ -213,12 +215,12 @@ def _bounced(name: str, above: Bool, below: Bool, floor: Complex, slope: Float) 
 
 
 def _crossings(x: Float, ranges: Float) -> tuple[Int, Int, Int]:
-    """Find where x (n_sensors, n_rays) passes a range between two neighbouring rays.
+    """Return the crossings of x (n_sensors, n_rays) with a range between neighbouring rays.
 
     Returns
     -------
-    sensor, ray, step : ndarray of int, shape (n_found,)
-        x[sensor, ray] and x[sensor, ray + 1] lie on either side of ranges[step].
+    sensor, ray, step : ndarray of int, shape (n_crossings,)
+        ranges[step] lies between x[sensor, ray] and x[sensor, ray + 1].
 
     Examples
     --------
@@ -226,9 +228,9 @@ def _crossings(x: Float, ranges: Float) -> tuple[Int, Int, Int]:
     (array([0, 0, 0]), array([0, 0, 3]), array([1, 0, 1]))
     """
     order = np.argsort(ranges)
-    place = np.searchsorted(ranges[order], x)
-    first = np.minimum(place[:, :-1], place[:, 1:])
-    n = np.abs(np.diff(place, axis=1))
+    rank = np.searchsorted(ranges[order], x)
+    first = np.minimum(rank[:, :-1], rank[:, 1:])
+    n = np.abs(np.diff(rank, axis=1))
     n[np.isnan(x[:, :-1]) | np.isnan(x[:, 1:])] = 0
     sensor, ray = np.nonzero(n)
     n, first = n[sensor, ray], first[sensor, ray]

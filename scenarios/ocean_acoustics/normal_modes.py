@@ -1,4 +1,4 @@
-"""The sound of a tone far from its source in shallow water, as a sum of normal modes."""
+"""Sound field of a tone in shallow water as a sum of normal modes."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ class Modes:
     Parameters
     ----------
     wavenumber : ndarray, shape (n_modes,)
-        Horizontal wavenumbers, 1/m, the largest real part first; a negative imaginary part is
-        loss, for sound that turns as exp(+jωt).
+        Horizontal wavenumbers, 1/m, sorted by descending real part; a negative imaginary part is
+        loss, for the time convention exp(+jωt).
     depth : ndarray, shape (n_depths,)
-        Grid, m, from the surface to the lowest end.
+        Grid, m, from the surface to the lower end.
     shape : ndarray, shape (n_modes, n_depths)
         Mode functions ψ, normalised so that ∫ ψ²/ρ dz = 1.
     """
@@ -32,10 +32,10 @@ class Modes:
     shape: Float
 
     def at(self, depth: ArrayLike) -> Float:
-        """Return the mode functions at depths (n,), m, of the waveguide: (n_modes, n)."""
-        depth, lowest = np.atleast_1d(real("depth", depth)), self.depth[-1]
-        if not ((depth >= 0) & (depth <= lowest)).all():
-            raise ValueError(f"depth must lie in [0, {lowest:g}] m; got {depth.tolist()}")
+        """Interpolate the mode functions at depths (n,), m: (n_modes, n)."""
+        depth, end = np.atleast_1d(real("depth", depth)), self.depth[-1]
+        if not ((depth >= 0) & (depth <= end)).all():
+            raise ValueError(f"depth must lie in [0, {end:g}] m; got {depth.tolist()}")
         right = np.clip(np.searchsorted(self.depth, depth), 1, len(self.depth) - 1)
         weight = (depth - self.depth[right - 1]) / (self.depth[right] - self.depth[right - 1])
         return np.asarray((1 - weight) * self.shape[:, right - 1] + weight * self.shape[:, right])
@@ -46,25 +46,27 @@ def modes(
 ) -> Modes:
     """Solve (ψ'/ρ)' + (ω²/c² - k²) ψ/ρ = 0 by finite differences.
 
-    ψ is 0 at the surface, and it or its slope at the lowest end. Each layer is divided into equal
-    cells, so that interfaces are nodes and ψ'/ρ passes them unbroken. Loss is added as a first
-    order perturbation: Im k = -∫ α ω/c ψ²/ρ dz / k.
+    ψ is 0 at the surface, and ψ or its slope is 0 at the lower end. Each layer is divided into
+    equal cells, so that interfaces are nodes and ψ'/ρ is continuous across them. Loss is a
+    first-order perturbation: Im k = -∫ α ω/c ψ²/ρ dz / k.
 
     Parameters
     ----------
     guide : Waveguide
+        Sound speeds and layers.
     frequency : float
-        Hz.
+        Frequency, Hz.
     step : float
-        Longest cell, m; a sixtieth of the wavelength is a good one.
+        Largest cell, m; choose about a sixtieth of the wavelength.
     steepest : float, optional
-        Phase speed, m/s, up to which modes are wanted; by default just below the highest speed of
-        a layer's top, so that the last layer carries no propagating mode, or all modes if there
-        are no layers.
+        Largest phase speed of the modes, m/s; by default just below the highest speed at the top
+        of a layer, which excludes modes that propagate in the last layer, or unlimited without
+        layers.
 
     Returns
     -------
     Modes
+        Wavenumbers and mode functions.
 
     Raises
     ------
@@ -81,8 +83,8 @@ def modes(
     The modes of ideal water have vertical wavenumbers (n - 1/2) π/depth over a rigid floor.
 
     >>> guide = Waveguide([0.0, 100.0], [1500.0, 1500.0], rigid=True)
-    >>> found = modes(guide, frequency=30.0)
-    >>> vertical = np.sqrt((2 * np.pi * 30 / 1500) ** 2 - found.wavenumber.real**2)
+    >>> k = modes(guide, frequency=30.0).wavenumber.real
+    >>> vertical = np.sqrt((2 * np.pi * 30 / 1500) ** 2 - k**2)
     >>> (vertical * 100 / np.pi).round(3)
     array([0.5, 1.5, 2.5, 3.5])
     """
@@ -91,34 +93,34 @@ def modes(
     omega = 2 * np.pi * positive("frequency", frequency)
     depth, density, loss = _cells(guide, positive("step", step))
     h = np.diff(depth)
-    k_water = omega / guide.speed([depth[:-1] + h / 4, depth[1:] - h / 4])  # of half cells
+    k_medium = omega / guide.speed([depth[:-1] + h / 4, depth[1:] - h / 4])  # of half cells
     mass = _nodes(h / density / 2)
     spring = 1 / (density * h)
-    diagonal = (_nodes(h / density / 2, k_water**2) - _nodes(spring)) / mass
-    off = spring / np.sqrt(mass[:-1] * mass[1:])
+    diagonal = (_nodes(h / density / 2, k_medium**2) - _nodes(spring)) / mass
+    off_diagonal = spring / np.sqrt(mass[:-1] * mass[1:])
     inner = slice(1, None if guide.rigid else -1)  # ψ = 0 at the other nodes
     fastest = _fastest(guide) if steepest is None else positive("steepest", steepest)
     k2, u = eigh_tridiagonal(
-        diagonal[inner], off[inner], select="v",
-        select_range=((omega / fastest) ** 2, k_water.max() ** 2),
+        diagonal[inner], off_diagonal[inner], select="v",
+        select_range=((omega / fastest) ** 2, k_medium.max() ** 2),
     )  # fmt: skip
     if len(k2) == 0:
         raise ValueError(f"no mode propagates at {frequency} Hz below {fastest} m/s")
     k = np.sqrt(k2[::-1])
     shape = np.zeros((len(k), len(depth)))
     shape[:, inner] = u.T[::-1] / np.sqrt(mass[inner])
-    alpha = _nodes(nepers(loss, frequency) * h / density / 2, k_water)
+    alpha = _nodes(nepers(loss, frequency) * h / density / 2, k_medium)
     return Modes(k - 1j * (shape**2 @ alpha) / k, depth, shape)
 
 
 def _fastest(guide: Waveguide) -> float:
-    """Return a phase speed that the lowest layer does not carry; infinite for bare water."""
+    """Return a phase speed evanescent in the lowest layer; infinite without layers."""
     tops = [layer.speed_top for layer in guide.layers]
     return 0.9995 * max(tops) if tops else np.inf
 
 
 def _cells(guide: Waveguide, step: float) -> tuple[Float, Float, Float]:
-    """Return the nodes (n + 1,), m, and density and attenuation of the cells (n,) between."""
+    """Return the nodes (n + 1,), m, and density and attenuation of the cells (n,)."""
     parts = [(0.0, guide.water_depth, 1.0, 0.0)]
     parts += [(b.top, b.bottom, b.density, b.attenuation) for b in guide.layers]
     counts = [int(np.ceil((bottom - top) / step - 1e-9)) for top, bottom, _, _ in parts]
@@ -131,33 +133,35 @@ def _cells(guide: Waveguide, step: float) -> tuple[Float, Float, Float]:
 
 
 def _nodes(cell: Float, factor: Float | None = None) -> Float:
-    """Add what the halves of the cells (n,) give to their nodes: (n + 1,).
+    """Sum the contributions of the half cells (n,) at the nodes: (n + 1,).
 
-    `factor` (2, n) weighs the upper and the lower half of each cell.
+    `factor` (2, n) weights the upper and the lower half of each cell.
     """
     upper, lower = (cell, cell) if factor is None else cell * factor
     return np.asarray(np.append(upper, 0.0) + np.insert(lower, 0, 0.0))
 
 
-def mode_field(found: Modes, source_depth: float, depths: ArrayLike, ranges: ArrayLike) -> Complex:
-    """Return the pressure of a source of one tone at an array.
+def mode_field(modes: Modes, source_depth: float, depths: ArrayLike, ranges: ArrayLike) -> Complex:
+    """Return the pressure of a tonal source at an array.
 
-    p = e^{-jπ/4}/√(8π) Σ ψ(z_s) ψ(z) e^{-j k r}/√(k r), whose unit is such that free space has
-    1/(4π) at 1 m. It holds some wavelengths away from the source.
+    p = e^{-jπ/4}/√(8π) Σ ψ(z_s) ψ(z) e^{-j k r}/√(k r), in a unit in which free space has 1/(4π)
+    at 1 m. Valid some wavelengths away from the source.
 
     Parameters
     ----------
-    found : Modes
+    modes : Modes
+        Modes of the waveguide at the tone's frequency.
     source_depth : float
-        In the water, m.
+        Depth of the source, in the water, m.
     depths : array_like, shape (n_sensors,)
-        In the water, m.
+        Depths of the sensors, in the water, m.
     ranges : array_like, shape (n_steps,)
         Horizontal distances, m.
 
     Returns
     -------
     ndarray, shape (n_steps, n_sensors)
+        Complex pressure.
 
     References
     ----------
@@ -172,7 +176,7 @@ def mode_field(found: Modes, source_depth: float, depths: ArrayLike, ranges: Arr
     ranges = real("ranges", ranges)
     if not (np.isfinite(ranges) & (ranges > 0)).all():
         raise ValueError(f"ranges must be finite and positive, m; got {ranges.tolist()}")
-    k = found.wavenumber
-    travel = np.exp(-1j * ranges[:, None] * k) / np.sqrt(ranges[:, None] * k.real)
-    p = (travel * found.at(source_depth)[:, 0]) @ found.at(depths)
-    return np.asarray(np.exp(-1j * np.pi / 4) / np.sqrt(8 * np.pi) * p)
+    k = modes.wavenumber
+    propagation = np.exp(-1j * ranges[:, None] * k) / np.sqrt(ranges[:, None] * k.real)
+    p = (propagation * modes.at(source_depth)[:, 0]) @ modes.at(depths)
+    return np.asarray(np.exp(-1j * np.pi / 4) / np.sqrt(8 * np.pi) * p)  # (5.14), conjugated

@@ -1,4 +1,4 @@
-"""Rays in layered water: how far and how long they travel from depth to depth."""
+"""Ray tracing in layered water: ranges and travel times between depths."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from arrivals.typing import Bool, Complex, Float
 
 @dataclass(frozen=True, eq=False)
 class Fan:
-    """Rays that leave a source, and how far they get from depth to depth.
+    """Fan of rays from a source, with ranges and travel times between depths.
 
-    A ray keeps its ray parameter a = cos θ/c (Snell). Where c reaches 1/a it turns; between its
-    upper and its lower end it goes down and up for ever.
+    The ray parameter a = cos θ/c is constant along a ray (Snell). A ray turns where c reaches
+    1/a, and cycles between its upper and its lower end.
 
     Parameters
     ----------
     angle : ndarray, shape (n_rays,)
-        Grazing angles at the source, rad; up or down makes no difference here.
+        Grazing angles at the source, rad, upward and downward alike.
     slowness : ndarray, shape (n_rays,)
         Ray parameters a, s/m.
     depth : ndarray, shape (n_nodes,)
-        Depths, m: those of the profile, of the source and of the receivers.
+        Depths of the profile, the source and the receivers, m.
     range, time : ndarray, shape (n_nodes, n_rays)
-        Horizontal distance, m, and time, s, from the upper end to each depth; NaN where the
-        ray does not come.
+        Horizontal distance, m, and time, s, from the upper end to each depth; NaN at depths that
+        the ray does not reach.
     whole_range, whole_time : ndarray, shape (n_rays,)
-        The same from the upper to the lower end.
+        Distance and time from the upper to the lower end.
     turns_above, turns_below : ndarray of bool, shape (n_rays,)
         Whether the upper end is a turning point, not the surface; the lower, not the floor.
     """
@@ -53,17 +53,23 @@ class Fan:
 
 
 def trace_rays(guide: Waveguide, angle: ArrayLike, source_depth: float, depths: ArrayLike) -> Fan:
-    """Trace rays through water whose speed is linear between the nodes.
+    """Trace rays through water with a sound speed linear between the nodes.
 
     Parameters
     ----------
     guide : Waveguide
+        Sound-speed profile.
     angle : array_like, shape (n_rays,)
         Grazing angles at the source, rad, in (0, π/2).
     source_depth : float
-        m.
+        Depth of the source, m.
     depths : array_like, shape (n_receivers,)
-        Of the receivers, m.
+        Depths of the receivers, m.
+
+    Returns
+    -------
+    Fan
+        Ranges and times at all depths.
 
     Examples
     --------
@@ -78,33 +84,33 @@ def trace_rays(guide: Waveguide, angle: ArrayLike, source_depth: float, depths: 
     source = int(np.searchsorted(depth, source_depth))
     a = np.cos(angle) / c[source]
     reached = _reached(c[:, None] * a < 1, source)
-    x, t = (_from_the_top(part) for part in _cells(np.diff(depth), c, a, reached))
-    nowhere = np.where(reached, 0.0, np.nan)
+    x, t = (_cumulative(part) for part in _cells(np.diff(depth), c, a, reached))
+    unreached = np.where(reached, 0.0, np.nan)
     ends = ~reached[0], ~reached[-1]
-    return Fan(angle, a, depth, x + nowhere, t + nowhere, x[-1], t[-1], *ends)
+    return Fan(angle, a, depth, x + unreached, t + unreached, x[-1], t[-1], *ends)
 
 
 def _reached(slow: Bool, source: int) -> Bool:
-    """Tell which nodes (n_nodes, n_rays) a ray reaches from the source through slow ones."""
+    """Return True for the nodes (n_nodes, n_rays) connected to the source by slow ones."""
     up = np.logical_and.accumulate(slow[source::-1], axis=0)[::-1]
     down = np.logical_and.accumulate(slow[source:], axis=0)
     return np.asarray(np.concatenate([up, down[1:]]))
 
 
 def _cells(h: Float, c: Float, a: Float, reached: Bool) -> tuple[Float, Float]:
-    """Return range and time (n_nodes - 1, n_rays) in the cells, zero where a ray does not come.
+    """Return range and time (n_nodes - 1, n_rays) in the cells, zero in cells that are not reached.
 
     With s = sin θ and a slope g of the speed, a ray advances by x = a h (c₀ + c₁)/(s₀ + s₁) in
-    the time (artanh s₀ - artanh s₁)/g = artanh(a g x/(1 - s₀s₁))/g. In the cell in which it
-    turns, at c = 1/a, it has the part of h up to there, and s = 0.
+    the time (artanh s₀ - artanh s₁)/g = artanh(a g x/(1 - s₀s₁))/g. In the cell of its turning
+    point, c = 1/a, only the part of h up to there counts, and s = 0.
     """
     g = (np.diff(c) / h)[:, None]
     c0, c1 = np.minimum(c[:-1, None], 1 / a), np.minimum(c[1:, None], 1 / a)
     s0, s1 = np.sqrt(1 - (a * c0) ** 2), np.sqrt(1 - (a * c1) ** 2)
     turning = reached[:-1] != reached[1:]
     height = np.where(turning, (c1 - c0) / np.where(turning, g, 1.0), h[:, None])
-    there = reached[:-1] | reached[1:]
-    x = np.where(there, a * height * (c0 + c1) / np.where(there, s0 + s1, 1.0), 0.0)
+    passed = reached[:-1] | reached[1:]
+    x = np.where(passed, a * height * (c0 + c1) / np.where(passed, s0 + s1, 1.0), 0.0)
     u = a * x / (1 - s0 * s1)
     return x, u * _artanhc(g * u)
 
@@ -122,29 +128,30 @@ def _artanhc(u: Float) -> Float:
     return np.where(small, 1 + u**2 / 3 + u**4 / 5, np.arctanh(v) / v)
 
 
-def _from_the_top(cells: Float) -> Float:
-    """Add up (n - 1, ...) cells to (n, ...) nodes."""
+def _cumulative(cells: Float) -> Float:
+    """Return the sums of (n - 1, ...) cells from the top to (n, ...) nodes."""
     return np.concatenate([np.zeros((1, *cells.shape[1:])), np.cumsum(cells, axis=0)])
 
 
 def floor_reflection(guide: Waveguide, frequency: float, slowness: ArrayLike) -> Complex:
     """Return the reflection coefficient of the sea floor for plane waves of ray parameters a.
 
-    Fluid layers, each with its mean speed; the lowest one goes on for ever at the speed of its top.
-    For sound that turns as exp(+jωt).
+    Fluid layers, each with its mean speed; the lowest is a half-space with the speed of its top.
+    Time convention exp(+jωt).
 
     Parameters
     ----------
     guide : Waveguide
+        Layers of the sea floor.
     frequency : float
-        Hz.
+        Frequency, Hz.
     slowness : array_like, shape (...)
         Ray parameters cos θ/c, s/m.
 
     Returns
     -------
     ndarray, shape (...)
-        Without layers -1, or 1 if the floor is rigid.
+        Complex coefficient; without layers -1, or 1 for a rigid floor.
 
     References
     ----------
@@ -168,7 +175,7 @@ def floor_reflection(guide: Waveguide, frequency: float, slowness: ArrayLike) ->
     # vertical wavenumbers; the root that decays downwards
     q = [np.conj(np.sqrt(np.conj(kn**2 - (omega * a) ** 2 + 0j))) for kn in k]
     R = np.zeros(a.shape, dtype=np.complex128)
-    for n in range(len(guide.layers), 0, -1):
+    for n in range(len(guide.layers), 0, -1):  # section 1.6.2, upwards
         r = (density[n] * q[n - 1] - density[n - 1] * q[n]) / (
             density[n] * q[n - 1] + density[n - 1] * q[n]
         )
@@ -180,17 +187,23 @@ def floor_reflection(guide: Waveguide, frequency: float, slowness: ArrayLike) ->
 def ray_line(
     guide: Waveguide, source_depth: float, depth: float, path: str, doa: float
 ) -> tuple[Float, Float]:
-    """Return a ray as a line to be drawn: distances from the source and depths, m, (n_points,).
+    """Return the polyline of a ray: distances from the source and depths, m, (n_points,).
 
     Parameters
     ----------
     guide : Waveguide
+        Sound-speed profile.
     source_depth, depth : float
-        Of the source and of the sensor, m.
+        Depths of the source and the sensor, m.
     path : str
-        Its bounces, B bottom, S surface, or turning points there; D for none.
+        Bounces: B bottom, S surface, or turning points there; D for none.
     doa : float
-        Its elevation at the sensor, rad.
+        Elevation at the sensor, rad.
+
+    Returns
+    -------
+    x, z : ndarray, shape (n_points,)
+        Distances and depths, m.
 
     Examples
     --------
@@ -202,8 +215,8 @@ def ray_line(
     c_source, c = np.interp([source_depth, depth], guide.depths, guide.speeds)
     angle = np.arccos(np.clip(c_source / c * np.cos(doa), -1, 1))
     fan = trace_rays(guide, [angle], source_depth, [depth])
-    there = ~np.isnan(fan.range[:, 0])
-    z, y = fan.depth[there], fan.range[there, 0]
+    reached = ~np.isnan(fan.range[:, 0])
+    z, y = fan.depth[reached], fan.range[reached, 0]
     if fan.turns_above[0]:  # between two nodes: drawn at the nearer one
         z, y = np.append(z[0], z), np.append(0.0, y)
     if fan.turns_below[0]:

@@ -1,4 +1,4 @@
-"""Water over layers of sea floor, the same at all ranges."""
+"""Range-independent waveguide: water over fluid layers of sea floor."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ NEPER_DB = 20 / np.log(10)
 
 @dataclass(frozen=True)
 class BottomLayer(FrozenModel):
-    """A fluid layer of the sea floor, its speed linear in depth.
+    """Fluid layer of the sea floor with a sound speed linear in depth.
 
     Parameters
     ----------
     top, bottom : float
-        Depths below the surface, m.
+        Depths of its ends below the surface, m.
     speed_top, speed_bottom : float
-        Sound speeds there, m/s.
+        Sound speeds at its ends, m/s.
     density : float
-        Relative to that of water.
+        Density relative to that of water.
     attenuation : float
-        dB per metre and kilohertz.
+        Attenuation, dB per metre and kilohertz.
     """
 
     top: float
@@ -48,23 +48,23 @@ class BottomLayer(FrozenModel):
 
 @dataclass(frozen=True, eq=False)
 class Waveguide(FrozenModel):
-    """Water whose sound speed changes with depth, a free surface, and layers of sea floor.
+    """Water with a sound-speed profile, a free surface, and layers of sea floor.
 
     Parameters
     ----------
     depths : array_like, shape (n,)
-        Where the sound speed of the water is known, m, from 0 to the sea floor, growing.
+        Depths of the profile, m, increasing from 0 to the sea floor.
     speeds : array_like, shape (n,)
-        Sound speeds there, m/s; linear in between.
+        Sound speeds at `depths`, m/s; linear in between.
     layers : sequence of BottomLayer
-        From the sea floor down, each where the one above ends; none: the water ends there.
+        Contiguous layers from the sea floor down; the waveguide ends at the floor if empty.
     rigid : bool
-        Whether the lowest end of all is rigid; free of pressure otherwise.
+        Whether the lower end is rigid; pressure release otherwise.
 
     Raises
     ------
     ValueError
-        If depths do not grow from 0, speeds are not positive, or layers leave a gap.
+        If depths do not increase from 0, speeds are not positive, or layers leave a gap.
 
     Examples
     --------
@@ -84,7 +84,9 @@ class Waveguide(FrozenModel):
             np.array(real("speeds", self.speeds)),
         )
         if depths.ndim != 1 or len(depths) < 2 or depths[0] != 0 or not (np.diff(depths) > 0).all():
-            raise ValueError(f"depths must be two or more, growing from 0; got {depths.tolist()}")
+            raise ValueError(
+                f"depths must be two or more, increasing from 0; got {depths.tolist()}"
+            )
         if speeds.shape != depths.shape or not (np.isfinite(speeds) & (speeds > 0)).all():
             raise ValueError(
                 f"speeds must be {len(depths)} positive numbers; got {speeds.tolist()}"
@@ -92,7 +94,7 @@ class Waveguide(FrozenModel):
         above = depths[-1]
         for layer in self.layers:
             if instance("layers", layer, BottomLayer).top != above:
-                raise ValueError(f"a layer must start at {above} m; got {layer.top} m")
+                raise ValueError(f"top of a layer must be {above} m; got {layer.top} m")
             above = layer.bottom
         for array in (depths, speeds):
             array.setflags(write=False)
@@ -111,7 +113,7 @@ class Waveguide(FrozenModel):
         return self.layers[-1].bottom if self.layers else self.water_depth
 
     def speed(self, depth: ArrayLike) -> Float:
-        """Return the sound speed, m/s, at depths (...), m; that of the upper part at an interface.
+        """Return the sound speed, m/s, at depths (...), m; above the interface where two meet.
 
         Raises
         ------
@@ -128,7 +130,7 @@ class Waveguide(FrozenModel):
         return np.asarray(speed)
 
     def in_water(self, name: str, depth: ArrayLike) -> Float:
-        """Return depths, m, that must lie in the water.
+        """Return depths, m, after checking that they are in the water.
 
         Examples
         --------
@@ -146,7 +148,7 @@ class Waveguide(FrozenModel):
 
 
 def nepers(attenuation: ArrayLike, frequency: float) -> Float:
-    """Return attenuations, dB per metre and kilohertz, as nepers per metre at a frequency, Hz.
+    """Convert attenuations from dB per metre and kilohertz to nepers per metre at a frequency, Hz.
 
     Examples
     --------

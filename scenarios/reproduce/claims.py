@@ -1,10 +1,10 @@
-"""One line on a claim: whether our numbers bear it out."""
+"""Verdicts on the claims of a paper: one line each."""
 
 from __future__ import annotations
 
 
 def verdict(claim: str, fact: bool | None, numbers: str) -> str:
-    """Return a line on a claim; None is for what the runs do not decide.
+    """Return the line of a claim: it holds, does not hold, or is not decided (None).
 
     Examples
     --------
@@ -16,7 +16,7 @@ def verdict(claim: str, fact: bool | None, numbers: str) -> str:
 
 
 def negative(mean: float, error: float) -> bool | None:
-    """Tell whether a mean is below zero, None if it is within two standard errors of it.
+    """Return True if a mean is below zero, None if it is within two standard errors of zero.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The papers' tables and figures again: our numbers beside theirs, as CSV, pictures and a page."""
+"""Studies that reproduce the papers' tables and figures: CSV, figures and a page each."""
 
 from __future__ import annotations
 
@@ -21,28 +21,29 @@ from arrivals.validation import count, one_of
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-QUICK = 10  # runs of a study that is only looked at
+PACKAGE = "arrivals.scenarios.reproduce"
+QUICK = 10  # runs of a quick study
 
-# Where each study lives: a function of the number of runs and the seed, and if it likes of `out`, a
-# folder for its runs, and of `quick`. A new one gets its line.
+# Function of each study: takes the number of runs and the seed, and optionally `out`, a folder for
+# its runs, and `quick`.
 STUDIES: dict[str, str] = {
-    "any-array": "arrivals.scenarios.reproduce.svalse.any_array:any_array",
-    "ar-kf": "arrivals.scenarios.reproduce.ar_kalman:ar_kf",
-    "interpolation-table1": "arrivals.scenarios.reproduce.interpolation.figures:table1",
-    "interpolation-convergence": "arrivals.scenarios.reproduce.interpolation.figures:convergence",
-    "interpolation-rmse": "arrivals.scenarios.reproduce.interpolation.figures:rmse_study",
-    "interpolation-moving": "arrivals.scenarios.reproduce.interpolation.figures:moving",
-    "rss": "arrivals.scenarios.reproduce.rss.table_1:table1",
-    "svalse-fig4": "arrivals.scenarios.reproduce.svalse.figures_4_to_7:fig4",
-    "svalse-fig5": "arrivals.scenarios.reproduce.svalse.figures_4_to_7:fig5",
-    "svalse-fig6": "arrivals.scenarios.reproduce.svalse.figures_4_to_7:fig6",
-    "svalse-fig7": "arrivals.scenarios.reproduce.svalse.figures_4_to_7:fig7",
-    "svalse-fig8": "arrivals.scenarios.reproduce.svalse.figures_8_to_10:fig8",
-    "svalse-fig9": "arrivals.scenarios.reproduce.svalse.figures_8_to_10:fig9",
-    "svalse-fig10": "arrivals.scenarios.reproduce.svalse.figures_8_to_10:fig10",
-    "swellex96": "arrivals.scenarios.reproduce.swellex96.figures_11_12:swellex96",
+    "any-array": f"{PACKAGE}.svalse.any_array:any_array",
+    "ar-kf": f"{PACKAGE}.ar_kalman:ar_kf",
+    "interpolation-table1": f"{PACKAGE}.interpolation.table_1:table1",
+    "interpolation-convergence": f"{PACKAGE}.interpolation.convergence:convergence",
+    "interpolation-rmse": f"{PACKAGE}.interpolation.rmse:rmse_study",
+    "interpolation-moving": f"{PACKAGE}.interpolation.moving_source:moving",
+    "rss": f"{PACKAGE}.rss.table_1:table1",
+    "svalse-fig4": f"{PACKAGE}.svalse.figures_4_to_7:fig4",
+    "svalse-fig5": f"{PACKAGE}.svalse.figures_4_to_7:fig5",
+    "svalse-fig6": f"{PACKAGE}.svalse.figures_4_to_7:fig6",
+    "svalse-fig7": f"{PACKAGE}.svalse.figures_4_to_7:fig7",
+    "svalse-fig8": f"{PACKAGE}.svalse.figures_8_to_10:fig8",
+    "svalse-fig9": f"{PACKAGE}.svalse.figures_8_to_10:fig9",
+    "svalse-fig10": f"{PACKAGE}.svalse.figures_8_to_10:fig10",
+    "swellex96": f"{PACKAGE}.swellex96.figures_11_12:swellex96",
 }
-# Runs of a study that wants others than 100, and QUICK if it is only looked at.
+# Runs of studies with numbers other than 100, and QUICK in a quick study
 RUNS: dict[str, tuple[int, int]] = {
     "any-array": (20, 3),
     "ar-kf": (100, 4),
@@ -59,19 +60,20 @@ RUNS: dict[str, tuple[int, int]] = {
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """What a study found.
+    """Results of a study.
 
     Parameters
     ----------
     title : str
+        Heading of the page.
     columns : sequence of str
         Names of the table's columns.
     rows : sequence of tuple
-        Its rows: text and numbers, NaN where there is none.
+        Rows of the table: text and numbers, NaN for missing ones.
     remarks : sequence of str
-        What could not be reproduced, and why; how to read the table.
+        Paragraphs below the table: its columns, and the claims with their verdicts.
     figures : mapping of str to Figure
-        Pictures by name.
+        Figures by name.
     """
 
     title: str
@@ -88,7 +90,7 @@ class Report:
             writer.writerows(text(row) for row in self.rows)
 
     def markdown(self, pictures: Sequence[str] = ()) -> str:
-        """Return the page: title, table, remarks and pictures.
+        """Return the page: title, table, remarks and figures.
 
         Examples
         --------
@@ -127,36 +129,37 @@ def reproduce(
     jobs: int = 1,
     page: str | Path | None = None,
 ) -> list[Path]:
-    """Run a study, and write NAME.csv, its pictures as NAME-*.png, and NAME.md.
+    """Run a study, and write NAME.csv, its figures as NAME-*.png, and NAME.md.
 
     Parameters
     ----------
     name : str
         One of `STUDIES`, or "all".
     out : path
-        Folder; it is made if it is not there. Studies of many runs keep theirs in its folder
-        "runs", and go on from there if they were stopped; "all" runs no study again whose page is
-        there, of the same runs, seed and code.
+        Folder; created if missing. Monte Carlo studies keep their runs in its folder "runs" and
+        resume from there; "all" skips studies with a page of the same runs, seed and code.
     runs : int, optional
-        Trials of each case; if None what `RUNS` says, else 100, or 10 if `quick`.
+        Trials of each case; `RUNS` or 100 if None, 10 if `quick`.
     seed : int
+        Seed of all trials.
     quick : bool
+        Few trials, without the slowest methods.
     jobs : int
-        Processes to use, -1 for one a core; the numbers are the same with any.
+        Number of processes, -1 for one a core; the results do not depend on it.
     page : path, optional
-        Where to write the tables of all studies on one page; OUT/results.md for "all" if None.
+        Page with the tables of all studies; OUT/results.md for "all" if None.
 
     Returns
     -------
     list of Path
-        What was written.
+        Files written.
 
     Raises
     ------
     ValueError
-        If there is no such study.
+        If the study is unknown.
     OSError
-        If something cannot be written, or a process died; what was finished stays.
+        If a file cannot be written, or a process was killed; finished runs are kept.
 
     Examples
     --------
@@ -170,11 +173,11 @@ def reproduce(
     if runs is not None:
         count("runs", runs, least=min(2, _runs(name, quick=True)))
     count("seed", seed, least=0)
-    if page is not None:  # known before hours of work
+    if page is not None:  # checked before hours of computation
         if not Path(page).parent.is_dir():
             raise FileNotFoundError(2, "the folder does not exist", str(Path(page).parent))
         if Path(page).is_dir():
-            raise IsADirectoryError(21, "page must be a file; this is a folder", str(page))
+            raise IsADirectoryError(21, "page must be a file; got a folder", str(page))
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     names, written = tuple(STUDIES) if name == "all" else (name,), []
@@ -196,21 +199,21 @@ def reproduce(
 
 
 def _shown(path: Path) -> str:
-    """Return a path as a page may show it: of one that only this machine has, the name."""
+    """Return a path for a page: an absolute path is reduced to its name."""
     return path.name if path.is_absolute() else path.as_posix()
 
 
 def _is_done(name: str, folder: Path, stamp: Mapping[str, Any]) -> bool:
-    """Tell whether the study's page is there, of the same runs and code, and what it shows."""
+    """Return True if the page of a study with this stamp exists, and all its files."""
     page = folder / f"{name}.md"
     return read_stamp(page) == stamp and all(path.exists() for path in _files(name, folder))
 
 
 def _files(name: str, folder: Path) -> list[Path]:
-    """Return what a study has written: table, page, and the pictures that the page shows."""
+    """Return the files of a study: table, page, and the figures of the page."""
     lines = (folder / f"{name}.md").read_text(encoding="utf-8").splitlines()
-    pictures = [line[2:].partition("]")[0] for line in lines if line.startswith("![")]
-    return [folder / part for part in (f"{name}.csv", f"{name}.md", *pictures)]
+    figures = [line[2:].partition("]")[0] for line in lines if line.startswith("![")]
+    return [folder / part for part in (f"{name}.csv", f"{name}.md", *figures)]
 
 
 def _runs(name: str, quick: bool) -> int:
@@ -222,41 +225,41 @@ def _report(name: str, folder: Path, runs: int, seed: int, jobs: int, quick: boo
 
     module, _, function = STUDIES[name].partition(":")
     study: Callable[..., Report] = getattr(importlib.import_module(module), function)
-    offered = {"out": folder / "runs", "quick": quick}
-    asked = inspect.signature(study).parameters
+    options = {"out": folder / "runs", "quick": quick}
+    accepted = inspect.signature(study).parameters
     with parallel_config(n_jobs=jobs):
-        return study(runs, seed, **{name: offered[name] for name in offered if name in asked})
+        return study(runs, seed, **{key: options[key] for key in options if key in accepted})
 
 
 def _write(name: str, report: Report, folder: Path, stamp: Mapping[str, Any]) -> None:
-    """Write a report's table, pictures and page; each picture says where it comes from."""
+    """Write a report's table, figures with their origin, and page."""
     report.to_csv(folder / f"{name}.csv")
-    pictures = [f"{name}-{key}.png" for key in report.figures]
+    files = [f"{name}-{key}.png" for key in report.figures]
     runs = f"{stamp['runs']} run{'s' * (stamp['runs'] != 1)}"
     origin = f"{name}, seed {stamp['seed']}, {runs} · arrivals {stamp['version']}"
-    for picture, figure in zip(pictures, report.figures.values(), strict=True):
-        told = f"{report.title} · {origin}"
-        figure.supxlabel(told, x=0.995, ha="right", fontsize=6, color="0.4")
-        with atomic_write(folder / picture, binary=True) as file:
+    for path, figure in zip(files, report.figures.values(), strict=True):
+        label = f"{report.title} · {origin}"
+        figure.supxlabel(label, x=0.995, ha="right", fontsize=6, color="0.4")
+        with atomic_write(folder / path, binary=True) as file:
             figure.savefig(file, format="png", dpi=130)
     with atomic_write(folder / f"{name}.md") as file:
-        file.write(add_stamp(report.markdown(pictures), stamp))
+        file.write(add_stamp(report.markdown(files), stamp))
 
 
 def add_reproduce(commands: Any) -> None:
     """Add `arrivals reproduce` to the subparsers of the command line."""
     add = commands.add_parser(
         "reproduce",
-        help="run a paper's experiment again: table, pictures, our numbers beside the paper's",
-        description="Run a paper's experiment again. Writes NAME.csv, NAME.md and pictures.",
+        help="reproduce an experiment of a paper: table, figures, our numbers beside the paper's",
+        description="Reproduce an experiment of a paper. Writes NAME.csv, NAME.md and figures.",
         allow_abbrev=False,
     )
     add.add_argument("name", metavar="NAME", help=f"all, {', '.join(STUDIES)}")
     add.add_argument("--out", default="arrivals-reproduced", metavar="DIR",
                      help="(arrivals-reproduced)")  # fmt: skip
-    add.add_argument("--page", metavar="FILE", help="tables of all on one page (DIR/results.md)")
+    add.add_argument("--page", metavar="FILE", help="page with all tables (DIR/results.md)")
     add.add_argument("--runs", type=int, metavar="N",
-                     help="trials of each case (100; fewer where a trial is long)")  # fmt: skip
+                     help="trials of each case (100; fewer for slow trials)")  # fmt: skip
     add.add_argument("--seed", type=int, default=0, metavar="N", help="(0)")
     add.add_argument("--quick", action="store_true", help=f"at most {QUICK} trials of each case")
     add.add_argument("--jobs", type=int, default=1, metavar="N",

@@ -1,4 +1,4 @@
-"""Source signals that are autoregressive processes."""
+"""Simulation of autoregressive source signals."""
 
 from __future__ import annotations
 
@@ -21,25 +21,27 @@ def ar_signals(
     *,
     complex_valued: bool = True,
 ) -> Complex | Float:
-    """Draw s(j) = Σ a_i s(j - i) + v(j) of several sources, from stationarity on.
+    """Draw stationary signals s(j) = Σ a_i s(j - i) + v(j) of several sources.
 
     Parameters
     ----------
-    coefficients : list of array_like
+    coefficients : sequence of array_like
         One list a_1 ... a_p for each source; orders may differ.
     noise : array_like, shape (n_sources,)
-        Variances of the driving noise v, circular if complex.
+        Variances of the innovations v, circular if complex.
     n : int
-        Steps.
+        Number of time steps.
     rng : numpy.random.Generator
+        Source of random numbers.
     batch : tuple of int
-        Leading axes, of independent draws.
+        Leading axes of independent draws.
     complex_valued : bool
         Circular complex signals, or real ones.
 
     Returns
     -------
     ndarray, shape (*batch, n, n_sources)
+        Signals.
 
     Raises
     ------
@@ -58,15 +60,15 @@ def ar_signals(
     count("n", n)
     if variances.shape != (len(orders),) or not (np.isfinite(variances) & (variances >= 0)).all():
         raise ValueError(
-            f"noise must hold one variance, not negative, for each of {len(orders)} sources; "
+            f"noise must have one variance, not negative, for each of {len(orders)} sources; "
             f"got {noise!r}"
         )
     parts = (2, *batch) if complex_valued else batch
-    share = 2 if complex_valued else 1
-    drawn = [
-        _real_signal(a, q / share, n, rng, parts) for a, q in zip(orders, variances, strict=True)
+    n_parts = 2 if complex_valued else 1
+    signals = [
+        _real_signal(a, q / n_parts, n, rng, parts) for a, q in zip(orders, variances, strict=True)
     ]
-    s = np.stack(drawn, axis=-1)
+    s = np.stack(signals, axis=-1)
     return np.asarray(s[0] + 1j * s[1]) if complex_valued else s
 
 
@@ -76,7 +78,8 @@ def stationary_covariance(a: ArrayLike, q: float) -> Float:
     Raises
     ------
     ValueError
-        If there is no such process: a root of the companion matrix is not inside the unit circle.
+        If the process is not stationary: a root of the companion matrix is not inside the unit
+        circle.
 
     Examples
     --------
@@ -84,7 +87,7 @@ def stationary_covariance(a: ArrayLike, q: float) -> Float:
     array([[1.]])
     >>> stationary_covariance([1.0], 1.0)
     Traceback (most recent call last):
-    ValueError: an AR process needs roots inside the unit circle; [1.0] has one of modulus 1
+    ValueError: roots of coefficients must be inside the unit circle; [1.0] has one of modulus 1
     """
     a = np.atleast_1d(real("coefficients", a))
     p = len(a)
@@ -93,8 +96,8 @@ def stationary_covariance(a: ArrayLike, q: float) -> Float:
     largest = float(pole_radius(a))
     if largest >= 1:
         raise ValueError(
-            f"an AR process needs roots inside the unit circle; {a.tolist()} has one of modulus "
-            f"{largest:.6g}"
+            f"roots of coefficients must be inside the unit circle; {a.tolist()} has one of "
+            f"modulus {largest:.6g}"
         )
     F, Q = np.eye(p, k=-1), np.zeros((p, p))
     F[0], Q[0, 0] = a, q

@@ -1,4 +1,4 @@
-"""Autoregressive sources before a symmetric line: the scenes of the report on joint tracking."""
+"""Autoregressive sources and a symmetric line: the scenes of the report on joint tracking."""
 
 from __future__ import annotations
 
@@ -30,18 +30,18 @@ def resonance(frequency: float, radius: float) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class SourceField(Scenario):
-    """Sources on their way from one direction to another, heard by a symmetric line.
+    """Sources that move at constant angular rates, and a symmetric line.
 
     Parameters
     ----------
     doa_deg : sequence of float
         Directions at the first snapshot, degrees.
     end_deg : sequence of float, optional
-        Those at the last one, reached at constant angular rates; the same if None.
+        Directions at the last snapshot; static if None.
     distances : sequence of float
-        Of the sensors on either side from the centre, wavelengths.
+        Distances of the sensors on either side from the centre, wavelengths.
     snr_db : float
-        Power of each source over that of the noise, one sensor.
+        Power of each source over that of the noise, one sensor, dB.
     """
 
     doa_deg: Sequence[float] = (-20.0, 30.0)
@@ -59,7 +59,7 @@ class SourceField(Scenario):
                 raise ValueError(f"{name} must lie within ±90 degrees; got {getattr(self, name)}")
         if self.end_deg is not None and len(self.end_deg) != len(self.doa_deg):
             raise ValueError(
-                f"end_deg must hold one direction for each of {len(self.doa_deg)} sources; "
+                f"end_deg must have one direction for each of {len(self.doa_deg)} sources; "
                 f"got {self.end_deg}"
             )
         number("snr_db", self.snr_db)
@@ -73,8 +73,8 @@ class SourceField(Scenario):
     @property
     def measurement(self) -> ArraySnapshot:
         """The line, and the noise; the wavelength is 1 m."""
-        apart = 1 + 1e-9 * np.arange(len(self.distances))  # the report puts two at one place
-        array = SensorArray.symmetric(np.array(self.distances) * apart)
+        distinct = 1 + 1e-9 * np.arange(len(self.distances))  # the report has two sensors at one
+        array = SensorArray.symmetric(np.array(self.distances) * distinct)
         return ArraySnapshot(array, wavelength=1.0, noise=10 ** (-self.snr_db / 10))
 
     def truth(self, n_steps: int) -> Float:
@@ -93,16 +93,16 @@ class SourceField(Scenario):
 @register("ar_fig1")
 @dataclass(frozen=True)
 class AutoregressiveField(SourceField):
-    """Two complex AR(2) sources at rest, three sensors, 30 dB: the report's Figs 1 and 2.
+    """Two static complex AR(2) sources, three sensors, 30 dB: Figs 1 and 2 of the report.
 
     Parameters
     ----------
     doa_deg, end_deg, distances, snr_db
         As in `SourceField`.
     coefficients : sequence of sequences of float
-        Of each source's process, scaled to power 1.
+        AR coefficients of each source, whose power is 1.
     n_intervals, interval : int
-        Intervals, and snapshots in each.
+        Number of intervals, and of snapshots in each.
     real_valued : bool
         Real sources in place of complex ones.
 
@@ -153,9 +153,9 @@ class AutoregressiveField(SourceField):
 @register("ar_fig3")
 @dataclass(frozen=True)
 class FastSource(AutoregressiveField):
-    """One source on its way from 40 to 0 degrees, intervals of 3 snapshots, 10 dB: Fig. 3.
+    """One source moving from 40 to 0 degrees, intervals of 3 snapshots, 10 dB: Fig. 3.
 
-    The report's own spacings, `distances=(0.5, 0.5)`, put two sensors at one place.
+    The report's distances, `distances=(0.5, 0.5)`, are two sensors at one position.
 
     References
     ----------
@@ -198,7 +198,7 @@ class MovingSource(FastSource):
 @register("ar_fig5")
 @dataclass(frozen=True)
 class NoisySources(AutoregressiveField):
-    """Two sources at rest, three sensors, 10 dB (and 5 and 1): Fig. 5.
+    """Two static sources, three sensors, 10 dB (and 5 and 1): Fig. 5.
 
     References
     ----------
@@ -216,7 +216,7 @@ class NoisySources(AutoregressiveField):
 @register("ar_fig6")
 @dataclass(frozen=True)
 class MoreSensors(AutoregressiveField):
-    """Two sources at rest, M = 2 (and 3 and 4) sensors on either side, 10 dB: Fig. 6.
+    """Two static sources, M = 2 (and 3 and 4) sensors on either side, 10 dB: Fig. 6.
 
     References
     ----------
@@ -235,7 +235,7 @@ class MoreSensors(AutoregressiveField):
 @register("ar_fig7")
 @dataclass(frozen=True)
 class ThirdOrder(AutoregressiveField):
-    """Two AR(3) sources at rest: Fig. 7. The report does not give their coefficients.
+    """Two static AR(3) sources: Fig. 7. The report omits their coefficients.
 
     References
     ----------
@@ -253,7 +253,7 @@ class ThirdOrder(AutoregressiveField):
 @register("ar_three_on_three")
 @dataclass(frozen=True)
 class ThreeOnThree(AutoregressiveField):
-    """Three sources on three sensors, as many as no subspace method can tell apart.
+    """Three sources and three sensors, more than subspace methods resolve.
 
     Examples
     --------
@@ -271,7 +271,7 @@ class ThreeOnThree(AutoregressiveField):
 @register("ar_four_on_three")
 @dataclass(frozen=True)
 class FourOnThree(AutoregressiveField):
-    """Four narrow-band sources on three sensors.
+    """Four narrow-band sources and three sensors.
 
     Examples
     --------

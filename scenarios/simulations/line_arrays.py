@@ -1,7 +1,7 @@
-"""Sources that move past a half-wavelength line array: the simulations of SVALSE's paper.
+"""Moving sources and a half-wavelength line array: the simulations of SVALSE's paper.
 
-Amplitudes are redrawn at every step, and the noise of a step is set by the sources' power in that
-very step, so that the signal-to-noise ratio is the same in every snapshot.
+Amplitudes are redrawn at every step, and the noise of a step is proportional to the sources' power
+in that step, so that the signal-to-noise ratio is the same in every snapshot.
 """
 
 from __future__ import annotations
@@ -20,13 +20,14 @@ from arrivals.validation import count, number
 
 @dataclass(frozen=True)
 class LineScenario(Scenario):
-    """Sources in front of a half-wavelength line array.
+    """Sources and a half-wavelength line array.
 
     Parameters
     ----------
     snr_db : float
-        Summed power of the sources over the noise power, after beamforming of one snapshot.
+        Summed power of the sources over the noise power, after beamforming of one snapshot, dB.
     n_sensors, n_steps : int
+        Numbers of sensors and time steps.
     """
 
     snr_db: float = 20.0
@@ -45,10 +46,10 @@ class LineScenario(Scenario):
 
     @abstractmethod
     def doa_deg(self) -> Float:
-        """Return the directions, degrees, (n_steps, n_sources), on or off."""
+        """Return the directions, degrees, (n_steps, n_sources), active or not."""
 
     def active(self, rng: np.random.Generator) -> Bool:
-        """Draw which sources are on, (n_steps, n_sources); all of them as a rule."""
+        """Draw the active sources, (n_steps, n_sources); all by default."""
         return np.ones(self.doa_deg().shape, dtype=np.bool_)
 
     def amplitudes(self, rng: np.random.Generator) -> Complex:
@@ -56,7 +57,7 @@ class LineScenario(Scenario):
         return complex_normal(rng, self.doa_deg().shape)
 
     def signals(self, rng: np.random.Generator) -> tuple[Float, Complex, Float]:
-        """Draw what there is to hear: directions, amplitudes at a sensor, noise variances."""
+        """Draw directions, amplitudes at a sensor, and noise variances."""
         active = self.active(rng)
         alpha = np.where(active, self.amplitudes(rng), 0)
         truth = np.where(active, np.deg2rad(self.doa_deg()), np.nan)
@@ -148,7 +149,7 @@ class SixSources(SixStatic):
 @register("svalse_fig5")
 @dataclass(frozen=True)
 class RandomPairsOff(SixSources):
-    """The six sources, two of them, drawn anew for every step but the first, off.
+    """The six sources, of which a random pair is inactive, redrawn at every step but the first.
 
     References
     ----------
@@ -156,7 +157,7 @@ class RandomPairsOff(SixSources):
     """
 
     def active(self, rng: np.random.Generator) -> Bool:
-        """Draw two sources for each step, and switch them off."""
+        """Draw two inactive sources for each step."""
         active = super().active(rng)
         off = np.argsort(rng.random(active.shape), axis=1)[:, :2]
         np.put_along_axis(active, off, values=False, axis=1)
@@ -167,7 +168,7 @@ class RandomPairsOff(SixSources):
 @register("svalse_fig5b")
 @dataclass(frozen=True)
 class OnePairOff(SixSources):
-    """The six sources, one random pair of them off from the second step on.
+    """The six sources, of which one random pair is inactive from the second step on.
 
     References
     ----------
@@ -175,7 +176,7 @@ class OnePairOff(SixSources):
     """
 
     def active(self, rng: np.random.Generator) -> Bool:
-        """Draw two sources, and switch them off after the first step."""
+        """Draw two sources that are inactive after the first step."""
         active = super().active(rng)
         active[1:, rng.permutation(6)[:2]] = False
         return active
@@ -184,7 +185,7 @@ class OnePairOff(SixSources):
 @register("svalse_fig6")
 @dataclass(frozen=True)
 class PairsInTurn(SixSources):
-    """The six sources, neighbouring pairs off in turn: steps 1-15, 16-30 and 31-50.
+    """The six sources, of which neighbouring pairs are inactive in steps 1-15, 16-30 and 31-50.
 
     References
     ----------
@@ -192,7 +193,7 @@ class PairsInTurn(SixSources):
     """
 
     def active(self, rng: np.random.Generator) -> Bool:
-        """Switch off 50 and 65 degrees, then the two that move, then -70 and -55 degrees."""
+        """Return all sources without 50 and 65°, then the moving ones, then -70 and -55°."""
         active = super().active(rng)
         active[:15, 4:] = False
         active[15:30, 2:4] = False

@@ -1,4 +1,4 @@
-"""Sources that move through a field of sensors: they cross, they appear and vanish."""
+"""Moving emitters in a sensor network: crossing tracks, births and deaths."""
 
 from __future__ import annotations
 
@@ -15,15 +15,16 @@ from arrivals.validation import count
 
 @dataclass(frozen=True)
 class MovingSources(RSSScenario):
-    """Sources on straight ways.
+    """Sources on straight tracks.
 
     Parameters
     ----------
     n_sources, n_sensors, radius, n_snapshots, alpha, noise_db, power_db, power_std_db
         As in `RSSScenario`.
     n_steps : int
+        Number of time steps, of 1 s.
     q : float
-        Of the tracker's `ConstantVelocity`, m²/s³.
+        Noise density of the tracker's `ConstantVelocity`, m²/s³.
     """
 
     n_steps: int = 40
@@ -35,14 +36,14 @@ class MovingSources(RSSScenario):
 
     @property
     def motion(self) -> MotionModel:
-        """Constant velocity, disturbed."""
+        """Constant velocity with acceleration noise."""
         return ConstantVelocity(self.q)
 
 
 @register("rss_crossing")
 @dataclass(frozen=True)
 class CrossingSources(MovingSources):
-    """Sources at 2 to 2.5 m/s from all sides that pass the middle, and each other, within 10 m.
+    """Sources at 2 to 2.5 m/s from all sides that pass the centre, and each other, within 10 m.
 
     Parameters
     ----------
@@ -51,7 +52,7 @@ class CrossingSources(MovingSources):
     n_steps, q
         As in `MovingSources`.
     start_std, speed_std : float
-        Errors of the start, m and m/s; the tracker starts at rest.
+        Standard deviations of the initial state, m and m/s; the initial velocity is zero.
 
     Examples
     --------
@@ -63,17 +64,17 @@ class CrossingSources(MovingSources):
     speed_std: float = 2.5
 
     def positions(self, rng: np.random.Generator) -> Float:
-        """Draw the ways."""
+        """Draw the tracks."""
         K = self.n_sources
         phi = rng.uniform(0, 2 * np.pi) + 2 * np.pi * np.arange(K) / K
         along = np.stack([np.cos(phi), np.sin(phi)], axis=-1)
         across = np.stack([-np.sin(phi), np.cos(phi)], axis=-1)
         t = np.arange(self.n_steps) - (self.n_steps - 1) / 2
-        way = np.multiply.outer(t, rng.uniform(2.0, 2.5, K))
-        return np.asarray(way[..., None] * along + rng.uniform(-5, 5, K)[:, None] * across)
+        travel = np.multiply.outer(t, rng.uniform(2.0, 2.5, K))
+        return np.asarray(travel[..., None] * along + rng.uniform(-5, 5, K)[:, None] * across)
 
     def start(self, truth: Float, rng: np.random.Generator) -> tuple[Float | None, Float]:
-        """Draw the first positions with an error; velocities are not known."""
+        """Draw initial positions with an error, and zero velocities."""
         x0 = np.zeros((self.n_sources, 4))
         x0[:, ::2] = truth[0] + self.start_std * rng.standard_normal(truth[0].shape)
         return x0, np.diag([self.start_std, self.speed_std] * 2) ** 2
@@ -82,7 +83,7 @@ class CrossingSources(MovingSources):
 @register("rss_birth_death")
 @dataclass(frozen=True)
 class BirthsAndDeaths(MovingSources):
-    """Sources at 1 m/s that appear and vanish; the tracker is told nothing of them.
+    """Sources at 1 m/s with unknown births and deaths.
 
     Parameters
     ----------
@@ -91,11 +92,11 @@ class BirthsAndDeaths(MovingSources):
     n_steps, q
         As in `MovingSources`.
     apart : float
-        Least distance of the ways' middles, m.
+        Spacing of the centres of the tracks, m.
 
     Notes
     -----
-    Every source is on for half to all of the time, the first from the beginning.
+    Every source is active for half to nine tenths of the time, the first from the start.
 
     Examples
     --------
@@ -109,15 +110,15 @@ class BirthsAndDeaths(MovingSources):
     apart: float = 60.0
 
     def positions(self, rng: np.random.Generator) -> Float:
-        """Draw the ways, and when the sources are on."""
+        """Draw the tracks, and the steps in which the sources are active."""
         K, T = self.n_sources, self.n_steps
-        middles = lattice(K, self.apart, centred=True)
-        turn = rng.uniform(0, 2 * np.pi)
-        c, s = np.cos(turn), np.sin(turn)
+        centres = lattice(K, self.apart, centred=True)
+        rotation = rng.uniform(0, 2 * np.pi)
+        c, s = np.cos(rotation), np.sin(rotation)
         phi = rng.uniform(0, 2 * np.pi, K)
         t = np.arange(T) - (T - 1) / 2
-        way = 0.5 * np.multiply.outer(t, np.stack([np.cos(phi), np.sin(phi)], axis=-1))
-        truth = middles @ np.array([[c, s], [-s, c]]) + way
+        travel = 0.5 * np.multiply.outer(t, np.stack([np.cos(phi), np.sin(phi)], axis=-1))
+        truth = centres @ np.array([[c, s], [-s, c]]) + travel
         length = rng.uniform(0.5, 0.9, K) * T
         first = np.floor(rng.uniform(0, T - length))
         first[0] = 0
@@ -126,5 +127,5 @@ class BirthsAndDeaths(MovingSources):
         return np.asarray(truth)
 
     def start(self, truth: Float, rng: np.random.Generator) -> tuple[Float | None, Float]:
-        """Tell nothing but how fast sources may be."""
+        """Return the covariance of a new source, without initial states."""
         return None, np.diag([100.0, 1.0, 100.0, 1.0])

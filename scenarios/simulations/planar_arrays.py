@@ -1,4 +1,4 @@
-"""Sources past circles, directional elements and sparse lines, in one or several looks a step."""
+"""Sources and circular, directional and sparse arrays, with one or several snapshots a step."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from arrivals.scenarios.simulations.line_arrays import complex_normal
 from arrivals.typing import Complex, Float
 from arrivals.validation import count, number, one_of, positive
 
-LOWEST = 0.6  # of the highest frequency: where several bins begin
+LOWEST_FREQUENCY = 0.6  # of several bins, relative to the highest
 
 
 def bins(n_bins: int) -> list[float]:
-    """Return wavelengths, m, of frequencies from 0.6 to 1 of that whose wavelength is 1 m.
+    """Return wavelengths, m, of frequencies from 0.6 to 1 relative to a wavelength of 1 m.
 
     Examples
     --------
@@ -27,7 +27,7 @@ def bins(n_bins: int) -> list[float]:
     """
     if n_bins == 1:
         return [1.0]
-    return [1 / f for f in np.linspace(LOWEST, 1.0, count("n_bins", n_bins)).tolist()]
+    return [1 / f for f in np.linspace(LOWEST_FREQUENCY, 1.0, count("n_bins", n_bins)).tolist()]
 
 
 def simulate_snapshots(
@@ -38,27 +38,30 @@ def simulate_snapshots(
     *,
     received: bool = False,
 ) -> Complex:
-    """Draw amplitudes ~ CN(0, 1) for every look, and noise below their power in that very look.
+    """Draw amplitudes ~ CN(0, 1) for every snapshot, and noise relative to their power in it.
 
     Parameters
     ----------
     model : ArraySnapshot
+        Array, wavelengths and numbers of bins and snapshots.
     truth : ndarray, shape (n_steps, n_sources)
-        Directions, rad; NaN while a source is off.
+        Directions, rad; NaN while a source is inactive.
     snr_db : float
-        Summed power of the sources over the noise power of one sensor.
+        Summed power of the sources over the noise power of one sensor, dB.
     rng : numpy.random.Generator
+        Source of random numbers.
     received : bool
-        Whether it is the power that the sensors received, in the mean, instead.
+        Use the mean power received by the sensors in place of the sources' power.
 
     Returns
     -------
     ndarray, shape (n_steps, *model.shape)
+        Snapshots.
     """
-    looks = model.shape[:-1]
-    alpha = complex_normal(rng, (len(truth), *looks, truth.shape[1]))
-    on = np.expand_dims(~np.isnan(truth), tuple(range(1, 1 + len(looks))))
-    noise = 10 ** (-snr_db / 10) * (np.abs(alpha) ** 2 * on).sum(axis=-1, keepdims=True)
+    snapshots = model.shape[:-1]
+    alpha = complex_normal(rng, (len(truth), *snapshots, truth.shape[1]))
+    active = np.expand_dims(~np.isnan(truth), tuple(range(1, 1 + len(snapshots))))
+    noise = 10 ** (-snr_db / 10) * (np.abs(alpha) ** 2 * active).sum(axis=-1, keepdims=True)
     wave = model.wave(truth, alpha)
     if received:
         noise = 10 ** (-snr_db / 10) * (np.abs(wave) ** 2).mean(axis=-1, keepdims=True)
@@ -68,15 +71,16 @@ def simulate_snapshots(
 @register("circle")
 @dataclass(frozen=True)
 class Circle(Scenario):
-    """Four sources around 8 sensors on a circle; two cross the cut at ±180°, and each other.
+    """Four sources around a circle of 8 sensors; two cross ±180°, and each other.
 
     Parameters
     ----------
     snr_db : float
-        Summed power of the sources over the noise power of one sensor.
+        Summed power of the sources over the noise power of one sensor, dB.
     n_bins, n_snapshots : int
-        Frequencies, from 0.6 to 1 of the highest, and snapshots in one step.
+        Numbers of frequencies, from 0.6 to 1 of the highest, and of snapshots in one step.
     n_steps : int
+        Number of time steps.
 
     References
     ----------
@@ -101,12 +105,12 @@ class Circle(Scenario):
 
     @property
     def measurement(self) -> ArraySnapshot:
-        """Neighbours are half of the shortest wavelength, 1 m, apart."""
+        """The circle, with a spacing of half of the shortest wavelength, 1 m."""
         array = SensorArray.uca(8, radius=0.25 / np.sin(np.pi / 8))
         return ArraySnapshot(array, bins(self.n_bins), n_snapshots=self.n_snapshots)
 
     def doa_deg(self) -> Float:
-        """Return the azimuths, degrees, (n_steps, 4); NaN while a source is off."""
+        """Return the azimuths, degrees, (n_steps, 4); NaN while a source is inactive."""
         t = np.arange(self.n_steps, dtype=np.float64)
         second = np.where(t < 10, np.nan, -100 - 1.8 * t)
         fourth = np.where(t < 25, -40.0, np.nan)
@@ -114,7 +118,7 @@ class Circle(Scenario):
         return np.asarray((doa + 180) % 360 - 180)
 
     def sample(self, rng: np.random.Generator) -> Trial:
-        """Draw one trial; the motion model expects 3° a step."""
+        """Draw one trial; the motion model has 3° a step."""
         truth, model = np.deg2rad(self.doa_deg()), self.measurement
         z = simulate_snapshots(model, truth, self.snr_db, rng)
         return Trial(z, truth, model, BernoulliVonMises(sigma_doa=np.deg2rad(3.0)))
@@ -123,17 +127,18 @@ class Circle(Scenario):
 @register("cardioids")
 @dataclass(frozen=True)
 class Cardioids(Scenario):
-    """Two sources at least 40° apart, drawn anew for every step; 8 cardioids facing outwards.
+    """Two sources at least 40° apart, redrawn at every step; 8 cardioids facing outwards.
 
     Parameters
     ----------
     snr_db : float
-        Power received over the noise power, in the mean of the sensors.
+        Received power over the noise power, mean of the sensors, dB.
     elements : {"cardioid", "mixed"}
-        All of them, or every second one, the others being isotropic.
+        Cardioids for all elements, or for every second one, the others being isotropic.
     known : bool
-        Whether the model that comes with a trial knows the elements, or takes them for isotropic.
+        Whether the measurement model of a trial has the true elements, or isotropic ones.
     n_steps : int
+        Number of time steps.
 
     Examples
     --------
@@ -153,7 +158,7 @@ class Cardioids(Scenario):
 
     @property
     def measurement(self) -> ArraySnapshot:
-        """The array as it is."""
+        """The array with its true elements."""
         array = SensorArray.uca(8, radius=0.25 / np.sin(np.pi / 8))
         facing = 2 * np.pi * np.arange(8) / 8
         omni = np.where((np.arange(8) % 2 == 1) & (self.elements == "mixed"), 1.0, 0.5)
@@ -162,30 +167,31 @@ class Cardioids(Scenario):
     def sample(self, rng: np.random.Generator) -> Trial:
         """Draw one trial."""
         first = rng.uniform(-np.pi, np.pi, self.n_steps)
-        apart = np.deg2rad(rng.uniform(40, 320, self.n_steps))
-        truth = (np.stack([first, first + apart], axis=1) + np.pi) % (2 * np.pi) - np.pi
+        separation = np.deg2rad(rng.uniform(40, 320, self.n_steps))
+        truth = (np.stack([first, first + separation], axis=1) + np.pi) % (2 * np.pi) - np.pi
         model = self.measurement
         z = simulate_snapshots(model, truth, self.snr_db, rng, received=True)
-        known = model if self.known else model.replace(response=None)
-        return Trial(z, truth, known, BernoulliVonMises(sigma_doa=np.deg2rad(3.0)))
+        assumed = model if self.known else model.replace(response=None)
+        return Trial(z, truth, assumed, BernoulliVonMises(sigma_doa=np.deg2rad(3.0)))
 
 
 @register("grating")
 @dataclass(frozen=True)
 class Grating(Scenario):
-    """One or two sources past a line so sparse that every direction has images.
+    """One or two sources and a sparse line, on which every direction has grating lobes.
 
     Parameters
     ----------
     n_sources : {1, 2}
         One at -20 + t degrees, or two at -50 + 0.5 t and 10 + 0.8 t.
     n_bins : int
-        Frequencies, from 0.6 to 1 of the highest.
+        Number of frequencies, from 0.6 to 1 of the highest.
     hopping : bool
-        Whether only one random bin of each step is heard.
+        Whether only one random bin of each step has data.
     snr_db, spacing : float
-        Spacing in the shortest wavelength, which is 1 m.
+        As in `Circle`; spacing in the shortest wavelength, which is 1 m.
     n_steps : int
+        Number of time steps.
 
     Examples
     --------
@@ -221,10 +227,10 @@ class Grating(Scenario):
         return np.asarray([-50.0, 10.0] + t * [0.5, 0.8])
 
     def sample(self, rng: np.random.Generator) -> Trial:
-        """Draw one trial; the motion model expects 2° a step."""
+        """Draw one trial; the motion model has 2° a step."""
         truth, model = np.deg2rad(self.doa_deg()), self.measurement
         z = simulate_snapshots(model, truth, self.snr_db, rng)
         if self.hopping and self.n_bins > 1:
-            heard = rng.integers(self.n_bins, size=self.n_steps)
-            z[np.arange(self.n_bins) != heard[:, None]] = complex(np.nan, np.nan)
+            valid = rng.integers(self.n_bins, size=self.n_steps)
+            z[np.arange(self.n_bins) != valid[:, None]] = complex(np.nan, np.nan)
         return Trial(z, truth, model, BernoulliVonMises(sigma_doa=np.deg2rad(2.0)))

@@ -1,6 +1,6 @@
-"""One source in front of a line array that takes real samples: the third paper's simulations.
+"""One source and a line array of real samples: the simulations of the interpolation paper.
 
-Delays are exact: the phase of every sinusoid that the source consists of.
+Delays are exact: phase shifts of the sinusoids of which the source consists.
 """
 
 from __future__ import annotations
@@ -22,21 +22,22 @@ from arrivals.validation import count, number, one_of
 
 @dataclass(frozen=True)
 class InterpolationScenario(Scenario):
-    """One source of power 1, at rest or on its way from one direction to another.
+    """One source of power 1, static or moving at a constant angular rate.
 
     Parameters
     ----------
     doa_deg : float
         Direction at the first snapshot, degrees.
     end_deg : float, optional
-        Direction at the last one, reached at a constant angular rate; the same if None.
+        Direction at the last snapshot; static if None.
     snr_db : float
-        Power of the source over that of the noise, one sensor and one sample.
+        Power of the source over that of the noise, one sensor and one sample, dB.
     n_sensors, n_steps : int
+        Numbers of sensors and snapshots.
     reference : {"first", "centre"}
-        Where the source's waveform is the given one: at the sensor that a positive angle reaches
-        first, as in the paper's (1) and (2), or at the array's centre. A source that moves keeps
-        its waveform undisturbed only there.
+        Position at which the waveform is defined: the sensor that a positive angle reaches first,
+        as in the paper's (1) and (2), or the array's centre. The waveform of a moving source is
+        free of Doppler shift only there.
 
     Notes
     -----
@@ -64,15 +65,15 @@ class InterpolationScenario(Scenario):
     @property
     @abstractmethod
     def correlation(self) -> SourceCorrelation:
-        """What the tracker may know of the source."""
+        """Correlation of the source's waveform."""
 
     @abstractmethod
     def sinusoids(self, rng: np.random.Generator) -> tuple[Float, Complex]:
-        """Draw frequencies, cycles per sample, and amplitudes of what the source consists of."""
+        """Draw frequencies, cycles per sample, and complex amplitudes of the source."""
 
     @property
     def measurement(self) -> ArraySamples:
-        """The array, half a wavelength of the highest frequency apart."""
+        """The array, with a spacing of half a wavelength of the highest frequency."""
         spacing = 0.5 / self.correlation.highest
         array = SensorArray.ula(self.n_sensors, spacing, speed=1.0)
         return ArraySamples(array, 1.0, self.correlation, self.snr_db, power=1.0)
@@ -85,28 +86,27 @@ class InterpolationScenario(Scenario):
     def sample(self, rng: np.random.Generator) -> Trial:
         """Draw one trial."""
         model, truth = self.measurement, self.truth()
-        doa = truth[:1, 0] if self.end_deg is None else truth[:, 0]  # one row serves all steps
-        places = model.array.positions
+        doa = truth[:1, 0] if self.end_deg is None else truth[:, 0]  # static: one row
+        positions = model.array.positions
         if self.reference == "first":
-            places = places - places.max()
-        earlier = direction(doa, 1) @ places.T
-        waves = received_waveforms(*self.sinusoids(rng), earlier, self.n_steps)
-        noise = rng.standard_normal(waves.shape) * np.sqrt(model.noise_ratio)
-        return Trial(waves + noise, truth, model, DelayWalk())
+            positions = positions - positions.max()
+        lead = direction(doa, 1) @ positions.T
+        waveforms = received_waveforms(*self.sinusoids(rng), lead, self.n_steps)
+        noise = rng.standard_normal(waveforms.shape) * np.sqrt(model.noise_ratio)
+        return Trial(waveforms + noise, truth, model, DelayWalk())
 
 
-def received_waveforms(
-    frequencies: Float, amplitudes: Complex, earlier: Float, n_steps: int
-) -> Float:
-    """Return a sum of sinusoids Re Σ a exp(j2πf (k + earlier)) at sensors, (n_steps, n_sensors).
+def received_waveforms(frequencies: Float, amplitudes: Complex, lead: Float, n_steps: int) -> Float:
+    """Return a sum of sinusoids Re Σ a exp(j2πf (k + lead)) at sensors, (n_steps, n_sensors).
 
     Parameters
     ----------
     frequencies, amplitudes : ndarray, shape (n,)
         Cycles per sample, and complex amplitudes.
-    earlier : ndarray, shape (n_steps, n_sensors) or (1, n_sensors)
-        By how much each sensor hears the source before the origin does, samples.
+    lead : ndarray, shape (n_steps, n_sensors) or (1, n_sensors)
+        Time of arrival at the origin minus that at each sensor, samples.
     n_steps : int
+        Number of samples.
 
     Examples
     --------
@@ -117,7 +117,7 @@ def received_waveforms(
     """
     k = np.arange(n_steps)
     carriers = np.exp(2j * np.pi * np.multiply.outer(k, frequencies)) * amplitudes
-    shifts = np.exp(2j * np.pi * np.multiply.outer(earlier, frequencies))
+    shifts = np.exp(2j * np.pi * np.multiply.outer(lead, frequencies))
     return np.asarray((shifts @ carriers[..., None])[..., 0].real)
 
 
@@ -135,8 +135,8 @@ class InterpolationTone(InterpolationScenario):
 
     References
     ----------
-    Radhakrishnan, Unnikrishnan and Balakrishnan, section 4, in one reading: the paper gives
-    neither its frequencies nor its numbers of sensors and snapshots.
+    Radhakrishnan, Unnikrishnan and Balakrishnan, section 4, in one reading: the paper omits its
+    frequencies and its numbers of sensors and snapshots.
 
     Examples
     --------
@@ -149,7 +149,7 @@ class InterpolationTone(InterpolationScenario):
 
     @property
     def correlation(self) -> Tones:
-        """The tone's."""
+        """Correlation of the tone."""
         return Tones(self.frequency)
 
     def sinusoids(self, rng: np.random.Generator) -> tuple[Float, Complex]:
@@ -186,11 +186,11 @@ class InterpolationBand(InterpolationScenario):
 
     @property
     def correlation(self) -> FlatBand:
-        """The band's."""
+        """Correlation of the band."""
         return FlatBand(self.low, self.high)
 
     def sinusoids(self, rng: np.random.Generator) -> tuple[Float, Complex]:
-        """Draw one sinusoid in each of many narrow cells, so dense that nothing repeats."""
+        """Draw one sinusoid in each of many narrow cells: no period within the record."""
         n = max(400, 2 * self.n_steps)
         frequencies = self.low + (self.high - self.low) * (np.arange(n) + rng.random(n)) / n
         re, im = rng.standard_normal((2, n)) / np.sqrt(n)
@@ -200,7 +200,7 @@ class InterpolationBand(InterpolationScenario):
 @register("interpolation_qpc")
 @dataclass(frozen=True)
 class InterpolationCoupled(InterpolationScenario):
-    """Three equal tones, the third at the sum of the others in frequency and in phase.
+    """Three equal tones, the third with the sums of the others' frequencies and phases.
 
     Parameters
     ----------
@@ -224,7 +224,7 @@ class InterpolationCoupled(InterpolationScenario):
 
     @property
     def correlation(self) -> Tones:
-        """That of three tones: to second order the coupling cannot be seen."""
+        """Correlation of three tones; second-order statistics do not show the coupling."""
         return Tones((self.first, self.second, self.first + self.second))
 
     def sinusoids(self, rng: np.random.Generator) -> tuple[Float, Complex]:

@@ -1,8 +1,8 @@
-"""Several sources heard by a field of sensors: the fourth paper's simulations.
+"""Several sources in a sensor network: the simulations of the paper on signal strength.
 
-The paper does not say where its targets stand, nor its number of snapshots and its noise. Read:
-100 sensors, uniform in a disc of 100 m; 50 snapshots; noise 40 dB; targets on a triangle of side
-30 m, or in the middle and at the corners of a hexagon of 50 m.
+The paper omits target positions, number of snapshots and noise. Our reading: 100 sensors, uniform
+in a disc of 100 m; 50 snapshots; noise 40 dB; targets on a triangle of side 30 m, or at the centre
+and the corners of a hexagon of 50 m.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from arrivals.scenarios.base import Scenario, Trial, register
 from arrivals.typing import Bool, Float
 from arrivals.validation import count, number, one_of, positive
 
-MOST_SOURCES, MOST_SENSORS = 50, 100_000
+MAX_SOURCES, MAX_SENSORS = 50, 100_000
 Start = Literal["prior", "random", "near"]
 
 
 @dataclass(frozen=True, eq=False)
 class RSSTrial(Trial):
-    """One draw of positions, powers and readings, and what a tracker is told at first.
+    """One draw of positions, powers and readings, with the prior of a tracker.
 
     Parameters
     ----------
@@ -34,10 +34,11 @@ class RSSTrial(Trial):
     log_amplitude : ndarray, shape (n_sources,)
         True u, Np.
     x0 : ndarray, shape (n_sources, n), or None
-        States that a tracker starts from; None where it must find the sources.
+        Initial states; None for an unknown number of sources.
     P0 : ndarray, shape (n, n)
+        Covariance of an initial state.
     mu0, v0 : float
-        Prior of the log amplitudes, Np and Np².
+        Mean and variance of the log amplitudes, Np and Np².
     """
 
     measurement: LogNormalRSS
@@ -48,9 +49,9 @@ class RSSTrial(Trial):
     v0: float
 
     def known(self) -> dict[str, Any]:
-        """Return models and priors, by the names of a tracker's parameters."""
-        told = {name: getattr(self, name) for name in ("x0", "P0", "mu0", "v0")}
-        return super().known() | told
+        """Return models and priors by the names of a tracker's parameters."""
+        prior = {name: getattr(self, name) for name in ("x0", "P0", "mu0", "v0")}
+        return super().known() | prior
 
 
 @dataclass(frozen=True)
@@ -60,15 +61,16 @@ class RSSScenario(Scenario):
     Parameters
     ----------
     n_sources : int
-        Up to 50.
+        Number of sources, at most 50.
     n_sensors : int
-        Up to 100 000.
+        Number of sensors, at most 100 000.
     radius : float, optional
-        Of the disc of sensors, m; 100 m, or what gives 18 sources as much room, if None.
+        Radius of the disc of sensors, m. If None, 100 m for up to 18 sources, and the same area
+        per source for more.
     n_snapshots : int
-        N of a reading.
+        Number of snapshots N of a reading.
     alpha : float
-        Loss exponent.
+        Path-loss exponent.
     noise_db, power_db, power_std_db : float
         Noise, and mean and standard deviation of the sources' powers, dB.
     """
@@ -83,9 +85,9 @@ class RSSScenario(Scenario):
     power_std_db: float = 3.0
 
     def __post_init__(self) -> None:
-        for name, most in (("n_sources", MOST_SOURCES), ("n_sensors", MOST_SENSORS)):
-            if count(name, getattr(self, name)) > most:
-                raise ValueError(f"{name} must be at most {most}; got {getattr(self, name)}")
+        for name, largest in (("n_sources", MAX_SOURCES), ("n_sensors", MAX_SENSORS)):
+            if count(name, getattr(self, name)) > largest:
+                raise ValueError(f"{name} must be at most {largest}; got {getattr(self, name)}")
         if self.radius is not None:
             positive("radius", self.radius)
         number("noise_db", self.noise_db)
@@ -102,23 +104,22 @@ class RSSScenario(Scenario):
     @property
     @abstractmethod
     def motion(self) -> MotionModel:
-        """How a tracker may take the sources to move."""
+        """Motion model of the sources."""
 
     @abstractmethod
     def positions(self, rng: np.random.Generator) -> Float:
-        """Draw positions, (n_steps, n_sources, 2), m; NaN while a source is off."""
+        """Draw positions, (n_steps, n_sources, 2), m; NaN while a source is inactive."""
 
     @abstractmethod
     def start(self, truth: Float, rng: np.random.Generator) -> tuple[Float | None, Float]:
-        """Draw the states that a tracker starts from, and give their covariance."""
+        """Draw the initial states of a tracker, and return them with their covariance."""
 
     def network(self, rng: np.random.Generator) -> LogNormalRSS:
         """Draw the sensors."""
-        places = in_disc(rng, (self.n_sensors,), self.disc)
-        return self.measurement(places)
+        return self.measurement(in_disc(rng, (self.n_sensors,), self.disc))
 
     def measurement(self, sensors: Float) -> LogNormalRSS:
-        """Return the model of readings at given places (n_sensors, 2), m."""
+        """Return the measurement model of sensors at given positions (n_sensors, 2), m."""
         return LogNormalRSS(
             sensors,
             n_snapshots=self.n_snapshots,
@@ -141,15 +142,15 @@ class RSSScenario(Scenario):
         """Draw one trial."""
         model, truth = self.network(rng), self.positions(rng)
         u = self.mu0 + np.sqrt(self.v0) * rng.standard_normal(self.n_sources)
-        there: Bool = np.isfinite(truth[..., 0])
-        far = np.where(there[..., None], truth, 0.0)
-        z = model.draw(np.where(there, u, -np.inf), far, rng)
+        active: Bool = np.isfinite(truth[..., 0])
+        theta = np.where(active[..., None], truth, 0.0)
+        z = model.draw(np.where(active, u, -np.inf), theta, rng)
         x0, P0 = self.start(truth, rng)
         return RSSTrial(z, truth, model, self.motion, u, x0, P0, self.mu0, self.v0)
 
 
 def in_disc(rng: np.random.Generator, shape: tuple[int, ...], radius: float) -> Float:
-    """Draw points uniformly in a disc about the origin, (*shape, 2).
+    """Draw points uniformly in a disc around the origin, (*shape, 2).
 
     Examples
     --------
@@ -167,10 +168,11 @@ def lattice(n: int, spacing: float, centred: bool) -> Float:
     Parameters
     ----------
     n : int
+        Number of points.
     spacing : float
-        Between neighbours, m.
+        Distance between neighbours, m.
     centred : bool
-        Whether the origin is a point of the lattice, or the middle of a triangle.
+        Whether the origin is a point of the lattice, or the centre of a triangle.
 
     Examples
     --------
@@ -189,19 +191,19 @@ def lattice(n: int, spacing: float, centred: bool) -> Float:
 
 @dataclass(frozen=True)
 class FixedSources(RSSScenario):
-    """Sources at rest on a triangular lattice, one reading a sensor.
+    """Static sources on a triangular lattice, one reading a sensor.
 
     Parameters
     ----------
     n_sources, n_sensors, radius, n_snapshots, alpha, noise_db, power_db, power_std_db
         As in `RSSScenario`.
     spacing : float
-        Between neighbours, m.
+        Distance between neighbours, m.
     prior_std : float
-        Of the position prior, each coordinate, m.
+        Standard deviation of the position prior, each coordinate, m.
     start_at : {"prior", "random", "near"}
-        Where the prior's mean, which is the start, is drawn: about the truth with `prior_std`,
-        uniformly in the disc, or within half its radius.
+        Distribution of the prior's mean, which is the start of the search: around the truth with
+        `prior_std`, uniform in the disc, or uniform within half its radius.
     """
 
     spacing: float = 30.0
@@ -218,11 +220,11 @@ class FixedSources(RSSScenario):
 
     @property
     def motion(self) -> MotionModel:
-        """None to speak of."""
+        """Random walk without noise."""
         return RandomWalk(q=0.0)
 
     def positions(self, rng: np.random.Generator) -> Float:
-        """Return the lattice's points."""
+        """Return the points of the lattice."""
         return lattice(self.n_sources, self.spacing, self.centred)[None]
 
     def start(self, truth: Float, rng: np.random.Generator) -> tuple[Float | None, Float]:
@@ -233,14 +235,14 @@ class FixedSources(RSSScenario):
         """Draw means of the prior for positions (..., n_sources, 2)."""
         if self.start_at == "prior":
             return np.asarray(theta + self.prior_std * rng.standard_normal(theta.shape))
-        reach = self.disc * (1.0 if self.start_at == "random" else 0.5)
-        return in_disc(rng, theta.shape[:-1], reach)
+        radius = self.disc * (1.0 if self.start_at == "random" else 0.5)
+        return in_disc(rng, theta.shape[:-1], radius)
 
 
 @register("rss_table1_k3")
 @dataclass(frozen=True)
 class Table1K3(FixedSources):
-    """Three close sources: a triangle of side 30 m, prior and start 20 m off or anywhere.
+    """Three close sources: a triangle of side 30 m; the prior is 20 m off, or random.
 
     References
     ----------
@@ -261,7 +263,7 @@ class Table1K3(FixedSources):
 @register("rss_table1_k7")
 @dataclass(frozen=True)
 class Table1K7(FixedSources):
-    """Seven sources: the middle and the corners of a hexagon of 50 m, prior 10 m off.
+    """Seven sources: the centre and the corners of a hexagon of 50 m; the prior is 10 m off.
 
     References
     ----------

@@ -1,4 +1,4 @@
-"""Two voices before a symmetric line, one of them walking: the report's Figs 8 and 9."""
+"""Two speakers and a symmetric line, one of them moving: Figs 8 and 9 of the report."""
 
 from __future__ import annotations
 
@@ -24,24 +24,24 @@ SHIPPED = ("synth_count_up_8k.wav", "synth_count_down_8k.wav")
 class SpeechField(SourceField):
     """Speech from 40 to 0 degrees, and from -20, five sensors, 30 dB (and 10 and 5): Fig. 8.
 
-    Two synthetic voices that count, up and down, are shipped; the report's own sounds are not
-    known.
+    Two synthetic voices that count up and down are shipped; the report's recordings are not
+    published.
 
     Parameters
     ----------
     doa_deg, end_deg, distances, snr_db
         As in `SourceField`.
     order : int
-        Of the autoregressive model, fitted to the whole recordings; Fig. 9 has 2.
+        Order of the autoregressive model, fitted to the whole recordings; 2 in Fig. 9.
     recordings : sequence of path, optional
-        Sound files with one channel in place of the two shipped, one a source. Cut to the
-        shortest; without their mean, and scaled to power 1.
+        Sound files with one channel, one a source, in place of the shipped ones. Truncated to the
+        shortest, with zero mean and power 1.
 
     Notes
     -----
-    The array hears real sources as complex snapshots, as narrow-band receivers would: the phases
-    of the array at one frequency, whatever the source's own spectrum. That is the report's model;
-    a microphone array in a room would see a delay in its place.
+    The real source signals are multiplied by the complex response of the array at one frequency,
+    as in narrow-band receivers, for any spectrum of the source. That is the report's model; the
+    signals of a microphone array in a room have delays instead.
 
     References
     ----------
@@ -63,41 +63,41 @@ class SpeechField(SourceField):
     def __post_init__(self) -> None:
         super().__post_init__()
         count("order", self.order)
-        given = SHIPPED if self.recordings is None else tuple(map(str, self.recordings))
-        if len(given) != self.n_sources:
+        paths = SHIPPED if self.recordings is None else tuple(map(str, self.recordings))
+        if len(paths) != self.n_sources:
             raise ValueError(
-                f"recordings must be one for each of {self.n_sources} sources; got {len(given)}"
+                f"recordings must be one for each of {self.n_sources} sources; got {len(paths)}"
             )
         if self.recordings is not None:
-            object.__setattr__(self, "recordings", given)
+            object.__setattr__(self, "recordings", paths)
 
     @property
     def signals(self) -> Float:
-        """The sources, (n_steps, n_sources)."""
-        own: list[Float] = (
+        """Source signals, (n_steps, n_sources)."""
+        signals: list[Float] = (
             [voice(name) for name in SHIPPED]
             if self.recordings is None
-            else [normalised(path) for path in self.recordings]
+            else [read_normalised(path) for path in self.recordings]
         )
-        shortest = min(map(len, own))
-        return np.stack([signal[:shortest] for signal in own], axis=-1)
+        shortest = min(map(len, signals))
+        return np.stack([signal[:shortest] for signal in signals], axis=-1)
 
     @property
     def motion(self) -> AutoregressiveSources:
-        """The models that Yule and Walker's equations give."""
+        """AR models of the signals by the Yule-Walker equations."""
         fits = [yule_walker(signal, self.order) for signal in self.signals.T]
         coefficients, noise = (np.array(each) for each in zip(*fits, strict=True))
         return AutoregressiveSources(coefficients, noise, real_valued=True)
 
     def sample(self, rng: np.random.Generator) -> Trial:
-        """Draw the noise."""
+        """Draw the noise of one trial."""
         return self.make_trial(self.signals, self.motion, rng)
 
 
 @register("ar_fig9")
 @dataclass(frozen=True)
 class SpeechOfOrderTwo(SpeechField):
-    """The same speech with models of order 2, on which the report says that the method fails.
+    """The same speech with models of order 2, for which the report states that the method fails.
 
     References
     ----------
@@ -115,18 +115,18 @@ class SpeechOfOrderTwo(SpeechField):
 @cache
 def voice(name: str) -> Float:
     """Return a shipped recording, of mean 0 and power 1, (n_steps,)."""
-    signal = normalised(Path(str(files("arrivals.scenarios") / "data" / name)))
+    signal = read_normalised(Path(str(files("arrivals.scenarios") / "data" / name)))
     signal.setflags(write=False)
     return signal
 
 
-def normalised(path: str | Path) -> Float:
+def read_normalised(path: str | Path) -> Float:
     """Read a sound file with one channel, of mean 0 and power 1, (n_steps,).
 
     Raises
     ------
     ValueError
-        If it is none, has several channels, or is silent.
+        If it is not a sound file, has several channels, or zero power.
     """
     from arrivals.recordings.readers import read
 
@@ -134,9 +134,9 @@ def normalised(path: str | Path) -> Float:
     if samples.ndim == 2 and samples.shape[1] == 1:
         samples = samples[:, 0]
     if samples.ndim != 1:
-        raise ValueError(f"{path} must have one channel; it has {samples.shape[1]}")
+        raise ValueError(f"{path} must have one channel; got {samples.shape[1]}")
     signal = samples - samples.mean()
     power = float(np.mean(signal**2))
     if not power > 0:
-        raise ValueError(f"{path} is silent")
+        raise ValueError(f"{path} must have positive power; got {power:g}")
     return np.asarray(signal / np.sqrt(power))

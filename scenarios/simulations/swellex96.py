@@ -1,4 +1,4 @@
-"""A source towed past a vertical line array in shallow water, after the SWellEx-96 experiment."""
+"""Simulated tow of a source past a vertical line array: the SWellEx-96 experiment."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from arrivals.scenarios.simulations.line_arrays import complex_normal
 from arrivals.typing import Complex, Float, Int
 from arrivals.validation import count, number, one_of, positive
 
-WITHIN_DB = 10.0  # of the strongest path: what counts as a direction that should be found
+WITHIN_DB = 10.0  # of the strongest path: range of the paths in the truth
 NUMBERS = ("top_m", "bottom_m", "speed_top_m_s", "speed_bottom_m_s", "density_g_cm3",
            "attenuation_db_m_khz")  # fmt: skip
 
@@ -35,7 +35,7 @@ def _table(name: str) -> list[dict[str, str]]:
 
 @lru_cache(maxsize=1)
 def environment() -> Waveguide:
-    """Return the experiment's water and sea floor.
+    """Return the waveguide of the experiment: water and sea floor.
 
     Examples
     --------
@@ -50,12 +50,12 @@ def environment() -> Waveguide:
 
 
 def track() -> dict[str, Float]:
-    """Return the ship's way, (350,) each: step, time_s, and east_m, north_m, range_m of the array.
+    """Return the ship's track, (350,) each: step, time_s, east_m, north_m and range_m.
 
     Examples
     --------
-    >>> way = track()
-    >>> float(way["range_m"].min()), int(way["step"][np.argmin(way["range_m"])])
+    >>> ship = track()
+    >>> float(ship["range_m"].min()), int(ship["step"][np.argmin(ship["range_m"])])
     (900.6, 294)
     """
     rows = _table("track")
@@ -83,34 +83,34 @@ def line(missing: Sequence[int] = (43,)) -> SensorArray:
 @register("swellex96")
 @dataclass(frozen=True)
 class TowPastLine(Scenario):
-    """A tone towed past the vertical array of the SWellEx-96 experiment, its field simulated.
+    """Simulated field of a tone towed past the vertical array of the SWellEx-96 experiment.
 
-    Every path over surface and bottom arrives from its own elevation; paths come, move and go.
+    Each path over surface and bottom has its own elevation; paths appear, move and disappear.
 
     Parameters
     ----------
     snr_db : float
         Mean power of the field over the array's elements at the median step, over the noise power,
-        which is the same in all steps.
+        dB; the noise power is the same in all steps.
     frequency : float
-        Hz.
+        Frequency, Hz.
     source_depth : float
-        m.
+        Depth of the source, m.
     ranges : sequence of float, optional
         Horizontal distance of the source in each step, m; by default that of the ship in the
         experiment, 350 steps of 10.92 s.
     n_steps : int, optional
-        The first so many steps only.
+        Number of steps, from the first; all if None.
     model : {"modes", "rays"}
-        What the field is a sum of.
+        Model of the field.
     missing : sequence of int
-        Elements that are left out, counted from 1; in the experiment number 43 was bad.
+        Missing elements, counted from 1; number 43 was defective in the experiment.
 
     Notes
     -----
-    The truth is the angles of the paths at the middle of the array, from the ray model, of those
-    within 10 dB of the strongest of the step. The pair of rays with and without the bounce off
-    the surface just above the source, less than 1° apart, is one path.
+    The truth has the angles at the centre of the array of the paths within 10 dB of the strongest
+    of the step, from the ray model. The two rays with and without the bounce off the surface just
+    above the source differ by less than 1° and are one path.
 
     References
     ----------
@@ -146,7 +146,7 @@ class TowPastLine(Scenario):
         if self.n_steps is not None:
             count("n_steps", self.n_steps)
         object.__setattr__(self, "missing", tuple(self.missing))
-        line(self.missing)  # refuses numbers that are none of its elements'
+        line(self.missing)  # rejects numbers of other elements
 
     @property
     def distances(self) -> Float:
@@ -156,7 +156,7 @@ class TowPastLine(Scenario):
 
     @property
     def measurement(self) -> ArraySnapshot:
-        """The array at the wavelength that belongs to its mean sound speed."""
+        """The array at the wavelength for its mean sound speed."""
         array = line(self.missing)
         return ArraySnapshot(array, array.wavelength(self.frequency), self.noise)
 
@@ -167,33 +167,33 @@ class TowPastLine(Scenario):
         return float(power / 10 ** (self.snr_db / 10))
 
     def field(self) -> Complex:
-        """Return the field without noise, (n_steps, n_sensors), free space having 1/(4π) at 1 m."""
+        """Return the noise-free field, (n_steps, n_sensors); free space has 1/(4π) at 1 m."""
         return self._whole()[:, self._used()]
 
     def paths(self) -> tuple[list[str], Float, Float]:
-        """Return names, angles and levels of the paths to the middle of the array.
+        """Return names, angles and levels of the paths to the centre of the array.
 
         Returns
         -------
         names : list of str, length n_paths
-            Bounces in order of travel, B bottom and S surface, D for none; the one just above the
-            source is not counted.
+            Bounces in order of travel, B bottom and S surface, D for none; without the one just
+            above the source.
         doa : ndarray, shape (n_steps, n_paths)
-            Elevation, rad, positive from above; NaN where there is no such path.
+            Elevation, rad, positive from above; NaN for absent paths.
         level_db : ndarray, shape (n_steps, n_paths)
-            Re 1 in the unit of `field`; NaN likewise.
+            Level re 1 in the unit of `field`, dB; NaN for absent paths.
         """
         names, doa, level_db = _paths(self.frequency, self.source_depth, self._distances())
         return names.copy(), doa.copy(), level_db.copy()
 
     def truth(self, within_db: float = WITHIN_DB) -> Float:
-        """Return the angles of the paths within so many dB of the strongest, (n_steps, n_paths)."""
+        """Return angles of the paths within `within_db` of the strongest, (n_steps, n_paths)."""
         _, doa, level = self.paths()
         strongest = np.nanmax(level, axis=1, keepdims=True, initial=-np.inf)
         return np.where(level >= strongest - within_db, doa, np.nan)
 
     def sample(self, rng: np.random.Generator) -> Trial:
-        """Draw the noise of one trial; the elements share it with the array that lacks none."""
+        """Draw the noise of one trial, for all 64 elements, missing ones included."""
         whole, model = self._whole(), self.measurement
         u = np.sqrt(self.noise) * complex_normal(rng, whole.shape)
         return Trial((whole + u)[:, self._used()], self.truth(), model, BernoulliVonMises())
@@ -210,7 +210,7 @@ class TowPastLine(Scenario):
 
 @lru_cache(maxsize=8)
 def _field(model: str, frequency: float, source_depth: float, ranges: tuple[float, ...]) -> Complex:
-    """Return the field at all 64 elements, (n_steps, 64), not to be written to."""
+    """Return the field at all 64 elements, (n_steps, 64), read-only."""
     guide, depths = environment(), -line(missing=()).positions[:, 0]
     if model == "modes":
         step = min(0.125, guide.speeds.min() / frequency / 60)
@@ -226,15 +226,15 @@ def _field(model: str, frequency: float, source_depth: float, ranges: tuple[floa
 def _paths(
     frequency: float, source_depth: float, ranges: tuple[float, ...]
 ) -> tuple[list[str], Float, Float]:
-    """Return names, angles and levels of the paths to mid-array, not to be written to."""
-    middle = -float(line(missing=()).positions.mean())
-    rays = eigenrays(environment(), frequency, source_depth, middle, ranges)
+    """Return names, angles and levels of the paths to the centre of the array, cached."""
+    centre = -float(line(missing=()).positions.mean())
+    rays = eigenrays(environment(), frequency, source_depth, centre, ranges)
     merged = np.array([_without_first(name) for name in rays.path.tolist()], dtype=np.str_)
     names, column = np.unique(merged, return_inverse=True)
-    shape, place = (len(ranges), len(names)), rays.step * len(names) + column
+    shape, index = (len(ranges), len(names)), rays.step * len(names) + column
     size, p = np.abs(rays.pressure), rays.pressure
     weight, moment, re, im = (
-        np.bincount(place, part, shape[0] * shape[1]).reshape(shape)
+        np.bincount(index, part, shape[0] * shape[1]).reshape(shape)
         for part in (size, size * rays.doa, p.real, p.imag)
     )
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -243,7 +243,7 @@ def _paths(
 
 
 def _without_first(path: str) -> str:
-    """Return the name of a path less the bounce off the surface above the source.
+    """Return the name of a path without the bounce off the surface above the source.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Beamformers over a whole record of real samples: what the delay filters are compared with."""
+"""Conventional and MVDR beamformers on whole records of real samples, for comparison."""
 
 from __future__ import annotations
 
@@ -26,22 +26,30 @@ def scan(
     loading: float | None = None,
     refine: bool = True,
 ) -> float:
-    """Return the direction, rad, of the highest beam over a record.
+    """Return the direction, rad, of the maximum beam power over a record.
 
-    One tone is scanned by the covariance of its analytic signal, anything else by the bins of
-    the record's spectrum in which the source has power.
+    A single tone is scanned with the covariance of its analytic signal, other sources with the
+    bins of the record's spectrum in which the source has power.
 
     Parameters
     ----------
     samples : array_like, shape (n_steps, n_sensors)
-        Real.
+        Real samples.
     measurement : ArraySamples
+        Array, sampling rate and correlation of the source.
     method : {"conventional", "mvdr"}
+        Beamformer.
     loading : float, optional
-        Of MVDR, in mean powers of a sensor: 0.01 for a tone, 0.3 for a band if None.
+        Diagonal loading of MVDR, in mean powers of a sensor: 0.01 for a tone, 0.3 for a band if
+        None.
     refine : bool
-        Look everywhere. If false, only at whole degrees: a truth that is one of them then gives
-        errors of exactly zero, which say nothing about the method.
+        Interpolate between the grid's directions. If false, scan whole degrees only: a truth on
+        this grid then gives errors of exactly zero, an artefact.
+
+    Returns
+    -------
+    float
+        Direction, rad.
 
     Raises
     ------
@@ -81,7 +89,7 @@ def scan(
 
 
 def _highest(power: Float) -> Int:
-    """Return the index of the highest, (1,), not at the ends."""
+    """Return the index of the maximum, (1,), without the ends."""
     return np.array([1 + int(np.argmax(power[1:-1]))])
 
 
@@ -137,7 +145,7 @@ class Broadband:
 
 
 def bins(frequencies: Float, measurement: ArraySamples) -> Int:
-    """Return the indices of the bins that hold the source: its band, or its tones and neighbours.
+    """Return the indices of the bins of a source: its band, or its tones and their neighbours.
 
     Examples
     --------
@@ -149,6 +157,6 @@ def bins(frequencies: Float, measurement: ArraySamples) -> Int:
     low, high = (source.low, source.high) if isinstance(source, FlatBand) else (0, source.highest)
     if isinstance(source, Tones):
         nearest = np.abs(frequencies[:, None] - np.asarray(source.frequencies)).argmin(axis=0)
-        wanted = np.unique(nearest[:, None] + [-1, 0, 1])
-        return wanted[(wanted > 0) & (wanted < len(frequencies))]
+        index = np.unique(nearest[:, None] + [-1, 0, 1])
+        return index[(index > 0) & (index < len(frequencies))]
     return np.flatnonzero((frequencies >= max(low, 1e-12)) & (frequencies <= high))

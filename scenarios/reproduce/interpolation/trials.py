@@ -1,4 +1,4 @@
-"""Many trials of one source at once, and what each method makes of them, in degrees."""
+"""Batches of trials of one source, and the directions of each method, in degrees."""
 
 from __future__ import annotations
 
@@ -13,10 +13,20 @@ from arrivals.measurement_models.delays.source_correlation import SourceCorrelat
 from arrivals.motion_models import MotionModel
 from arrivals.scenarios.bounds.delay import band_bound, tone_bound
 from arrivals.scenarios.reproduce.interpolation.beamformers import Method, scan
-from arrivals.scenarios.simulations.sampled_source import InterpolationScenario
+from arrivals.scenarios.simulations.sampled_source import (
+    InterpolationBand,
+    InterpolationCoupled,
+    InterpolationScenario,
+    InterpolationTone,
+)
 from arrivals.trackers import InterpolationEKF
 from arrivals.typing import Float
 
+SOURCES: dict[str, InterpolationScenario] = {
+    "tone": InterpolationTone(),
+    "band": InterpolationBand(),
+    "qpc": InterpolationCoupled(),
+}
 FILTERS = ("B", "Bw", "C", "D", "E", "E2", "phasor")
 
 
@@ -33,10 +43,10 @@ def draws(scenario: InterpolationScenario, runs: int, seed: int) -> Float:
 def tracker(
     measurement: ArraySamples, method: str, start_deg: float, n_steps: int, **params: Any
 ) -> InterpolationEKF:
-    """Make a filter as the studies use it: the paper's form for "B", a fourth of "E2" to acquire.
+    """Make a filter of the studies: the paper's form for "B", a fourth of the record to acquire.
 
-    The paper's correlation is that of a flat band, also where the source is made of tones. The
-    joint filter "E" starts within the main lobe, known to 0.08 in the sine.
+    The paper's correlation is that of a flat band, also for tones. The joint filter "E" starts
+    within the main lobe, with a standard deviation of 0.08 in the sine.
     """
     if method == "E":
         params = {"std": 0.08 / np.cos(np.deg2rad(start_deg))} | params
@@ -74,7 +84,7 @@ def scan_records(
 def final_directions(
     scenario: InterpolationScenario, runs: int, seed: int, method: str, start_deg: float
 ) -> Float:
-    """Return the directions that a filter or a scan ends with, degrees, (runs,)."""
+    """Return the final directions of a filter or a scan, degrees, (runs,)."""
     samples = draws(scenario, runs, seed)
     if method in FILTERS:
         return filter_directions(scenario, samples, method, start_deg)[:, -1]
@@ -83,7 +93,7 @@ def final_directions(
 
 
 def bound_deg(scenario: InterpolationScenario) -> float:
-    """Return the Cramér-Rao bound of a source at rest: standard deviation, degrees."""
+    """Return the Cramér-Rao bound of a static source, a standard deviation, degrees."""
     model, doa = scenario.measurement, np.deg2rad(scenario.doa_deg)
     bound = band_bound if isinstance(model.correlation, FlatBand) else tone_bound
     return float(np.rad2deg(bound(model, doa, scenario.n_steps)))
@@ -101,13 +111,14 @@ def rms(error: Float) -> float:
 
 
 def smooth(x: Float, P: Float, motion: MotionModel) -> Float:
-    """Return the means of Rauch, Tung and Striebel's smoother of a linear motion.
+    """Return the means of the Rauch-Tung-Striebel smoother of a linear motion.
 
     Parameters
     ----------
     x, P : ndarray, shape (..., n_steps, dim_x), (..., n_steps, dim_x, dim_x)
-        A filter's beliefs after its measurements.
+        Posterior means and covariances of a filter.
     motion : MotionModel
+        A linear motion model.
     """
     F, Q = motion.F(np.zeros(motion.dim_x)), motion.Q()
     means = x.copy()
@@ -129,8 +140,8 @@ def moving_errors(
 ) -> tuple[float, float]:
     """Return the RMSE over snapshots of `span`, degrees, of a filter and of its smoother.
 
-    Estimates are held against the truth of the snapshot that they treat, `latency` ago. "E" is not
-    smoothed (NaN): a shifted delay line is known without error, its covariance singular.
+    Estimates are compared with the truth of their own snapshot, `latency` ago. "E" is not smoothed
+    (NaN): its shifted delay line has a singular covariance.
     """
     model, truth = scenario.measurement, np.rad2deg(scenario.truth()[:, 0])
     made = tracker(model, method, scenario.doa_deg, scenario.n_steps, motion=motion, **params)

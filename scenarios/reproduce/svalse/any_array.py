@@ -1,7 +1,7 @@
-"""Directions on circles, directional elements and sparse lines: what looks and memory gain.
+"""SVALSE on circles and sparse lines: the gain from several snapshots and from memory.
 
-Nothing of this is published: the figures beside ours are those of the prototype from which the
-method was specified, means of 4 to 6 runs.
+No results are published: the figures beside ours are those of the prototype from which the method
+was specified, means of 4 to 6 runs.
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MERGED: dict[str, Any] = {"solver": NewtonSolver(merge=np.deg2rad(1.5))}
-STRICT: dict[str, Any] = {"threshold_db": 3.0}  # of the beam's peaks
+STRICT: dict[str, Any] = {"threshold_db": 3.0}  # of the beam peaks
 NAMES = {"svalse": "SVALSE", "valse": "VALSE", "cbf": "beamformer",
          "peaks_gnn": "beamformer, tracked"}  # fmt: skip
 
 
 @dataclass(frozen=True)
 class ArrayExperiment:
-    """One row: a scene and its numbers, a tracker and its settings, the prototype's GOSPA."""
+    """One row: scenario and parameters, tracker and settings, the prototype's GOSPA."""
 
-    scene: str
-    told: str
-    numbers: dict[str, Any]
+    scenario: str
+    label: str
+    parameters: dict[str, Any]
     method: str
     prototype: float
     params: dict[str, Any] = field(default_factory=dict)
@@ -53,16 +53,12 @@ def _of_circle() -> list[ArrayExperiment]:
         ("10 bins", 10.0): ({"n_bins": 10}, 4.8, 10.3, 12.1),
     }
     cases = []
-    for (looks, snr_db), (numbers, *prototype) in figures.items():
+    for (data, snr_db), (parameters, *prototype) in figures.items():
         settings: list[dict[str, Any]] = [{}, MERGED, STRICT, STRICT]
         figures_of_all = (*prototype, np.nan)
         for method, figure, params in zip(NAMES, figures_of_all, settings, strict=True):
-            told = f"circle, {looks}, {snr_db:g} dB"
-            cases.append(
-                ArrayExperiment(
-                    "circle", told, {"snr_db": snr_db} | numbers, method, figure, params
-                )
-            )
+            label, of_case = f"circle, {data}, {snr_db:g} dB", {"snr_db": snr_db} | parameters
+            cases.append(ArrayExperiment("circle", label, of_case, method, figure, params))
     return cases
 
 
@@ -76,16 +72,16 @@ def _of_sparse_line() -> list[ArrayExperiment]:
         ("hopping, whole posterior", hop, {"memory": "posterior"}, 2.77, 6.28),
     ]
     cases = []
-    for told, numbers, params, *figure in figures:
+    for data, parameters, params, *figure in figures:
         for n in (1, 2):
-            scene = f"sparse line, {n} source{'s' * (n > 1)}, {told}"
-            of_scene = {"n_sources": n} | numbers
+            label = f"sparse line, {n} source{'s' * (n > 1)}, {data}"
+            of_case = {"n_sources": n} | parameters
             cases.append(
-                ArrayExperiment("grating", scene, of_scene, "svalse", figure[n - 1], params)
+                ArrayExperiment("grating", label, of_case, "svalse", figure[n - 1], params)
             )
             if not params:
                 cases.append(
-                    ArrayExperiment("grating", scene, of_scene, "peaks_gnn", np.nan, STRICT)
+                    ArrayExperiment("grating", label, of_case, "peaks_gnn", np.nan, STRICT)
                 )
     return cases
 
@@ -94,71 +90,69 @@ CASES = [*_of_circle(), *_of_sparse_line()]
 
 
 def any_array(runs: int, seed: int) -> Report:
-    """Mean GOSPA of every case, and a run on the circle as a picture."""
-    found = np.array(
-        parallel_map(_scored, [(case, seed + n) for case in CASES for n in range(runs)])
-    )
-    found = found.reshape(len(CASES), runs, 4)
+    """Mean GOSPA of every case, and one run on the circle as a figure."""
+    runs_of_cases = [(case, seed + n) for case in CASES for n in range(runs)]
+    scores = np.array(parallel_map(_scores, runs_of_cases)).reshape(len(CASES), runs, 4)
     rows = []
-    for case, parts in zip(CASES, found, strict=True):
+    for case, parts in zip(CASES, scores, strict=True):
         error = parts[:, 0].std(ddof=1) / np.sqrt(runs)
         name = NAMES[case.method]
-        rows.append((case.told, name, *parts.mean(axis=0).tolist(), float(error), case.prototype))
+        rows.append((case.label, name, *parts.mean(axis=0).tolist(), float(error), case.prototype))
     columns = ("scene", "method", "GOSPA", "distance", "missed", "false", "std error", "prototype")
     remarks = (
-        "GOSPA in degrees, cut-off 10 degrees, on the circle. The prototype's figures are means of "
-        "4 to 6 runs; its beamformer had the best of several thresholds, ours has 3 dB. "
-        "'beamformer, tracked' is `peaks_gnn` behind it. VALSE merges components within 1.5 "
-        "degrees, as SVALSE does. Eight sensors two wavelengths apart hear images of every source.",
-        *_claims(found[:, :, 0]),
+        "GOSPA in degrees, wrapped, with a cut-off of 10 degrees. The prototype's figures are "
+        "means of 4 to 6 runs; its beamformer has the best of several thresholds, ours has 3 dB. "
+        "'beamformer, tracked' is `peaks_gnn` on the beamformer's peaks. VALSE merges components "
+        "within 1.5 degrees, as SVALSE does. The sparse line has eight sensors two wavelengths "
+        "apart: every source has grating lobes.",
+        *claims(scores[:, :, 0]),
     )
     title = f"Any array: GOSPA over {runs} runs"
     return Report(title, columns, rows, remarks, {"circle": _draw(seed)})
 
 
-# What is below what, of the same draws: (scene, method) twice, and in words.
+# Claims on the same draws: (label, method) of the lower and the higher GOSPA, and the claim
 ORDER = [
     (("circle, 1 snapshot, 20 dB", "svalse"), ("circle, 1 snapshot, 20 dB", "valse"),
-     "on the circle SVALSE is below VALSE with one snapshot"),
+     "on the circle SVALSE has a lower GOSPA than VALSE with one snapshot"),
     (("circle, 10 snapshots, 20 dB", "svalse"), ("circle, 10 snapshots, 20 dB", "valse"),
-     "so it is with ten snapshots"),
+     "the same with ten snapshots"),
     (("circle, 10 bins, 20 dB", "svalse"), ("circle, 10 bins, 20 dB", "valse"),
-     "so it is with ten frequencies"),
+     "the same with ten frequencies"),
     (("circle, 1 snapshot, 20 dB", "svalse"), ("circle, 1 snapshot, 20 dB", "peaks_gnn"),
-     "SVALSE is below the tracked beamformer"),
+     "SVALSE has a lower GOSPA than the tracked beamformer"),
     (("sparse line, 2 sources, 5 bins", "svalse"), ("sparse line, 2 sources, 1 bin", "svalse"),
-     "several frequencies tell a source from its images"),
+     "several frequencies resolve the grating lobes"),
     (("sparse line, 2 sources, hopping", "svalse"), ("sparse line, 2 sources, 1 bin", "svalse"),
-     "one random frequency a step does so over time"),
+     "one random frequency a step resolves them over time"),
     (("sparse line, 2 sources, hopping, whole posterior", "svalse"),
      ("sparse line, 2 sources, hopping", "svalse"),
-     "for that, whole densities by coordinate ascent are better than joint Newton steps"),
+     "with one random frequency, whole posteriors by coordinate ascent are better than Newton "
+     "steps"),
 ]  # fmt: skip
 
 
-def _claims(gospa: Float) -> list[str]:
-    """Say of each pair whether the first is below the second, by GOSPA (n_cases, n_runs)."""
-    of = {(case.told, case.method): values for case, values in zip(CASES, gospa, strict=True)}
+def claims(gospa: Float) -> list[str]:
+    """Return the verdicts on `ORDER` by paired differences of GOSPA (n_cases, n_runs)."""
+    values = {(case.label, case.method): row for case, row in zip(CASES, gospa, strict=True)}
     lines = []
-    for low, high, told in ORDER:
-        d = of[low] - of[high]
+    for low, high, claim in ORDER:
+        d = values[low] - values[high]
         mean, error = float(d.mean()), float(d.std(ddof=1) / np.sqrt(len(d)))
         numbers = f"paired difference {mean:.2f} ± {error:.2f} standard error"
-        lines.append(verdict(told, negative(mean, error), numbers))
+        lines.append(verdict(claim, negative(mean, error), numbers))
     return lines
 
 
-def _scored(case: ArrayExperiment, seed: int) -> tuple[float, float, float, float]:
-    trial = create(case.scene, **case.numbers).sample(np.random.default_rng(seed))
+def _scores(case: ArrayExperiment, seed: int) -> tuple[float, float, float, float]:
+    trial = create(case.scenario, **case.parameters).sample(np.random.default_rng(seed))
     g = _gospa(trial, _run(trial, case.method, case.params))
     return g.total, g.distance, g.missed, g.false
 
 
 def _run(trial: Trial, method: str, params: dict[str, Any]) -> Run:
     with warnings.catch_warnings():
-        warnings.filterwarnings(
-            "ignore", "directions .* are ambiguous"
-        )  # the sparse line is meant to
+        warnings.simplefilter("ignore", UserWarning)  # the sparse line is ambiguous
         if method == "peaks_gnn":
             params = {"detector": trial.tracker("cbf", **params)}
         return trial.tracker(method, **params).run(trial.measurements)
@@ -177,13 +171,13 @@ def _draw(seed: int) -> Figure:
     figure = Figure(figsize=(9.0, 7.5), layout="constrained")
     panels = figure.subplots(2, sharex=True)
     for ax, n_snapshots in zip(panels, (1, 10), strict=True):
-        scene = Circle(n_snapshots=n_snapshots)
-        trial = scene.sample(np.random.default_rng(seed))
-        run, model = _run(trial, "svalse", {}), scene.measurement
+        scenario = Circle(n_snapshots=n_snapshots)
+        trial = scenario.sample(np.random.default_rng(seed))
+        run, model = _run(trial, "svalse", {}), scenario.measurement
         plot_bearing_time(run, snapshots=trial.measurements, measurement=model, ax=ax)
         truth: Float = np.rad2deg(trial.truth)
         ax.plot(truth, linestyle="none", marker="+", markersize=4, color="black", zorder=5)
         ax.set_title(f"SVALSE, {n_snapshots} snapshot{'s' * (n_snapshots > 1)} a step, 20 dB; "
-                     "truth as crosses", loc="left", fontsize=11)  # fmt: skip
+                     "crosses: truth", loc="left", fontsize=11)  # fmt: skip
         ax.label_outer()
     return figure

@@ -1,4 +1,4 @@
-"""Figs 4 to 7 of the paper on SVALSE: single runs over the beam, and tables over many."""
+"""Figs 4 to 7 of the paper on SVALSE: tracks of single runs, and tables over many runs."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ def as_printed(max_iterations: int) -> dict[str, Any]:
 
 
 def svalse_as_printed(label: str, **probabilities: float) -> Method:
-    """Return the paper's form of SVALSE, with its walk in the electrical angle.
+    """Return SVALSE as published, with its walk in the electrical angle.
 
     Examples
     --------
-    >>> svalse_as_printed("never lets go", p_deactivate=0.0).params["motion"].walk.kappa
+    >>> svalse_as_printed("no deaths", p_deactivate=0.0).params["motion"].walk.kappa
     148.0
     """
     motion = BernoulliVonMises(**probabilities)
@@ -52,7 +52,7 @@ COLUMNS = ("method", "GOSPA", "std of runs", "from", "to", "distance", "missed",
 
 
 def table_methods(quick: bool) -> list[Method]:
-    """Return the methods of the tables; the paper's form takes ten times as long."""
+    """Return the methods of the tables; the published forms take ten times as long."""
     return methods(FAST if quick else (*FAST, *PRINTED))
 
 
@@ -62,13 +62,13 @@ def fig4(runs: int, seed: int, out: Path | None = None, quick: bool = False) -> 
 
 
 def fig5(runs: int, seed: int, out: Path | None = None, quick: bool = False) -> Report:
-    """Random pairs of the six sources off."""
-    remark = "Fig. 5 is read as: a pair drawn anew at every step but the first is off."
+    """Random pairs of the six sources inactive."""
+    remark = "Our reading of Fig. 5: a pair redrawn at every step but the first is inactive."
     return scene("svalse_fig5", "Fig. 5: random pairs off", runs, seed, out, quick, remark)
 
 
 def fig6(runs: int, seed: int, out: Path | None = None, quick: bool = False) -> Report:
-    """Neighbouring pairs of the six sources off in turn."""
+    """Neighbouring pairs of the six sources inactive in turn."""
     return scene("svalse_fig6", "Fig. 6: pairs off in turn", runs, seed, out, quick)
 
 
@@ -81,18 +81,18 @@ def scene(
                         batch=batch_of(runs))  # fmt: skip
     rows = [_row(study, name, method) for method in study.methods]
     claims = [*_order(study), *_as_rebuilt(study, name), *_calibration(study)]
-    said = [*remarks, *SPREADS, *claims, _bound(scenario, runs, seed)]
+    lines = [*remarks, *SPREADS, *claims, _bound(scenario, runs, seed)]
     figures = {
         "tracks": draw_runs(
             scenario, seed, methods(SHOWN), [PAPER[name].get(method, NAN) for method in SHOWN]
         ),
         "gospa": draw_parts(study, name),
     }
-    return Report(f"{title}, {runs} runs at 20 dB, degrees", COLUMNS, rows, said, figures)
+    return Report(f"{title}, {runs} runs at 20 dB, degrees", COLUMNS, rows, lines, figures)
 
 
 def batch_of(runs: int) -> int:
-    """Return how many runs a process is given at once: a few processes have enough to do.
+    """Return the number of runs in a batch: eight batches or more for a few processes.
 
     Examples
     --------
@@ -103,13 +103,14 @@ def batch_of(runs: int) -> int:
 
 
 SPREADS = (
-    "From, to: 95 % bootstrap interval of the mean. Label switches: in a run. Track length: steps "
-    "for which a source is found under one label without a gap. NEES: squared error over stated "
-    "variance, 1 if right; in 68 %, in 95 %: share of errors within the stated intervals.",
+    "From, to: 95 % bootstrap interval of the mean. Label switches: number in a run. Track length: "
+    "number of steps in which a source is detected with one label, without a gap. NEES: squared "
+    "error over stated variance, 1 if consistent; in 68 %, in 95 %: fraction of errors within the "
+    "stated intervals.",
     "Rebuilt: the published programs of SBL and SSBL; VALSE and SVALSE as the paper prints them "
-    "(coordinate ascent, first sensor as reference of the phases, tolerance 1e-6, a walk in the "
-    "electrical angle). Ours, unless so called, take joint Newton steps, count phases from the "
-    "middle and walk 1.5 degrees in direction.",
+    "(coordinate ascent, first sensor as phase reference, tolerance 1e-6, a walk in the electrical "
+    "angle). Ours, unless called 'as printed', use joint Newton steps, a phase reference in the "
+    "middle and a walk of 1.5 degrees in direction.",
 )
 
 
@@ -117,19 +118,19 @@ def _row(study: Study, name: str, method: str) -> tuple[Any, ...]:
     def mean(metric: str) -> float:
         try:
             return study.mean(metric, method)
-        except ValueError:  # frame by frame there are no labels
+        except ValueError:  # methods without memory have no labels
             return NAN
 
     rebuilt = REBUILT[name].get(tracker_name(method))
     known = (rebuilt.gospa, rebuilt.std, rebuilt.rmse) if rebuilt else (NAN,) * 3
-    wanted = ("distance", "missed", "false", "rmse", "cardinality", "label_switches",
-              "track_length", "nees", "coverage68", "coverage95", "cpu_ms")  # fmt: skip
+    metrics = ("distance", "missed", "false", "rmse", "cardinality", "label_switches",
+               "track_length", "nees", "coverage68", "coverage95", "cpu_ms")  # fmt: skip
     return (
         method,
         study.mean("gospa", method),
         study.spread("gospa", method),
         *study.interval("gospa", method),
-        *map(mean, wanted),
+        *map(mean, metrics),
         PAPER[name].get(tracker_name(method), NAN),
         *known,
     )
@@ -141,22 +142,22 @@ def _order(study: Study) -> list[str]:
     if "svalse as printed" in study.methods:
         claims.append(("svalse as printed", "ssbl"))
     for better, worse in claims:
-        off = study.paired("gospa", better, worse)
+        d = study.paired("gospa", better, worse)
         numbers = (
-            f"paired difference {off.mean:.2f} ± {off.error:.2f} standard error, "
-            f"below 0 in {off.n_below} of {off.n_runs} runs"
+            f"paired difference {d.mean:.2f} ± {d.error:.2f} standard error, "
+            f"below 0 in {d.n_below} of {d.n_runs} runs"
         )
-        fact = negative(off.mean, off.error)
+        fact = negative(d.mean, d.error)
         lines.append(verdict(f"{better} has a lower GOSPA than {worse}", fact, numbers))
     return lines
 
 
 def _as_rebuilt(study: Study, name: str) -> list[str]:
-    """Hold the methods that are the rebuilt ones to what those gave."""
+    """Compare the methods that are the rebuilt ones with the rebuilt values."""
     lines = []
     for method in study.methods:
         its = REBUILT[name].get(tracker_name(method))
-        if its is None or method in ("valse", "svalse"):  # these are more than the paper's
+        if its is None or method in ("valse", "svalse"):  # these improve on the paper's
             continue
         gospa = study.mean("gospa", method)
         numbers = f"GOSPA {gospa:.2f}, rebuilt {its.gospa:.2f} ± {its.std:.2f}"
@@ -168,12 +169,12 @@ def _as_rebuilt(study: Study, name: str) -> list[str]:
 
 
 def _calibration(study: Study) -> list[str]:
-    """Tell of each method that states deviations whether they are right."""
+    """Check the stated standard deviations of each method that has them."""
     lines = []
     for method in study.methods:
         try:
             nees, c68, c95 = (study.mean(m, method) for m in ("nees", "coverage68", "coverage95"))
-        except ValueError:  # it states none
+        except ValueError:  # no standard deviations
             continue
         numbers = (
             f"errors {np.sqrt(nees):.1f} times as large as stated, in rms; the 68 % and 95 % "
@@ -189,7 +190,7 @@ def _calibration(study: Study) -> list[str]:
 def _bound(scenario: Scenario, runs: int, seed: int) -> str:
     bound = line_bound(scenario, min(runs, 6), seed)  # type: ignore[arg-type]  # a LineScenario
     return (
-        f"Scale: an efficient method that sees one snapshot and knows the number of sources would "
+        f"Scale: an efficient estimator from one snapshot with a known number of sources would "
         f"have a GOSPA of {bound.gospa:.2f} and an RMSE of {bound.rmse:.2f} (deterministic "
         f"Cramér-Rao bound, capped at the cut-off)."
     )
@@ -199,11 +200,11 @@ def _bound(scenario: Scenario, runs: int, seed: int) -> str:
 
 
 def fig7(runs: int, seed: int, out: Path | None = None) -> Report:
-    """Probabilities of birth and death at their ends, on the scene of Fig. 6."""
-    panels = {f"p_d {off:g}, p_a {on:g}": (off, on) for off, on in ACTIVATION}
+    """Extreme probabilities of birth and death, on the scenario of Fig. 6."""
+    panels = {f"p_d {death:g}, p_a {birth:g}": (death, birth) for death, birth in ACTIVATION}
     settings = [
-        svalse_as_printed(label, p_deactivate=off, p_activate=on)
-        for label, (off, on) in panels.items()
+        svalse_as_printed(label, p_deactivate=death, p_activate=birth)
+        for label, (death, birth) in panels.items()
     ]
     scenario = create("svalse_fig6")
     study = monte_carlo({"svalse_fig6": scenario}, settings, runs, seed, out=out, batch=1)
@@ -218,10 +219,10 @@ def fig7(runs: int, seed: int, out: Path | None = None) -> Report:
 
 
 CLAIMS = (
-    ("who never lets go finds false sources", "false"),
-    ("who forgets misses sources", "missed"),
-    ("who lets nothing in misses sources", "missed"),
-    ("who lets everything in finds false sources", "false"),
+    ("without deaths there are false sources", "false"),
+    ("without memory sources are missed", "missed"),
+    ("without births sources are missed", "missed"),
+    ("with certain births there are false sources", "false"),
 )
 
 
@@ -242,14 +243,14 @@ def _activation_claims(study: Study) -> list[str]:
 
 
 FORCED = (
-    "Where every component is forced on, merging takes most of them off again, and what is left "
-    "hangs on how the angles are integrated: the published program has mixtures "
+    "With certain births every component is active; merging removes most of them, and the rest "
+    "depends on the integration over the angles: the published program uses mixtures "
     '(`posterior="mixture"`) in place of quadrature.'
 )
 
 
-def _activation_row(study: Study, label: str, off: float, on: float) -> tuple[Any, ...]:
-    known = ACTIVATION[off, on]
+def _activation_row(study: Study, label: str, death: float, birth: float) -> tuple[Any, ...]:
+    known = ACTIVATION[death, birth]
     means = [study.mean(metric, label) for metric in ("missed", "false", "rmse", "converged")]
-    return (off, on, study.mean("gospa", label), study.spread("gospa", label), *means,
+    return (death, birth, study.mean("gospa", label), study.spread("gospa", label), *means,
             known.paper, known.paper_rmse, known.gospa, known.std, known.rmse)  # fmt: skip

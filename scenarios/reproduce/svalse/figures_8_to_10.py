@@ -28,7 +28,7 @@ SNR_DB = tuple(float(snr) for snr in range(0, 45, 5))
 MEASURED = ("gospa", "distance", "missed", "false", "rmse", "converged")
 
 
-@lru_cache(maxsize=2)  # Fig. 10 looks at what Figs 8 and 9 have computed
+@lru_cache(maxsize=2)  # Fig. 10 uses the results of Figs 8 and 9
 def sweep(name: str, runs: int, seed: int, out: Path | None, quick: bool) -> Study:
     """Run all methods on a scene at every SNR; the cases are the SNRs."""
     cases = {f"{snr:g}": create(name, snr_db=snr) for snr in SNR_DB}
@@ -47,7 +47,7 @@ def fig9(runs: int, seed: int, out: Path | None = None, quick: bool = False) -> 
 
 
 def parts(name: str, figure: str, runs: int, seed: int, out: Path | None, quick: bool) -> Report:
-    """Tabulate and draw one sweep."""
+    """Return the table and the figure of one sweep."""
     study = sweep(name, runs, seed, out, quick)
     rows = [_row(study, name, snr, method) for snr in SNR_DB for method in study.methods]
     columns = ("snr_db", "method", "GOSPA", "std of runs", "distance", "missed", "false", "RMSE",
@@ -59,8 +59,8 @@ def parts(name: str, figure: str, runs: int, seed: int, out: Path | None, quick:
 
 
 BOUND = (
-    "Bound: an efficient method that sees one snapshot and knows the number of sources; what is "
-    "carried from step to step may lie below it. The rebuilt figures are means of 3 runs."
+    "Bound: an efficient estimator from one snapshot with a known number of sources; a method with "
+    "memory may be below it. The rebuilt figures are means of 3 runs."
 )
 
 
@@ -93,7 +93,7 @@ def _claims(study: Study, name: str) -> list[str]:
     lines = [
         verdict("svalse has the lowest GOSPA of the four up to 20 dB", len(low) == 5,
               f"at {', '.join(map(str, low)) or 'no'} dB"),
-        verdict("below 10 dB sbl and ssbl suffer from false directions",
+        verdict("below 10 dB sbl and ssbl have false directions",
               mean("false", "ssbl", 5) > 2 * mean("false", "svalse", 5),
               f"false at 5 dB: ssbl {mean('false', 'ssbl', 5):.1f}, "
               f"svalse {mean('false', 'svalse', 5):.1f}"),
@@ -104,7 +104,7 @@ def _claims(study: Study, name: str) -> list[str]:
     ]  # fmt: skip
     if name == "svalse_scenario2":
         lines.append(
-            verdict("at 0 dB the RMSE, blind to false directions, favours ssbl over svalse",
+            verdict("at 0 dB the RMSE, which ignores false directions, favours ssbl over svalse",
                   mean("rmse", "ssbl", 0) < mean("rmse", "svalse", 0),
                   f"{mean('rmse', 'ssbl', 0):.1f} and {mean('rmse', 'svalse', 0):.1f}")
         )  # fmt: skip
@@ -112,11 +112,11 @@ def _claims(study: Study, name: str) -> list[str]:
 
 
 def _draw_rebuilt(ax: Axes, name: str, part: int) -> None:
-    """Mark the rebuilt GOSPA (part 0) or RMSE (1) by crosses, in the methods' colours."""
+    """Draw the rebuilt GOSPA (part 0) or RMSE (1) as crosses, in the methods' colours."""
     for n, method in enumerate(SWEPT):
         values = [known[n][part] for known in SWEEP[name].values()]
-        told = "rebuilt" if n == 0 else None
-        ax.plot(SNR_DB, values, "x", color=METHOD_COLOURS[method], markersize=5, label=told)
+        label = "rebuilt" if n == 0 else None
+        ax.plot(SNR_DB, values, "x", color=METHOD_COLOURS[method], markersize=5, label=label)
 
 
 def _draw_parts(study: Study, name: str, bounds: dict[str, LineBound]) -> Figure:
@@ -137,7 +137,7 @@ def _draw_parts(study: Study, name: str, bounds: dict[str, LineBound]) -> Figure
 def fig10(runs: int, seed: int, out: Path | None = None, quick: bool = False) -> Report:
     """RMSE against the SNR, both scenarios."""
     rows: list[tuple[Any, ...]] = []
-    said: list[str] = []
+    remarks: list[str] = []
     figure, axes = panels(1, 2, (11.0, 4.2))
     for ax, name in zip(axes, SCENES, strict=False):
         study, bounds = sweep(name, runs, seed, out, quick), _bounds(name, runs, seed)
@@ -147,26 +147,24 @@ def fig10(runs: int, seed: int, out: Path | None = None, quick: bool = False) ->
         least = min(study.mean("rmse", method, case) for method in study.methods
                     for case in study.cases)  # fmt: skip
         ax.set(xlabel="SNR, dB", ylabel="RMSE, degrees", yscale="log", title=SCENES[name])
-        ax.set_ylim(bottom=max(least / 3, 1e-4))  # an interval may reach down to zero
-        said += _rmse_claims(study, SCENES[name])
+        ax.set_ylim(bottom=max(least / 3, 1e-4))  # an interval may extend to zero
+        remarks += _rmse_claims(study, SCENES[name])
         for snr in SNR_DB:
             rows += [(name, *_rmse_row(study, name, snr, method), bounds[f"{snr:g}"].rmse)
                      for method in study.methods]  # fmt: skip
     columns = ("scenario", "snr_db", "method", "RMSE", "std of runs", "rebuilt", "bound")
     title = f"Fig. 10: RMSE against the SNR, {runs} runs, degrees"
-    return Report(title, columns, rows, (*said, BOUND), {"rmse": figure})
+    return Report(title, columns, rows, (*remarks, BOUND), {"rmse": figure})
 
 
 def _rmse_claims(study: Study, scene: str) -> Iterator[str]:
-    """Hold that the RMSE, blind to false directions, favours ssbl at low SNR only."""
+    """Check that the RMSE, which ignores false directions, favours ssbl at low SNR only."""
     for snr, better, worse in ((0, "ssbl", "svalse"), (20, "svalse", "ssbl"), (20, "ssbl", "sbl")):
-        off = study.paired("rmse", better, worse, f"{snr}")
+        d = study.paired("rmse", better, worse, f"{snr}")
         values = [study.mean("rmse", method, f"{snr}") for method in (better, worse)]
-        numbers = (
-            f"{values[0]:.2f} and {values[1]:.2f}, difference {off.mean:.2f} ± {off.error:.2f}"
-        )
+        numbers = f"{values[0]:.2f} and {values[1]:.2f}, difference {d.mean:.2f} ± {d.error:.2f}"
         claim = f"{scene}, {snr} dB: {better} has a lower RMSE than {worse}"
-        yield verdict(claim, negative(off.mean, off.error), numbers)
+        yield verdict(claim, negative(d.mean, d.error), numbers)
 
 
 def _rmse_row(study: Study, name: str, snr: float, method: str) -> tuple[Any, ...]:

@@ -1,4 +1,4 @@
-"""Pictures of the studies of SVALSE's paper: single runs over the beam, and bars of GOSPA."""
+"""Figures of the studies of SVALSE's paper: tracks over the beam power, and bars of GOSPA."""
 
 from __future__ import annotations
 
@@ -25,15 +25,18 @@ TRUTH = "#00b050"
 def draw_runs(
     scenario: Scenario, seed: int, shown: Sequence[Method], paper: Sequence[float]
 ) -> Figure:
-    """Draw run 0 of a study by several methods: the beam behind, the truth in green.
+    """Draw run 0 of a study by several methods over the beam power, the truth in green.
 
     Parameters
     ----------
     scenario : Scenario
+        Scenario of the study.
     seed : int
+        Seed of the study.
     shown : sequence of Method
+        Methods, one panel each.
     paper : sequence of float
-        The paper's GOSPA of each; NaN where it has none.
+        The paper's GOSPA of each; NaN if it has none.
 
     Examples
     --------
@@ -54,9 +57,10 @@ def draw_runs(
         )  # fmt: skip
         steps = np.broadcast_to(np.arange(len(trial.truth))[:, None], trial.truth.shape)
         ax.plot(steps, np.rad2deg(trial.truth), ".", color=TRUTH, markersize=2, zorder=4)
-        told = "" if np.isnan(known) else f" (paper {known:g}°)"
+        published = "" if np.isnan(known) else f" (paper {known:g}°)"
         gospa, rmse = (METRICS[metric](trial, run) for metric in ("gospa", "rmse"))
-        ax.set_title(f"{method.label}: GOSPA {gospa:.1f}°{told}, RMSE {rmse:.1f}°", fontsize=10)
+        title = f"{method.label}: GOSPA {gospa:.1f}°{published}, RMSE {rmse:.1f}°"
+        ax.set_title(title, fontsize=10)
         ax.label_outer()
     for ax in axes[len(shown):]:  # fmt: skip
         ax.set_axis_off()
@@ -66,7 +70,7 @@ def draw_runs(
 
 
 def _one_bar(figure: Figure, axes: Sequence[Axes]) -> None:
-    """Put one colour bar in place of each panel's own: they show the same beam."""
+    """Replace the colour bars of the panels by one: they show the same beam power."""
     beams = [image for ax in axes for image in ax.collections if image.colorbar]
     for image in beams:
         if image.colorbar:
@@ -81,20 +85,21 @@ def _name_marks(figure: Figure) -> None:
 
     marks = [
         Line2D([], [], marker=".", linestyle="", color=TRUTH, label="truth"),
-        Line2D([], [], marker="o", markersize=4, linestyle="", color=NEUTRAL, label="found"),
-        Line2D([], [], linewidth=2, color=PALETTE[0], label="found, a colour for each label"),
+        Line2D([], [], marker="o", markersize=4, linestyle="", color=NEUTRAL, label="estimates"),
+        Line2D([], [], linewidth=2, color=PALETTE[0], label="estimates, one colour a label"),
     ]
     figure.legend(handles=marks, loc="outside upper center", ncols=3, fontsize=9, frameon=False)
 
 
 def draw_parts(study: Study, name: str) -> Figure:
-    """Draw GOSPA as a bar of its three parts, a bar a method, with the interval of the whole.
+    """Draw GOSPA as one bar of three parts a method, with its confidence interval.
 
     Parameters
     ----------
     study : Study
+        Study of one scenario.
     name : str
-        Its scenario's, of `REBUILT`.
+        Name of the scenario in `REBUILT`.
     """
     figure, (ax,) = panels(1, 1, (9.0, 3.8))
     labels = study.methods
@@ -107,10 +112,10 @@ def draw_parts(study: Study, name: str) -> Figure:
     ax.errorbar(at, base, yerr=np.abs(ends - base), color="black", fmt="none", capsize=3,
                 label="95 % of the mean")  # fmt: skip
     rebuilt = {method: known.gospa for method, known in REBUILT[name].items()}
-    for known, marker, told in ((rebuilt, "D", "rebuilt"), (PAPER[name], "*", "paper, one run")):
-        there = [n for n, method in enumerate(labels) if tracker_name(method) in known]
-        ax.plot(np.array(there) + 0.2, [known[tracker_name(labels[n])] for n in there], marker,
-                color="black", markerfacecolor="white", label=told)  # fmt: skip
+    for known, marker, origin in ((rebuilt, "D", "rebuilt"), (PAPER[name], "*", "paper, one run")):
+        index = [n for n, method in enumerate(labels) if tracker_name(method) in known]
+        ax.plot(np.array(index) + 0.2, [known[tracker_name(labels[n])] for n in index], marker,
+                color="black", markerfacecolor="white", label=origin)  # fmt: skip
     ax.set_xticks(at, [label.replace(" ", "\n", 1) for label in labels])
     ax.set(ylabel="GOSPA, degrees")
     ax.legend(fontsize=8)
@@ -118,7 +123,7 @@ def draw_parts(study: Study, name: str) -> Figure:
 
 
 def panels(n_rows: int, n_columns: int, size: tuple[float, float]) -> tuple[Figure, list[Axes]]:
-    """Return a figure that no window shows, and its axes, row by row.
+    """Return a figure without a window, and its axes, row by row.
 
     Examples
     --------

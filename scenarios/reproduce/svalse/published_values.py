@@ -1,6 +1,6 @@
-"""Figures of the paper on SVALSE, and those that its methods give when they are rebuilt.
+"""Published values of the paper on SVALSE, and those of its methods as reimplemented.
 
-The paper gives single runs. "Rebuilt": the published programs, or the methods as the paper prints
+The paper has single runs. "Rebuilt": the published programs, or the methods as the paper prints
 them (first sensor as phase reference, tolerance 1e-6), many runs; GOSPA and RMSE in degrees.
 """
 

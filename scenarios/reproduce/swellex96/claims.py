@@ -1,4 +1,4 @@
-"""What SVALSE's paper says about the SWellEx-96 sound field, held against the simulated one."""
+"""Statements of SVALSE's paper on the SWellEx-96 sound field, compared with the simulated field."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from arrivals.trackers.beamforming.spectrum import bartlett_power, scan_directio
 from arrivals.typing import Complex, Float, Int
 
 CRITICAL = np.arccos(1488 / 1600)  # rad, the paper's critical angle of the bottom
-Claim = tuple[str, str, str]  # what is claimed, the paper's words or number, ours
+Claim = tuple[str, str, str]  # statement, the paper's value, ours
 
 
 def beam(scenario: TowPastLine, snapshots: Complex) -> tuple[Float, Float]:
-    """Return look directions (361,), rad, and the conventional beam power (n_steps, 361).
+    """Return scan directions (361,), rad, and the conventional beam power (n_steps, 361).
 
     Examples
     --------
@@ -28,21 +28,26 @@ def beam(scenario: TowPastLine, snapshots: Complex) -> tuple[Float, Float]:
 
 
 def claims(scenario: TowPastLine, step: Int) -> list[Claim]:
-    """Return one row for each claim that has a number.
+    """Return one row for each quantitative statement.
 
     Parameters
     ----------
     scenario : TowPastLine
-        On the ship's track or a part of it.
+        The ship's track or a part of it.
     step : ndarray of int, shape (n_steps,)
-        The experiment's number of each of its steps, from 1.
+        Numbers of its steps in the experiment, from 1.
+
+    Returns
+    -------
+    list of Claim
+        Statement, the paper's value, ours.
 
     Examples
     --------
     >>> from arrivals.scenarios.simulations.swellex96 import track
     >>> step = np.arange(1, 351, 10)
-    >>> found = claims(TowPastLine(ranges=tuple(track()["range_m"][step - 1])), step)
-    >>> found[0][:2]
+    >>> rows = claims(TowPastLine(ranges=tuple(track()["range_m"][step - 1])), step)
+    >>> rows[0][:2]
     ('path power from beyond the critical angle, steps 1-200', 'none')
     """
     return [
@@ -53,7 +58,7 @@ def claims(scenario: TowPastLine, step: Int) -> list[Claim]:
 
 
 def _angles(scenario: TowPastLine, step: Int) -> list[Claim]:
-    """Hold the critical angle, and the growth of the angles as the source nears."""
+    """Compare the critical angle, and the growth of the angles at decreasing range."""
     _, doa, level_db = scenario.paths()
     power = np.nan_to_num(10 ** (level_db / 10))
     far = step <= 200
@@ -67,15 +72,15 @@ def _angles(scenario: TowPastLine, step: Int) -> list[Claim]:
             f"{100 * np.median(beyond):.1f} % (median of the steps)",
         ),
         (
-            "absolute angles grow as the source nears",
-            "they do",
+            "absolute angles increase as the range decreases",
+            "yes",
             f"in {100 * grows:.0f} % of the steps of all paths up to the closest one",
         ),
     ]
 
 
 def _strongest(scenario: TowPastLine, step: Int) -> list[Claim]:
-    """Hold the paths that are said to dominate from step 220 on."""
+    """Compare the paths that dominate from step 220 on."""
     names, doa, level_db = scenario.paths()
     late, middle = (step >= 250) & (step < 340), (step >= 220) & (step < 250)
     B, D, BS, BSB = (names.index(name) for name in ("B", "D", "BS", "BSB"))
@@ -107,19 +112,20 @@ def _strongest(scenario: TowPastLine, step: Int) -> list[Claim]:
 
 
 def _models_agree(scenario: TowPastLine) -> list[Claim]:
-    """Hold rays against modes, and the peaks of the beam against the rays."""
+    """Compare rays with modes, and beam peaks with rays."""
     modes, rays = scenario.field(), scenario.replace(model="rays").field()
-    grid, seen = beam(scenario, modes)
-    _, traced = beam(scenario, rays)
+    grid, modal_power = beam(scenario, modes)
+    _, ray_power = beam(scenario, rays)
     level = 10 * np.log10((np.abs(rays) ** 2).mean(axis=1) / (np.abs(modes) ** 2).mean(axis=1))
-    above, below = (peak_to_path(scenario, grid, seen, side) for side in (1, -1))
+    above, below = (peak_to_path(scenario, grid, modal_power, side) for side in (1, -1))
     both = np.concatenate([above, below])
     return [
         (
             "modes (b) and rays (d) agree",
             "visually well",
-            f"correlation of the beam powers {np.median(_correlation(seen, traced)):.2f} (median "
-            f"of the steps), level of the rays {level.mean():+.1f} dB, std {level.std():.1f} dB",
+            f"correlation of the beam powers "
+            f"{np.median(_correlation(modal_power, ray_power)):.2f} (median of the steps), "
+            f"level of the rays {level.mean():+.1f} dB, std {level.std():.1f} dB",
         ),
         (
             "the beam's highest peak on either side is one of its six strongest paths",
@@ -131,15 +137,15 @@ def _models_agree(scenario: TowPastLine) -> list[Claim]:
 
 
 def peak_to_path(scenario: TowPastLine, grid: Float, power: Float, side: int) -> Float:
-    """Return how far the highest peak on one side is from the nearest of six paths, degrees.
+    """Return the distance of the highest peak on one side to the nearest of six paths, degrees.
 
     Parameters
     ----------
     scenario : TowPastLine
     grid, power : ndarray, shapes (n,), (n_steps, n)
-        As `beam` gives them.
+        As `beam` returns them.
     side : int
-        1 for sound from above, -1 for below; the six strongest paths of that side count.
+        1 for above, -1 for below; the six strongest paths of that side are used.
 
     Examples
     --------
@@ -163,13 +169,13 @@ def _highest(grid: Float, power: Float, low: float, high: float) -> Float:
 
 
 def _correlation(a: Float, b: Float) -> Float:
-    """Return the correlation coefficients of the rows of two pictures."""
+    """Return the correlation coefficients of the rows of two matrices."""
     a, b = a - a.mean(axis=1, keepdims=True), b - b.mean(axis=1, keepdims=True)
     return np.asarray((a * b).sum(axis=1) / np.sqrt((a**2).sum(axis=1) * (b**2).sum(axis=1)))
 
 
 def _span(doa: Float) -> str:
-    """Return the smallest and the largest angle, by size, in words.
+    """Return the angles of smallest and largest magnitude as text.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Figs 11 and 12 of SVALSE's paper: a tow past the SWellEx-96 array, its field simulated."""
+"""Figs 11 and 12 of SVALSE's paper: simulated tow past the SWellEx-96 array."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ if TYPE_CHECKING:
 METHODS: dict[str, dict[str, Any]] = {
     "cbf": {},
     "peaks_gnn": {},
-    "sbl": {"n_directions": 181},  # of 64 sensors a beam is 1.8 degrees wide: 1 degree will do
+    "sbl": {"n_directions": 181},  # a step of 1 degree: the beam width is 1.8 degrees
     "ssbl": {"n_directions": 181},
     "valse": {},
     "svalse": {},
 }
 BLOCKS = ((1, 350), (1, 100), (101, 200), (201, 250), (251, 350))  # steps, from 1
-NEAR, AUDIBLE_DB = 1.5, 30.0  # degrees from a path, among those within so many dB
+NEAR, AUDIBLE_DB = 1.5, 30.0  # distance from a path, degrees, and range of its level, dB
 
 
 def swellex96(runs: int, seed: int) -> Report:
     """Track the tow by six methods, with and without element 43; `runs` draws of the noise.
 
-    With a single run every second step is left out: a quick look.
+    A single run uses every second step only, as a quick check.
     """
     step = step_numbers(runs)
     scenario = TowPastLine(ranges=tuple(track()["range_m"][step - 1].tolist()))
@@ -57,16 +57,16 @@ def swellex96(runs: int, seed: int) -> Report:
     }
     columns = ("elements", "method", "steps", "GOSPA", "std", "distance", "missed", "false", "RMSE",
                "found", "paths", "near a path, %", "CPU ms a step")  # fmt: skip
-    thinned = ", every second step" if runs == 1 else ""
+    decimation = ", every second step" if runs == 1 else ""
     draws = f"{runs} draws of the noise" if runs > 1 else "one draw of the noise"
-    title = f"Figs 11 and 12: the SWellEx-96 tow, simulated, 10 dB, {draws}{thinned}"
-    said = compare_methods(scenario, {name: doa[63, name] for name in METHODS}, step)
-    remarks = (*REMARKS, *said, CURVED, FIELD, _table(claims(scenario, step)))
+    title = f"Figs 11 and 12: the SWellEx-96 tow, simulated, 10 dB, {draws}{decimation}"
+    verdicts = compare_methods(scenario, {name: doa[63, name] for name in METHODS}, step)
+    remarks = (*REMARKS, *verdicts, CURVED, FIELD, _table(claims(scenario, step)))
     return Report(title, columns, rows, remarks, figures)
 
 
 def step_numbers(runs: int) -> Int:
-    """Return the steps that are looked at, from 1: every second one in a quick look.
+    """Return the numbers of the steps, from 1: every second one for a single run.
 
     Examples
     --------
@@ -78,18 +78,18 @@ def step_numbers(runs: int) -> Int:
 
 REMARKS = (
     "The recordings are too large to ship: the field is a sum of normal modes in the experiment's "
-    "water, over its sea floor, at the ship's ranges, with white noise. Element 43 was bad in the "
-    "experiment: 63 elements are as there, 64 are the whole array, with the same noise.",
-    f"Directions and paths more than {WITHIN_DB:g} dB below the strongest of their step are left "
-    "out on both sides. GOSPA (cut-off 10 degrees), its parts and RMSE are degrees, `std` is that "
-    f"of GOSPA over draws; the last column counts the directions found within {NEAR} degrees of a "
+    "water, over its sea floor, at the ship's ranges, with white noise. Element 43 was defective "
+    "in the experiment: 63 elements as there, or the whole array of 64, with the same noise.",
+    f"Directions and paths more than {WITHIN_DB:g} dB below the strongest of their step are "
+    "excluded on both sides. GOSPA (cut-off 10 degrees), its parts and RMSE are degrees, `std` is "
+    f"that of GOSPA over draws; 'near a path' counts the estimates within {NEAR} degrees of a "
     f"path that is at most {AUDIBLE_DB:g} dB below the strongest.",
-    "sbl and ssbl have a grid of 1 degree: a beam of 64 elements is 1.8 degrees wide.",
+    "sbl and ssbl have a grid of 1 degree; the beam width of 64 elements is 1.8 degrees.",
 )
 CURVED = (
-    "Near the closest approach (steps 251 to 350) the array, 118 m long, sees curved wavefronts, "
-    "and the sound speed changes along it: one path is no plane wave, and at 20 dB a gridless "
-    "method makes two or three of it. The paper has no figures to hold this against."
+    "Near the closest approach (steps 251 to 350) the wavefronts at the array, 118 m long, are "
+    "curved, and the sound speed changes along it: a path is not a plane wave, and at 20 dB a "
+    "gridless method estimates two or three components for it. The paper has no figures on this."
 )
 LOWER, LESS = "has a lower GOSPA than", "misses less than"
 CLAIMED = (
@@ -100,26 +100,26 @@ CLAIMED = (
     ("svalse", LOWER, "ssbl"),
     ("svalse", LOWER, "peaks_gnn"),
 )
-FIELD = "The paper's statements on the field, and the simulated one:"
+FIELD = "The paper's statements on the field, compared with the simulated one:"
 
 
 def compare_methods(
     scenario: TowPastLine, doa: Mapping[str, Sequence[Float]], step: Int
 ) -> Iterator[str]:
-    """Give a line on each claim of steps 1 to 100, where many paths lie near each other."""
+    """Yield a verdict on each claim of steps 1 to 100, which have many close paths."""
     score = {name: _scores(scenario, mine, step, (1, 100)) for name, mine in doa.items()}
     for better, claim, worse in CLAIMED:
         part = 0 if claim == LOWER else 2  # of the scores
-        off = (score[better] - score[worse])[:, part]
+        d = (score[better] - score[worse])[:, part]
         numbers = f"{score[better][:, part].mean():.1f} and {score[worse][:, part].mean():.1f}"
-        error = float(off.std(ddof=1)) / len(off) ** 0.5 if len(off) > 1 else np.nan
-        numbers += f", difference {off.mean():.2f} ± {error:.2f}" if len(off) > 1 else ", one draw"
-        fact = negative(float(off.mean()), error)
+        error = float(d.std(ddof=1)) / len(d) ** 0.5 if len(d) > 1 else np.nan
+        numbers += f", difference {d.mean():.2f} ± {error:.2f}" if len(d) > 1 else ", one draw"
+        fact = negative(float(d.mean()), error)
         yield verdict(f"in steps 1 to 100 {better} {claim} {worse}", fact, numbers)
 
 
 def track_draw(scenario: TowPastLine, name: str, seed: int, draw: int) -> tuple[Run, float]:
-    """Track one draw of the noise, the same for all methods and arrays; tell CPU ms a step."""
+    """Track one draw of the noise, the same for all methods and arrays; return CPU ms a step."""
     trial = scenario.sample(np.random.default_rng([seed, draw]))
     started = time.process_time()
     run = trial.tracker(name, **METHODS[name]).run(trial.measurements)
@@ -136,7 +136,7 @@ def strong_directions(run: Run) -> Float:
 def _row(
     scenario: TowPastLine, draws: Sequence[Float], step: Int, block: tuple[int, int]
 ) -> tuple[Any, ...]:
-    """Return the scores of a block of steps, means over the draws."""
+    """Return the mean scores of a block of steps over the draws."""
     scores = _scores(scenario, draws, step, block)
     gospa, *rest = scores.mean(axis=0).tolist()
     std = float(scores[:, 0].std(ddof=1)) if len(scores) > 1 else np.nan
@@ -146,7 +146,7 @@ def _row(
 def _scores(
     scenario: TowPastLine, draws: Sequence[Float], step: Int, block: tuple[int, int]
 ) -> Float:
-    """Return GOSPA, its parts, RMSE, numbers found and there, and % near a path: (n_draws, 8)."""
+    """Return GOSPA, parts, RMSE, numbers of estimates and paths, % near a path: (n_draws, 8)."""
     here = (step >= block[0]) & (step <= block[1])
     truth = np.rad2deg(scenario.truth())[here]
     audible = np.rad2deg(scenario.truth(AUDIBLE_DB))[here]
@@ -161,7 +161,7 @@ def _scores(
 
 
 def share_near(doa: Float, paths: Float) -> float:
-    """Return the share of directions (n_steps, n) that lie near one of the paths (n_steps, m).
+    """Return the fraction of directions (n_steps, n) near one of the paths (n_steps, m).
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Pictures of the SWellEx-96 tow: the scene, and directions over the steps."""
+"""Figures of the SWellEx-96 tow: environment, and directions over the steps."""
 
 from __future__ import annotations
 
@@ -43,16 +43,16 @@ def environment_figure() -> Figure:
 
 
 def _draw_paths(ax: Axes) -> None:
-    """Draw some paths from the source to the middle of the array, the stronger ray of each pair."""
-    guide, depths, way = environment(), -line(missing=()).positions[:, 0], track()
-    middle = float(depths.mean())
-    for colour, (step, wanted) in zip(PALETTE, SHOWN.items(), strict=False):
-        distance = float(way["range_m"][step - 1])
-        rays = eigenrays(guide, 198.0, 9.0, middle, [distance])
-        for name, style in zip(wanted, ("-", "--"), strict=True):
+    """Draw selected paths from the source to the array's centre, the stronger ray of each pair."""
+    guide, depths, ship = environment(), -line(missing=()).positions[:, 0], track()
+    centre = float(depths.mean())
+    for colour, (step, names) in zip(PALETTE, SHOWN.items(), strict=False):
+        distance = float(ship["range_m"][step - 1])
+        rays = eigenrays(guide, 198.0, 9.0, centre, [distance])
+        for name, style in zip(names, ("-", "--"), strict=True):
             pair = np.flatnonzero(np.isin(rays.path, [name, f"S{name}".removesuffix("D")]))
             n = pair[np.argmax(np.abs(rays.pressure[pair]))]
-            x, z = ray_line(guide, 9.0, middle, str(rays.path[n]), float(rays.doa[n]))
+            x, z = ray_line(guide, 9.0, centre, str(rays.path[n]), float(rays.doa[n]))
             label = f"step {step}, {name}: {np.rad2deg(rays.doa[n]):.1f}°"
             ax.plot((distance - x) / 1e3, z, style, color=colour, linewidth=1, label=label)
         ax.plot(distance / 1e3, 9.0, "o", color=colour)
@@ -71,27 +71,27 @@ def _draw_speed(ax: Axes) -> None:
 
 
 def _draw_range(ax: Axes) -> None:
-    way = track()
-    ax.plot(way["step"], way["range_m"] / 1e3, color=PALETTE[1])
+    ship = track()
+    ax.plot(ship["step"], ship["range_m"] / 1e3, color=PALETTE[1])
     ax.set(xlabel="step", ylabel="range, km", ylim=(0, None), title="(c) range")
 
 
 def _draw_track(ax: Axes) -> None:
-    """Draw the ship's way, a mark every 50 steps."""
-    way = track()
-    x, y = way["east_m"] / 1e3, way["north_m"] / 1e3
+    """Draw the ship's track, with a mark every 50 steps."""
+    ship = track()
+    x, y = ship["east_m"] / 1e3, ship["north_m"] / 1e3
     ax.plot(x, y, color=PALETTE[1])
-    marks = way["step"] % 50 == 0
+    marks = ship["step"] % 50 == 0
     ax.plot(x[marks], y[marks], "o", color=PALETTE[1], markersize=4)
-    for step, place in zip(way["step"][marks], np.stack([x, y], axis=1)[marks], strict=True):
-        ax.annotate(f"{step:.0f}", place, (5, -3), textcoords="offset points", fontsize=7)
+    for step, point in zip(ship["step"][marks], np.stack([x, y], axis=1)[marks], strict=True):
+        ax.annotate(f"{step:.0f}", point, (5, -3), textcoords="offset points", fontsize=7)
     ax.plot(0, 0, "^", color="black")
     ax.set(xlabel="east, km", ylabel="north, km", title="the ship, the array at the origin")
     ax.set_aspect("equal", adjustable="datalim")
 
 
 def field_figure(scenario: TowPastLine, valse: Run, svalse: Run, step: Int, seed: int) -> Figure:
-    """Draw Fig. 12: beam power of three fields, and what VALSE and SVALSE found over the steps.
+    """Draw Fig. 12: beam power of three fields, and the estimates of VALSE and SVALSE.
 
     Examples
     --------
@@ -107,12 +107,12 @@ def field_figure(scenario: TowPastLine, valse: Run, svalse: Run, step: Int, seed
     figure = Figure(figsize=(12.0, 10.0), layout="constrained")
     axes = figure.subplots(3, 2, sharex=True, sharey=True).ravel()
     noisy = scenario.sample(np.random.default_rng([seed, 0])).measurements
-    pictures = (
+    beams = (
         (0, f"(a) CBF, modes and noise, {scenario.snr_db:g} dB", noisy),
         (1, "(b) CBF, modes", scenario.field()),
         (3, "(d) CBF, rays", scenario.replace(model="rays").field()),
     )
-    for n, title, snapshots in pictures:
+    for n, title, snapshots in beams:
         image = _draw_beam(axes[n], scenario, np.asarray(snapshots, np.complex128), step)
         axes[n].set_title(title)
     figure.colorbar(image, ax=list(axes), shrink=0.5, label="dB re the step's maximum")
@@ -140,10 +140,10 @@ def _draw_beam(ax: Axes, scenario: TowPastLine, snapshots: Complex, step: Int) -
 
 
 def _draw_levels(ax: Axes, step: Int, doa: Float, level_db: Float) -> None:
-    """Draw directions (n_steps, n) as dots, the darker the stronger, down to `RANGE_DB`."""
+    """Draw directions (n_steps, n) as dots, coloured by level, down to `RANGE_DB`."""
     level = level_db - np.nanmax(level_db, axis=1, keepdims=True)
     shown = level > -RANGE_DB
-    at = np.broadcast_to(step[:, None], doa.shape)[shown]
-    ax.scatter(at, np.rad2deg(doa[shown]), c=level[shown], s=6, cmap="viridis", vmin=-RANGE_DB,
+    x = np.broadcast_to(step[:, None], doa.shape)[shown]
+    ax.scatter(x, np.rad2deg(doa[shown]), c=level[shown], s=6, cmap="viridis", vmin=-RANGE_DB,
                vmax=0, linewidths=0)  # fmt: skip
     ax.set_facecolor("#f4f4f4")

@@ -27,7 +27,7 @@ from arrivals.motion_models import (
     LinearMotion,
 )
 from arrivals.scenarios.bounds.delay import band_bound, exact_bound, tone_bound
-from arrivals.scenarios.reproduce.interpolation.figures import SOURCES
+from arrivals.scenarios.reproduce.interpolation.trials import SOURCES
 
 BAND = FlatBand(0.15, 0.35)
 EPS = 10**-0.5

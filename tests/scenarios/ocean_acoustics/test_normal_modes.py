@@ -1,4 +1,4 @@
-"""Normal modes against closed forms, images of the source and the laws that they obey."""
+"""Normal modes: closed forms, image sources, orthonormality and reciprocity."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ def water(depth: float = 100.0, *, rigid: bool = False) -> Waveguide:
 
 
 def overlap(found: Modes, guide: Waveguide) -> Float:
-    """∫ ψ_m ψ_n / ρ dz, each layer by itself."""
+    """Return ∫ ψ_m ψ_n / ρ dz, summed over the layers."""
     total = np.zeros((len(found.wavenumber),) * 2)
     parts = [(0.0, guide.water_depth, 1.0)] + [(b.top, b.bottom, b.density) for b in guide.layers]
     for top, bottom, density in parts:
@@ -36,25 +36,25 @@ def test_modes_of_a_layered_floor_are_orthonormal() -> None:
 
 @settings(max_examples=20)
 @given(st.floats(20, 300), st.floats(15, 120), st.booleans())
-def test_modes_of_ideal_water_are_those_of_the_closed_form(
+def test_modes_of_ideal_water_match_the_closed_form(
     depth: float, frequency: float, rigid: bool
 ) -> None:
     k = 2 * np.pi * frequency / 1500
     n = np.arange(1, 200)
     vertical = (n - 0.5 * rigid) * np.pi / depth
-    wanted = np.sqrt(k**2 - vertical[vertical < k] ** 2)
-    assume(len(wanted) > 0)
-    assume(wanted[-1] > 0.2 * k and np.abs(vertical - k).min() > 1e-3 * k)  # away from the edge
+    expected = np.sqrt(k**2 - vertical[vertical < k] ** 2)
+    assume(len(expected) > 0)
+    assume(expected[-1] > 0.2 * k and np.abs(vertical - k).min() > 1e-3 * k)  # away from the edge
     found = modes(water(depth, rigid=rigid), frequency, step=1500 / frequency / 400)
-    assert len(found.wavenumber) == len(wanted)
-    np.testing.assert_allclose(found.wavenumber.real, wanted, rtol=2e-3)
+    assert len(found.wavenumber) == len(expected)
+    np.testing.assert_allclose(found.wavenumber.real, expected, rtol=2e-3)
     shape = np.sqrt(2 / depth) * np.sin(vertical[0] * found.depth)
     np.testing.assert_allclose(np.abs(found.shape[0]), np.abs(shape), atol=1e-3 / np.sqrt(depth))
     assert (found.wavenumber.imag == 0).all()
 
 
-def test_modes_over_a_fast_fluid_solve_the_equation_of_pekeris() -> None:
-    """tan(q D) = -ρ q/γ with a jump of speed and of density; the field dies out in the floor."""
+def test_modes_over_a_fast_fluid_solve_the_pekeris_equation() -> None:
+    """tan(q D) = -ρ q/γ with jumps of speed and density; evanescent field in the floor."""
     depth, c, density, frequency = 100.0, 1800.0, 1.8, 60.0
     layer = BottomLayer(depth, 1500.0, c, c, density)
     found = modes(Waveguide(np.array([0.0, depth]), np.array([1500.0] * 2), [layer]), frequency)
@@ -66,7 +66,7 @@ def test_modes_over_a_fast_fluid_solve_the_equation_of_pekeris() -> None:
     np.testing.assert_allclose(residual / np.hypot(gamma, density * q), 0, atol=1e-3)
 
 
-def test_error_of_the_wavenumbers_falls_with_the_square_of_the_step() -> None:
+def test_wavenumber_error_is_quadratic_in_the_step() -> None:
     k = 2 * np.pi * 50 / 1500
     exact = np.sqrt(k**2 - (np.arange(1, 7) * np.pi / 100) ** 2)
     errors = [
@@ -76,21 +76,21 @@ def test_error_of_the_wavenumbers_falls_with_the_square_of_the_step() -> None:
     np.testing.assert_allclose(np.array(errors[:-1]) / errors[1:], 4, rtol=0.05)
 
 
-def test_loss_of_a_mode_is_that_of_its_share_in_the_floor() -> None:
-    """A floor like the water but for its loss: Im k = -α cos-weighted share, by hand."""
+def test_modal_loss_is_proportional_to_the_power_in_the_floor() -> None:
+    """Floor that differs from the water in loss alone: Im k in closed form."""
     layer = BottomLayer(50.0, 100.0, 1500.0, 1500.0, 1.0, 0.5)
     guide = Waveguide(np.array([0.0, 50.0]), np.array([1500.0] * 2), [layer])
     found = modes(guide, 40.0, steepest=1e9)
     k, n = 2 * np.pi * 40 / 1500, np.arange(1, len(found.wavenumber) + 1)
     alpha = 0.5 * 0.04 / (20 / np.log(10))
     share = 0.5  # of sin² over the lower half of the water
-    wanted = alpha * k * share / np.sqrt(k**2 - (n * np.pi / 100) ** 2)
-    np.testing.assert_allclose(-found.wavenumber.imag, wanted, rtol=2e-3)
+    expected = alpha * k * share / np.sqrt(k**2 - (n * np.pi / 100) ** 2)
+    np.testing.assert_allclose(-found.wavenumber.imag, expected, rtol=2e-3)
 
 
 @settings(max_examples=10)
 @given(st.floats(1, 216), st.floats(1, 216), st.floats(300, 9000))
-def test_source_and_sensor_may_change_places(one: float, other: float, distance: float) -> None:
+def test_mode_field_is_reciprocal(one: float, other: float, distance: float) -> None:
     found = modes(environment(), 60.0, step=0.5)
     there = mode_field(found, one, [other], [distance])
     back = mode_field(found, other, [one], [distance])
@@ -110,26 +110,23 @@ def images(source: float, depths: Float, distance: float, k: float, n_images: in
     return total
 
 
-def test_modes_add_up_to_the_images_of_the_source() -> None:
+def test_mode_field_matches_image_sources() -> None:
     depths, distance, frequency = np.linspace(5, 95, 19), 3000.0, 45.0
     found = modes(water(rigid=True), frequency, step=0.1)
-    mine = mode_field(found, 30.0, depths, [distance])[0]
-    theirs = images(30.0, depths, distance, 2 * np.pi * frequency / 1500, 20000)
-    off = np.linalg.norm(mine - theirs) / np.linalg.norm(theirs)
-    assert off < 0.02
+    field = mode_field(found, 30.0, depths, [distance])[0]
+    exact = images(30.0, depths, distance, 2 * np.pi * frequency / 1500, 20000)
+    assert np.linalg.norm(field - exact) < 0.02 * np.linalg.norm(exact)
 
 
 @pytest.mark.parametrize(
     ("depth", "step", "match"), [(-1.0, 0.5, "depth must lie"), (9.0, -0.5, "step must be")]
 )
-def test_a_source_out_of_the_guide_or_a_bad_step_is_refused(
-    depth: float, step: float, match: str
-) -> None:
+def test_modes_invalid_depth_or_step_is_rejected(depth: float, step: float, match: str) -> None:
     with pytest.raises(ValueError, match=match):
         mode_field(modes(water(), 30.0, step=step), depth, [50.0], [1000.0])
 
 
-def test_too_low_a_tone_and_a_range_of_zero_are_refused() -> None:
+def test_modes_below_cutoff_and_zero_range_are_rejected() -> None:
     with pytest.raises(ValueError, match=r"no mode propagates at 5\.0 Hz"):
         modes(water(), 5.0)
     with pytest.raises(ValueError, match="ranges must be finite and positive"):
@@ -139,21 +136,26 @@ def test_too_low_a_tone_and_a_range_of_zero_are_refused() -> None:
 @pytest.mark.parametrize(
     ("depths", "speeds", "layers", "match"),
     [
-        ([0.0, 50.0, 50.0], [1500.0] * 3, (), "growing from 0"),
-        ([1.0, 50.0], [1500.0] * 2, (), "growing from 0"),
+        ([0.0, 50.0, 50.0], [1500.0] * 3, (), "increasing from 0"),
+        ([1.0, 50.0], [1500.0] * 2, (), "increasing from 0"),
         ([0.0, 50.0], [1500.0, np.nan], (), "2 positive numbers"),
         ([0.0, 50.0], [1500.0] * 3, (), "2 positive numbers"),
-        ([0.0, 50.0], [1500.0] * 2, (BottomLayer(51.0, 60.0, 1600.0, 1600.0),), "start at 50"),
+        (
+            [0.0, 50.0],
+            [1500.0] * 2,
+            (BottomLayer(51.0, 60.0, 1600.0, 1600.0),),
+            "top of a layer must be 50",
+        ),
     ],
 )
-def test_water_that_makes_no_sense_is_refused(
+def test_waveguide_invalid_argument_is_rejected(
     depths: list[float], speeds: list[float], layers: tuple[BottomLayer, ...], match: str
 ) -> None:
     with pytest.raises(ValueError, match=match):
         Waveguide(np.array(depths), np.array(speeds), layers)
 
 
-def test_layers_are_refused_upside_down_and_speeds_out_of_the_guide() -> None:
+def test_invalid_layers_and_depths_are_rejected() -> None:
     with pytest.raises(ValueError, match="bottom must lie below top"):
         BottomLayer(60.0, 50.0, 1600.0, 1600.0)
     with pytest.raises(ValueError, match="attenuation must be"):
@@ -164,7 +166,7 @@ def test_layers_are_refused_upside_down_and_speeds_out_of_the_guide() -> None:
         Waveguide(np.array([0.0, 50.0]), np.array([1500.0] * 2), ["mud"])  # type: ignore[list-item]
 
 
-def test_a_guide_survives_the_round_trip_through_plain_numbers() -> None:
+def test_waveguide_configuration_makes_the_round_trip() -> None:
     guide = environment()
     back = Waveguide.from_dict(guide.to_dict())
     np.testing.assert_array_equal(back.speeds, guide.speeds)

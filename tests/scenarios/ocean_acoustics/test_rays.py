@@ -1,4 +1,4 @@
-"""Rays against images of the source, circles, the eikonal and the field of the modes."""
+"""Rays: image sources, circular arcs, the eikonal equation and the field of the modes."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ FLAT = Waveguide(np.array([0.0, 100.0]), np.array([1500.0] * 2), rigid=True)
 
 
 def image_depth(path: str, source: float, depth: float) -> float:
-    """Unfold the path: the height of the image above the sensor, positive for one from above."""
+    """Return the height of the image source above the sensor, by unfolding the path."""
     z, up = source, path.startswith("S")
     travelled = 0.0
     for bounce in path.replace("D", ""):
@@ -29,10 +29,10 @@ def image_depth(path: str, source: float, depth: float) -> float:
 
 @settings(max_examples=20)
 @given(st.floats(5, 95), st.floats(5, 95), st.floats(200, 600))
-def test_rays_in_even_water_come_from_the_images(
+def test_rays_at_constant_speed_match_image_sources(
     source: float, depth: float, distance: float
 ) -> None:
-    assume(abs(source - depth) > 10)  # the fan has no ray along the horizontal
+    assume(abs(source - depth) > 10)  # the fan excludes the horizontal
     steep = np.deg2rad(75)
     found = eigenrays(FLAT, 100.0, source, [depth], [distance], n_bottom=1, steepest=steep)
     assert sorted(found.path) == sorted(path_names(1))
@@ -51,10 +51,10 @@ def test_rays_in_even_water_come_from_the_images(
     ("source", "depth", "distance"),
     [(50.0, 120.0, 400.0), (120.0, 50.0, 400.0), (100.0, 100.0, 3000.0), (90.0, 110.0, 3500.0)],
 )
-def test_rays_in_water_of_an_even_slope_are_circles(
+def test_rays_in_linear_profile_are_circles(
     source: float, depth: float, distance: float, slope: float
 ) -> None:
-    """cosh(g t) = 1 + g² R²/(2 c₁ c₂); far rays turn on their way, and touch no caustic."""
+    """cosh(g t) = 1 + g² R²/(2 c₁ c₂); distant rays have a turning point and no caustic."""
     guide = Waveguide(np.array([0.0, 200.0]), 1500 + slope * np.array([0.0, 200.0]), rigid=True)
     c1, c2 = 1500 + slope * source, 1500 + slope * depth
     straight = np.hypot(distance, source - depth)
@@ -68,7 +68,7 @@ def test_rays_in_water_of_an_even_slope_are_circles(
     assert abs(p) == pytest.approx(1 / (4 * np.pi * straight), rel=0.03)
 
 
-def test_travel_times_obey_the_eikonal_of_the_water() -> None:
+def test_travel_times_satisfy_the_eikonal_equation() -> None:
     """∂t/∂r = cos β/c and ∂t/∂z = sin β/c at the sensor: Snell's and Fermat's laws at once."""
     guide, z, r = environment(), np.array([149.9, 150.0, 150.1]), np.array([2999.0, 3000.0, 3001.0])
     found = eigenrays(guide, 198.0, 9.0, z, r, n_bottom=4)
@@ -86,18 +86,18 @@ def test_travel_times_obey_the_eikonal_of_the_water() -> None:
         assert (t[1, 2] - t[1, 0]) / 0.2 == pytest.approx(np.sin(doa) / c, rel=3e-2)
 
 
-def test_a_ray_keeps_its_parameter_and_stays_between_its_turning_points() -> None:
+def test_ray_basedrays_stay_between_their_turning_points() -> None:
     guide = environment()
     fan = trace_rays(guide, np.deg2rad([1.0, 2.0, 10.0]), 9.0, [150.0])
     speed = np.interp(fan.depth, guide.depths, guide.speeds)
-    came = ~np.isnan(fan.range)
-    assert (speed[:, None] * fan.slowness < 1)[came].all()
+    reached = ~np.isnan(fan.range)
+    assert (speed[:, None] * fan.slowness < 1)[reached].all()
     np.testing.assert_array_equal(fan.turns_above, [True, True, False])
     assert not fan.turns_below.any()
     assert (np.diff(fan.range[-300:], axis=0) > 0).all()
 
 
-def test_a_drawn_ray_goes_from_the_source_to_the_sensor() -> None:
+def test_ray_line_connects_source_and_sensor() -> None:
     guide = environment()
     found = eigenrays(guide, 198.0, 9.0, [153.0], [2540.0])
     for path, doa, p in zip(found.path, found.doa, found.pressure, strict=True):
@@ -109,7 +109,7 @@ def test_a_drawn_ray_goes_from_the_source_to_the_sensor() -> None:
         assert (np.diff(x) >= 0).all()
 
 
-def test_the_floor_reflects_as_the_closed_forms_say() -> None:
+def test_floor_reflection_matches_closed_forms() -> None:
     a = np.linspace(1e-4, 1 / 1500 - 1e-9, 50)
     depths, speeds = np.array([0.0, 100.0]), np.array([1500.0] * 2)
     hard, soft = Waveguide(depths, speeds, rigid=True), Waveguide(depths, speeds)
@@ -122,13 +122,13 @@ def test_the_floor_reflects_as_the_closed_forms_say() -> None:
     sine, under = np.sqrt(1 - (1500 * a) ** 2), np.sqrt(1 - (1700 * a[~total]) ** 2)
     Z0, Z1 = 1500 / sine[~total], 1.5 * 1700 / under
     np.testing.assert_allclose(R[~total], (Z1 - Z0) / (Z1 + Z0))
-    # grazing sound is turned as by a free surface, and loss takes from it
+    # total reflection with sign change at grazing incidence; loss reduces it
     assert R[-1] == pytest.approx(-1, abs=0.02)
     lossy = Waveguide(depths, speeds, [BottomLayer(100.0, 200.0, 1700.0, 1700.0, 1.5, 0.5)])
     assert (np.abs(floor_reflection(lossy, 100.0, a)) < 1).all()
 
 
-def test_a_layer_cut_in_two_reflects_as_before() -> None:
+def test_floor_reflection_is_invariant_to_splitting_a_layer() -> None:
     a = np.linspace(1e-4, 1 / 1501, 40)
     rest = BottomLayer(140.0, 900.0, 1900.0, 1900.0, 2.0, 0.1)
     one = [BottomLayer(100.0, 140.0, 1600.0, 1600.0, 1.6, 0.3), rest]
@@ -144,14 +144,14 @@ def test_a_layer_cut_in_two_reflects_as_before() -> None:
     np.testing.assert_allclose(R1, R2, atol=1e-12)
 
 
-def test_rays_and_modes_give_the_same_picture() -> None:
+def test_beam_powers_of_rays_and_modes_correlate() -> None:
     """The beam powers of two independent models; the specification's rays reach 0.90."""
     ranges = tuple(np.linspace(950, 7700, 40))
-    modal, traced_ = (TowPastLine(ranges=ranges, model=m) for m in ("modes", "rays"))
-    pictures = [beam(modal, s.field())[1] for s in (modal, traced_)]
-    correlation = [np.corrcoef(a, b)[0, 1] for a, b in zip(*pictures, strict=True)]
+    modal, ray_based = (TowPastLine(ranges=ranges, model=m) for m in ("modes", "rays"))
+    powers = [beam(modal, s.field())[1] for s in (modal, ray_based)]
+    correlation = [np.corrcoef(a, b)[0, 1] for a, b in zip(*powers, strict=True)]
     assert np.median(correlation) > 0.88
-    levels = [10 * np.log10((np.abs(s.field()) ** 2).mean(axis=1)) for s in (modal, traced_)]
+    levels = [10 * np.log10((np.abs(s.field()) ** 2).mean(axis=1)) for s in (modal, ray_based)]
     assert abs(np.median(levels[1] - levels[0])) < 1.5
 
 
@@ -167,7 +167,7 @@ def test_rays_and_modes_give_the_same_picture() -> None:
         ({"frequency": -5.0}, "frequency must be finite and positive"),
     ],
 )
-def test_rays_that_make_no_sense_are_refused(change: dict[str, object], match: str) -> None:
-    given_ = {"frequency": 100.0, "source_depth": 20.0, "depths": [50.0], "ranges": [500.0]}
+def test_eigenrays_invalid_argument_is_rejected(change: dict[str, object], match: str) -> None:
+    arguments = {"frequency": 100.0, "source_depth": 20.0, "depths": [50.0], "ranges": [500.0]}
     with pytest.raises(ValueError, match=match):
-        eigenrays(FLAT, **given_ | change)  # type: ignore[arg-type]
+        eigenrays(FLAT, **arguments | change)  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""Comparators and studies of the third paper."""
+"""Beamformers for comparison, and studies of the interpolation-delay filter."""
 
 import io
 from pathlib import Path
@@ -10,9 +10,15 @@ import pytest
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.recordings.sample_stream import band_samples, live_samples, track_samples
 from arrivals.scenarios import create, read
+from arrivals.scenarios.reproduce.interpolation import convergence, rmse, table_1
 from arrivals.scenarios.reproduce.interpolation.beamformers import scan
-from arrivals.scenarios.reproduce.interpolation.figures import SOURCES
-from arrivals.scenarios.reproduce.interpolation.trials import bound_deg, draws, rms, scan_records
+from arrivals.scenarios.reproduce.interpolation.trials import (
+    SOURCES,
+    bound_deg,
+    draws,
+    rms,
+    scan_records,
+)
 from arrivals.scenarios.reproduce.studies import reproduce
 from arrivals.scenarios.simulations.sampled_source import received_waveforms
 from arrivals.trackers import CBF, MVDR, InterpolationEKF
@@ -20,13 +26,13 @@ from arrivals.trackers import CBF, MVDR, InterpolationEKF
 MODEL = ArraySnapshot(SensorArray.ula(10, spacing=0.5), wavelength=1.0, noise=0.1)
 
 
-def test_fig_8_the_conventional_scan_attains_the_bound_for_a_tone() -> None:
+def test_fig_8_conventional_scan_attains_the_bound_for_a_tone() -> None:
     scenario = SOURCES["tone"]
     error = scan_records(scenario, draws(scenario, 40, 0), "conventional") - 60
     assert rms(error) < 1.4 * bound_deg(scenario)
 
 
-def test_table_1_mvdrs_zero_variance_is_the_grids() -> None:
+def test_table_1_zero_variance_of_mvdr_is_due_to_the_grid() -> None:
     scenario = SOURCES["tone"].replace(doa_deg=30.0)
     samples = draws(scenario, 20, 0)
     np.testing.assert_allclose(
@@ -37,15 +43,15 @@ def test_table_1_mvdrs_zero_variance_is_the_grids() -> None:
 
 @pytest.mark.parametrize("method", ["conventional", "mvdr"])
 @pytest.mark.parametrize("name", ["tone", "band", "qpc"])
-def test_scans_find_either_side(name: str, method: Any) -> None:
-    for doa in (-40.0, 25.0):
-        scenario = SOURCES[name].replace(doa_deg=doa)
+def test_scan_estimates_directions_on_both_sides(name: str, method: Any) -> None:
+    for doa_deg in (-40.0, 25.0):
+        scenario = SOURCES[name].replace(doa_deg=doa_deg)
         z = scenario.sample(np.random.default_rng(1)).measurements
-        found = scan(z, scenario.measurement, method)
-        assert np.rad2deg(found) == pytest.approx(doa, abs=2)
+        doa = scan(z, scenario.measurement, method)
+        assert np.rad2deg(doa) == pytest.approx(doa_deg, abs=2)
 
 
-def test_mvdr_separates_what_the_conventional_beam_does_not() -> None:
+def test_mvdr_resolves_sources_within_a_beam_width() -> None:
     doa = np.tile(np.deg2rad([10.0, 18.0]), (400, 1))
     rng = np.random.default_rng(0)
     phases = np.exp(2j * np.pi * rng.random(doa.shape))
@@ -54,7 +60,7 @@ def test_mvdr_separates_what_the_conventional_beam_does_not() -> None:
     np.testing.assert_allclose(np.sort(np.rad2deg(tracker.run(z).doa[-1])), [10, 18], atol=0.5)
 
 
-def test_mvdr_of_one_snapshot_peaks_where_the_conventional_beam_does() -> None:
+def test_mvdr_of_one_snapshot_equals_the_conventional_beam() -> None:
     z = MODEL.array.steering_vector(0.3, 1.0)
     one, other = MVDR(MODEL, max_sources=1), CBF(MODEL, max_sources=1)
     for tracker in (one, other):
@@ -63,7 +69,7 @@ def test_mvdr_of_one_snapshot_peaks_where_the_conventional_beam_does() -> None:
     np.testing.assert_allclose(abs(one.estimate.amplitude), 1.0, atol=0.1)
 
 
-def test_mvdr_survives_missing_sensors_and_silence() -> None:
+def test_mvdr_handles_missing_sensors_and_zero_power() -> None:
     z = MODEL.simulate(np.full((30, 1), 0.4), 1.0, np.random.default_rng(0))
     z[5:, 3] = np.nan
     run = MVDR(MODEL, max_sources=1).run(z)
@@ -73,7 +79,7 @@ def test_mvdr_survives_missing_sensors_and_silence() -> None:
     assert silent.estimate.n_found == 0
 
 
-def test_scans_refuse_what_does_not_fit() -> None:
+def test_scan_invalid_argument_is_rejected() -> None:
     model = SOURCES["tone"].measurement
     with pytest.raises(ValueError, match=r"\(n_steps, 10\)"):
         scan(np.zeros((5, 3)), model)
@@ -81,8 +87,18 @@ def test_scans_refuse_what_does_not_fit() -> None:
         scan(np.zeros((5, 10)), model, "music")  # type: ignore[arg-type]
 
 
+@pytest.fixture
+def few_cases(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Shorten the studies to one or two angles, levels and lengths."""
+    monkeypatch.setattr(table_1, "ANGLES", (15.0, 30.0))
+    monkeypatch.setattr(convergence, "SNRS_DB", (0.0, 5.0))
+    monkeypatch.setattr(rmse, "LENGTHS", (25, 50))
+    monkeypatch.setattr(rmse, "SNRS_DB", (5.0,))
+
+
+@pytest.mark.usefixtures("few_cases")
 @pytest.mark.parametrize("name", ["table1", "convergence", "rmse"])
-def test_a_study_writes_its_table_page_and_pictures(name: str, tmp_path: Path) -> None:
+def test_study_writes_table_page_and_figures(name: str, tmp_path: Path) -> None:
     written = reproduce(f"interpolation-{name}", tmp_path / "new", runs=2)
     assert [path.suffix for path in written[:2]] == [".csv", ".md"]
     assert all(path.stat().st_size > 1000 for path in written)
@@ -90,14 +106,14 @@ def test_a_study_writes_its_table_page_and_pictures(name: str, tmp_path: Path) -
     assert "Not reproduced" in page or "The paper" in page
 
 
-def test_scenarios_refuse_directions_that_are_none() -> None:
+def test_interpolation_scenario_invalid_parameter_is_rejected() -> None:
     with pytest.raises(ValueError, match="doa_deg"):
         create("interpolation_tone", doa_deg=91.0)
     with pytest.raises(ValueError, match="reference"):
         create("interpolation_tone", reference="last")
 
 
-def test_a_wav_is_tracked_sample_by_sample(tmp_path: Path) -> None:
+def test_wav_file_is_tracked_sample_by_sample(tmp_path: Path) -> None:
     """A band from -25 degrees, 16-bit samples of unknown level, as `arrivals track` reads them."""
     from scipy.io import wavfile
 
@@ -106,8 +122,8 @@ def test_a_wav_is_tracked_sample_by_sample(tmp_path: Path) -> None:
     model = band_samples(array, rate, band, snr_db=10.0)
     rng = np.random.default_rng(0)
     frequencies, weights = rng.uniform(600, 1600, 300) / rate, rng.standard_normal((300, 2))
-    earlier = rate / 340 * np.sin(np.deg2rad(-25)) * array.positions.T
-    waves = received_waveforms(frequencies, weights @ np.array([1, 1j]), earlier, 800)
+    lead = rate / 340 * np.sin(np.deg2rad(-25)) * array.positions.T
+    waves = received_waveforms(frequencies, weights @ np.array([1, 1j]), lead, 800)
     waves += 0.3 * waves.std() * rng.standard_normal(waves.shape)
     wavfile.write(tmp_path / "a.wav", rate, (1000 * waves / waves.std()).astype(np.int16))
     recording = read(tmp_path / "a.wav")
@@ -118,7 +134,7 @@ def test_a_wav_is_tracked_sample_by_sample(tmp_path: Path) -> None:
     assert run.time[-1] == pytest.approx(799 / rate)
 
 
-def test_a_stream_gives_its_frames_and_drops_a_part_of_one() -> None:
+def test_stream_yields_whole_frames_only() -> None:
     stream = io.BytesIO(np.arange(7, dtype="<i2").tobytes())
     assert len(list(live_samples(stream, 3))) == 2
     with pytest.raises(ValueError, match="dtype"):

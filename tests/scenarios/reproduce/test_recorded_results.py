@@ -1,7 +1,7 @@
 """Agreement with the recorded per-step results of the published program (section 12.5).
 
 The recordings do not ship. Run by hand: ARRIVALS_DATA=FOLDER python -m pytest
-tests/test_recorded_results.py, FOLDER holding svalse/fig4_001.npz and svalse/fig6_001.npz.
+tests/scenarios/reproduce/test_recorded_results.py, FOLDER with svalse/fig4_001.npz and svalse/fig6_001.npz.
 """
 
 import os
@@ -21,15 +21,15 @@ from arrivals.typing import Complex, Float, Int
 FOLDER = os.environ.get("ARRIVALS_DATA")
 pytestmark = pytest.mark.skipif(FOLDER is None, reason="ARRIVALS_DATA does not name the folder")
 
-# e^{-jmπ sin β}: the recorded line counts its sensors the other way round
+# e^{-jmπ sin β}: the recorded line has its sensors in reverse order
 LINE = ArraySnapshot(SensorArray(-0.5 * np.arange(15.0)), wavelength=1.0)
 
 
 class PublishedAscent(SingleSnapshotAscent):
-    """With the slip of the published program: columns of C by running number (section 10, 1)."""
+    """With the error of the published program: columns of C by running number (section 10, 1)."""
 
     def covariances(self, on: Int) -> Complex:
-        """Take the columns 0, 1... of C where those of the active components are meant."""
+        """Return columns 0, 1... of C in place of those of the active components."""
         C = self.C[np.ix_(on, np.arange(len(on)))]
         np.fill_diagonal(C, 0)
         return C
@@ -42,17 +42,17 @@ REPLAYED: dict[str, Any] = {  # also of the first step, which has no prior
 
 
 class PublishedProgram(CoordinateSolver):
-    """The published program: the paper's settings, and the slip."""
+    """The published program: the paper's settings, and its error."""
 
     def step(
         self, y: Complex, manifold: Manifold, prediction: ComponentPrior | None
     ) -> SingleSnapshotAscent:
-        """Return the working state with the slip."""
+        """Return the solver state with the error."""
         return PublishedAscent(self, y, manifold, prediction)
 
 
 def replayed(name: str, n_steps: int, engine: CoordinateSolver) -> tuple[Float, Int, Any]:
-    """Largest deviation of each step, degrees, from its recorded carried components; iterations."""
+    """Return the largest deviation of each step, degrees, from the recorded prior; iterations."""
     z = np.load(Path(FOLDER or "") / "svalse" / f"{name}.npz")
     manifold = LINE.manifold("first")
     worst, iterations = [], []
@@ -76,7 +76,7 @@ def replayed(name: str, n_steps: int, engine: CoordinateSolver) -> tuple[Float, 
 @pytest.mark.parametrize(
     ("name", "n_steps", "worst"), [("fig4_001", 24, 0.01), ("fig6_001", 30, 0.001)]
 )
-def test_heuristic_1_with_the_slip_follows_the_program(
+def test_heuristic_1_with_the_error_matches_the_program(
     name: str, n_steps: int, worst: float
 ) -> None:
     engine = PublishedProgram(posterior="mixture", **REPLAYED)
@@ -88,7 +88,9 @@ def test_heuristic_1_with_the_slip_follows_the_program(
 @pytest.mark.parametrize(
     ("name", "n_steps", "shares"), [("fig4_001", 24, (0.70, 0.95)), ("fig6_001", 30, (0.83, 1.0))]
 )
-def test_heuristic_1_without_the_slip(name: str, n_steps: int, shares: tuple[float, float]) -> None:
+def test_heuristic_1_without_the_error_is_close_to_the_program(
+    name: str, n_steps: int, shares: tuple[float, float]
+) -> None:
     engine = CoordinateSolver(posterior="mixture", **REPLAYED)
     off, _, _ = replayed(name, n_steps, engine)
     assert (off < 0.01).mean() >= shares[0]
@@ -99,7 +101,7 @@ def test_heuristic_1_without_the_slip(name: str, n_steps: int, shares: tuple[flo
     ("name", "n_steps", "shares", "median"),
     [("fig4_001", 24, (0.37, 0.79), 0.15), ("fig6_001", 30, (0.5, 0.99), 0.10)],
 )
-def test_direct_quadrature(
+def test_direct_quadrature_is_close_to_the_program(
     name: str, n_steps: int, shares: tuple[float, float], median: float
 ) -> None:
     engine = CoordinateSolver(**REPLAYED)
@@ -111,7 +113,7 @@ def test_direct_quadrature(
 
 @pytest.mark.parametrize("name", ["fig4_001", "fig6_001"])
 def test_free_running_mixture_keeps_the_recorded_number_of_sources(name: str) -> None:
-    """The tracker itself, in the paper's form, without the slip: K as recorded in most steps."""
+    """The tracker itself, in the paper's form, without the error: K as recorded in most steps."""
     z = np.load(Path(FOLDER or "") / "svalse" / f"{name}.npz")
     tracker = SVALSE(
         LINE,
@@ -125,7 +127,7 @@ def test_free_running_mixture_keeps_the_recorded_number_of_sources(name: str) ->
 
 @pytest.mark.parametrize("name", ["fig4_001", "fig6_001"])
 @pytest.mark.parametrize(("method", "kind"), [("sbl", SBL), ("ssbl", SSBL)])
-def test_free_running_sbl_follows_the_program(name: str, method: str, kind: type[SBL]) -> None:
+def test_free_running_sbl_matches_the_program(name: str, method: str, kind: type[SBL]) -> None:
     z = np.load(Path(FOLDER or "") / "svalse" / f"{name}.npz")
     tracker = kind(LINE)
     for t, y in enumerate(z["y"].T):
@@ -136,6 +138,6 @@ def test_free_running_sbl_follows_the_program(name: str, method: str, kind: type
             np.rad2deg(tracker.estimate.doa), recorded[~np.isnan(recorded)], atol=1e-9
         )
         np.testing.assert_allclose(tracker.gamma, gamma, atol=1e-6 * gamma.max())
-        if tracker.estimate.converged:  # else the program gives the last σ² with the best γ
+        if tracker.estimate.converged:  # else the program returns the last σ² with the best γ
             assert tracker.noise == pytest.approx(z[f"{method}_sigma2"][t], rel=1e-6)
         assert tracker.estimate.iterations == z[f"{method}_iterations"][t]

@@ -1,4 +1,4 @@
-"""The studies of SVALSE's paper, cut short: their tables, claims and pictures."""
+"""Shortened studies of SVALSE's paper: tables, claims, figures and the results page."""
 
 import csv
 from pathlib import Path
@@ -19,7 +19,7 @@ from arrivals.scenarios.reproduce.swellex96 import figures_11_12 as reproduce_sw
 
 @pytest.fixture
 def short(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Scenarios of one step."""
+    """Make the studies' scenarios one step long."""
 
     def create(name: str, **params: Any) -> base.Scenario:
         return base.create(name, **{"n_steps": 1} | params)
@@ -36,7 +36,7 @@ def table(path: Path) -> list[dict[str, str]]:
 
 @pytest.mark.usefixtures("short")
 @pytest.mark.parametrize("number", [4, 7])
-def test_scenes_make_table_claims_and_pictures(number: int, tmp_path: Path) -> None:
+def test_study_writes_table_claims_and_figures(number: int, tmp_path: Path) -> None:
     name = f"svalse-fig{number}"
     written = reproduce.reproduce(name, tmp_path, runs=2, quick=True)
     assert {path.name for path in written} >= {f"{name}.csv", f"{name}.md", f"{name}-tracks.png"}
@@ -60,7 +60,7 @@ def test_scenes_make_table_claims_and_pictures(number: int, tmp_path: Path) -> N
 
 
 @pytest.mark.usefixtures("short")
-def test_sweeps_are_computed_once_for_three_figures(
+def test_sweep_is_computed_once_for_three_figures(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(reproduce_svalse, "FAST", ("sbl", "ssbl", "valse", "svalse"))
@@ -82,7 +82,7 @@ def test_sweeps_are_computed_once_for_three_figures(
 
 
 @pytest.mark.usefixtures("short")
-def test_pictures_of_runs_name_their_marks_and_tell_the_paper_s_number(tmp_path: Path) -> None:
+def test_run_figure_has_legend_and_published_values(tmp_path: Path) -> None:
     report = reproduce_svalse.fig4(2, 0, tmp_path, quick=True)
     figure = report.figures["tracks"]
     titles = [ax.get_title() for ax in figure.axes]
@@ -92,40 +92,40 @@ def test_pictures_of_runs_name_their_marks_and_tell_the_paper_s_number(tmp_path:
     assert len(bars) == 1
     columns = list(report.columns)
     rows = {row[0]: row for row in report.rows}
-    for wanted in ("label switches", "track length", "NEES", "in 68 %", "in 95 %"):
-        assert np.isnan(rows["cbf"][columns.index(wanted)])
+    for column in ("label switches", "track length", "NEES", "in 68 %", "in 95 %"):
+        assert np.isnan(rows["cbf"][columns.index(column)])
     assert rows["svalse"][columns.index("NEES")] > 0
-    told = [line for line in report.remarks if "svalse states the standard deviations" in line]
-    assert len(told) == 1
+    claim = "svalse states the standard deviations"
+    assert len([line for line in report.remarks if claim in line]) == 1
 
 
-def test_what_a_user_would_write_stands_in_every_table_of_directions() -> None:
+def test_every_table_of_directions_includes_the_baselines() -> None:
     for methods in (reproduce_svalse.FAST, reproduce_swellex.METHODS):
         assert set(methods) >= {"cbf", "peaks_gnn", "sbl", "ssbl", "valse", "svalse"}
-    scenes = {case.told for case in reproduce_any_array.CASES if not case.params.get("memory")}
-    assert {c.told for c in reproduce_any_array.CASES if c.method == "peaks_gnn"} == scenes
+    labels = {case.label for case in reproduce_any_array.CASES if not case.params.get("memory")}
+    assert {c.label for c in reproduce_any_array.CASES if c.method == "peaks_gnn"} == labels
 
 
-def test_claims_on_any_array_go_by_paired_differences() -> None:
+def test_claims_on_any_array_use_paired_differences() -> None:
     cases = reproduce_any_array.CASES
     fewer = np.array([case.method == "svalse" and not case.params for case in cases])
     gospa = np.where(fewer, 1.0, 2.0)[:, None] + [[0.0, 0.1, 0.2]]
-    claims = reproduce_any_array._claims(gospa)
+    claims = reproduce_any_array.claims(gospa)
     assert len(claims) == len(reproduce_any_array.ORDER)
-    assert claims[0].startswith("Holds: on the circle SVALSE is below VALSE")
-    assert claims[-1].startswith("Does not hold: for that, whole densities")
+    assert claims[0].startswith("Holds: on the circle SVALSE has a lower GOSPA than VALSE")
+    assert claims[-1].startswith("Does not hold: with one random frequency, whole posteriors")
     assert "1.00 ± 0.00" in claims[0]
 
 
 def brief(runs: int, seed: int) -> Report:
     calls.append(runs)
-    return Report(f"Brief, {runs}", ["a"], [(1.0,)], ["Holds: it is brief (1).", "A word."])
+    return Report(f"Brief, {runs}", ["a"], [(1.0,)], ["Holds: it is brief (1).", "A remark."])
 
 
 calls: list[int] = []
 
 
-def test_all_writes_every_study_and_one_page(
+def test_reproduce_all_writes_every_study_and_one_page(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
@@ -145,7 +145,7 @@ def test_all_writes_every_study_and_one_page(
     assert str(tmp_path) not in text
 
 
-def test_page_is_made_again_without_what_is_finished(
+def test_reproduce_all_skips_finished_studies(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
@@ -159,7 +159,7 @@ def test_page_is_made_again_without_what_is_finished(
     assert first[-1].read_text() == page
     (tmp_path / "two.csv").unlink()
     reproduce.reproduce("all", tmp_path, runs=2)
-    reproduce.reproduce("one", tmp_path, runs=2)  # by its name: again
+    reproduce.reproduce("one", tmp_path, runs=2)  # a single study is always run
     assert calls == [2, 2, 2, 2]
     reproduce.reproduce("all", tmp_path, runs=2, seed=1)
     monkeypatch.setattr(reproduce, "code_mark", lambda: "other")
@@ -167,11 +167,11 @@ def test_page_is_made_again_without_what_is_finished(
     assert len(calls) == 8
 
 
-def test_every_study_of_other_runs_exists() -> None:
+def test_studies_with_special_numbers_of_runs_exist() -> None:
     assert set(RUNS) <= set(STUDIES)
 
 
-def test_a_page_must_be_a_file_and_that_is_known_before_the_work(
+def test_page_that_is_a_folder_is_rejected_before_the_study(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(reproduce, "STUDIES", {"one": f"{__name__}:brief"})

@@ -1,4 +1,4 @@
-"""The report's scenes: autoregressive sources and speech before a symmetric line."""
+"""Scenarios of the report: autoregressive sources, speech and a symmetric line."""
 
 from pathlib import Path
 
@@ -22,7 +22,7 @@ NAMES = [*(f"ar_fig{n}" for n in (1, 3, 4, 5, 6, 7, 8, 9)), "ar_three_on_three",
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_trial_is_what_its_models_say(name: str) -> None:
+def test_trial_is_consistent_with_its_models(name: str) -> None:
     scene: Scenario = create(name)
     trial = scene.sample(np.random.default_rng(0))
     sent = np.asarray(trial.signals)
@@ -32,12 +32,12 @@ def test_a_trial_is_what_its_models_say(name: str) -> None:
     assert (np.abs(noise) ** 2).mean() == pytest.approx(trial.measurement.noise, rel=0.1)  # type: ignore[union-attr]
 
 
-def test_a_seed_is_a_trial() -> None:
+def test_equal_seeds_give_equal_trials() -> None:
     one, other = (FastSource().sample(np.random.default_rng(3)) for _ in range(2))
     np.testing.assert_array_equal(one.measurements, other.measurements)
 
 
-def test_real_sources_are_real() -> None:
+def test_real_valued_sources_have_real_signals() -> None:
     scene = AutoregressiveField(real_valued=True, n_intervals=4)
     assert np.asarray(scene.sample(np.random.default_rng(0)).signals).dtype == np.float64
 
@@ -53,12 +53,12 @@ def test_real_sources_are_real() -> None:
         ({"n_intervals": 0}, "n_intervals"),
     ],
 )
-def test_scenes_refuse_what_is_none(params: dict[str, object], message: str) -> None:
+def test_field_invalid_parameter_is_rejected(params: dict[str, object], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         AutoregressiveField(**params)  # type: ignore[arg-type]  # some are wrong
 
 
-def test_speech_of_ones_own(tmp_path: Path) -> None:
+def test_speech_field_reads_recordings(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     paths = [tmp_path / "one.wav", tmp_path / "other.wav"]
     for n, path in enumerate(paths):
@@ -69,7 +69,7 @@ def test_speech_of_ones_own(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="one for each of 2"):
         SpeechField(recordings=paths[:1])
     wavfile.write(paths[0], 8000, np.zeros(500, np.int16))
-    with pytest.raises(ValueError, match="silent"):
+    with pytest.raises(ValueError, match="positive power"):
         _ = scene.signals
     wavfile.write(paths[0], 8000, np.zeros((500, 2), np.int16))
     with pytest.raises(ValueError, match="one channel"):
@@ -83,7 +83,7 @@ def test_speech_of_ones_own(tmp_path: Path) -> None:
         (FourOnThree(n_intervals=130), 5.0, {"regression__forgetting": 0.99}, 0.8),
     ],
 )
-def test_section_7_more_sources_than_a_subspace_method_can_tell(
+def test_section_7_more_sources_than_subspace_methods_resolve(
     scene: AutoregressiveField, offset: float, params: dict[str, float], most: float
 ) -> None:
     trials = [scene.sample(np.random.default_rng(n)) for n in range(6)]
@@ -96,12 +96,14 @@ def test_section_7_more_sources_than_a_subspace_method_can_tell(
         trials[0].tracker("music", n_sources=scene.n_sources)
 
 
-def test_directions_that_are_not_found_are_held() -> None:
-    found = hold_last(np.array([[np.nan, 0.2], [0.3, np.nan], [np.nan, np.nan]]))
-    np.testing.assert_array_equal(found, [[0.0, 0.2], [0.3, 0.2], [0.3, 0.2]])
+def test_hold_last_fills_missing_directions() -> None:
+    filled = hold_last(np.array([[np.nan, 0.2], [0.3, np.nan], [np.nan, np.nan]]))
+    np.testing.assert_array_equal(filled, [[0.0, 0.2], [0.3, 0.2], [0.3, 0.2]])
 
 
-def test_the_study_draws_its_figures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ar_study_writes_table_claims_and_figures(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     assert {case.figure for case in cases()} == set(range(1, 10))
     short = [case._replace(scene=case.scene.replace(n_intervals=110))
              for case in cases() if case.figure in (1, 3)]  # fmt: skip
@@ -111,4 +113,4 @@ def test_the_study_draws_its_figures(tmp_path: Path, monkeypatch: pytest.MonkeyP
     page = (tmp_path / "ar-kf.md").read_text()
     assert page.count("\n| ") == 2 + len(short)
     assert page.count("the AR coefficients converge (Fig. 1) (error 0.") == 1
-    assert "Fig. 7" not in page  # no claim on what was not run
+    assert "Fig. 7" not in page  # no claims on figures that were not run

@@ -1,4 +1,4 @@
-"""The tow past the SWellEx-96 line: its scenario, its study and the recorded arrays."""
+"""SWellEx-96 tow: scenario, study and recorded fields."""
 
 import csv
 import os
@@ -20,7 +20,7 @@ from arrivals.scenarios.simulations.swellex96 import TowPastLine, environment, l
 from arrivals.trackers import Run
 from arrivals.typing import Complex, Float
 
-WAY = tuple(track()["range_m"].tolist())
+RANGES = tuple(track()["range_m"].tolist())
 
 
 def rng(seed: int = 0) -> np.random.Generator:
@@ -30,8 +30,8 @@ def rng(seed: int = 0) -> np.random.Generator:
 # the scenario
 
 
-def test_noise_lies_so_many_db_below_the_field_at_the_median_step() -> None:
-    scenario = TowPastLine(ranges=WAY[::10], snr_db=7.0)
+def test_noise_level_is_snr_db_below_the_field_at_the_median_step() -> None:
+    scenario = TowPastLine(ranges=RANGES[::10], snr_db=7.0)
     trial, field = scenario.sample(rng()), scenario.field()
     noise = (np.abs(trial.measurements - field) ** 2).mean()
     power = np.median((np.abs(field) ** 2).mean(axis=1))
@@ -39,18 +39,18 @@ def test_noise_lies_so_many_db_below_the_field_at_the_median_step() -> None:
     assert scenario.noise == pytest.approx(noise, rel=0.1)
 
 
-def test_the_same_draw_with_and_without_element_43() -> None:
-    scenario = TowPastLine(ranges=WAY[:3])
-    most, whole = scenario.sample(rng()), scenario.replace(missing=()).sample(rng())
-    assert (most.measurements.shape[1], whole.measurements.shape[1]) == (63, 64)
-    np.testing.assert_array_equal(most.measurements, np.delete(whole.measurements, 42, axis=1))
-    np.testing.assert_array_equal(most.truth, whole.truth)
-    np.testing.assert_array_equal(most.measurements, scenario.sample(rng()).measurements)
-    assert (most.measurements != scenario.sample(rng(1)).measurements).all()
+def test_draws_with_and_without_element_43_share_their_noise() -> None:
+    scenario = TowPastLine(ranges=RANGES[:3])
+    partial, whole = scenario.sample(rng()), scenario.replace(missing=()).sample(rng())
+    assert (partial.measurements.shape[1], whole.measurements.shape[1]) == (63, 64)
+    np.testing.assert_array_equal(partial.measurements, np.delete(whole.measurements, 42, axis=1))
+    np.testing.assert_array_equal(partial.truth, whole.truth)
+    np.testing.assert_array_equal(partial.measurements, scenario.sample(rng()).measurements)
+    assert (partial.measurements != scenario.sample(rng(1)).measurements).all()
 
 
-def test_a_trial_may_be_written_to_and_the_next_is_whole() -> None:
-    scenario = TowPastLine(ranges=WAY[:2])
+def test_writing_to_a_trial_does_not_change_the_next() -> None:
+    scenario = TowPastLine(ranges=RANGES[:2])
     first = scenario.sample(rng())
     kept = first.measurements.copy(), first.truth.copy()
     first.measurements[:] = 0
@@ -61,8 +61,8 @@ def test_a_trial_may_be_written_to_and_the_next_is_whole() -> None:
     np.testing.assert_array_equal(again.truth, kept[1])
 
 
-def test_the_sound_that_ships_is_of_this_scenario() -> None:
-    """The demo's snapshots less our field are white, and 10 dB below it at the median step."""
+def test_shipped_snapshots_are_of_this_scenario() -> None:
+    """The demo's snapshots minus our field: 10 dB below it at the median step."""
     measurement, snapshots, time = shipped()
     scenario = TowPastLine()
     np.testing.assert_allclose(time, track()["time_s"], atol=1e-3)
@@ -71,7 +71,7 @@ def test_the_sound_that_ships_is_of_this_scenario() -> None:
     assert (np.abs(noise) ** 2).mean() == pytest.approx(scenario.noise, rel=0.02)
 
 
-def test_paths_are_where_the_description_of_the_data_says() -> None:
+def test_path_angles_match_the_description_of_the_data() -> None:
     names, doa, level_db = TowPastLine().paths()
     degrees, step = np.rad2deg(doa), np.arange(1, 351)
     strongest = np.array(names)[np.nanargmax(level_db, axis=1)]
@@ -82,11 +82,11 @@ def test_paths_are_where_the_description_of_the_data_says() -> None:
     at_206 = degrees[205]
     assert at_206[names.index("BS")] == pytest.approx(14.6, abs=0.5)
     assert at_206[names.index("BSB")] == pytest.approx(-17.2, abs=0.5)
-    assert np.nanmin(np.abs(degrees)) > 11  # the flattest ray: acos(1489/1519)
+    assert np.nanmin(np.abs(degrees)) > 11  # the ray of smallest elevation: acos(1489/1519)
 
 
-def test_truth_is_what_is_strong() -> None:
-    scenario = TowPastLine(ranges=WAY[::25])
+def test_truth_has_the_strong_paths() -> None:
+    scenario = TowPastLine(ranges=RANGES[::25])
     near, wide = scenario.truth(10.0), scenario.truth(30.0)
     assert (np.isnan(near) | (near == wide)).all()
     assert ((~np.isnan(near)).sum(axis=1) >= 1).all()
@@ -94,14 +94,14 @@ def test_truth_is_what_is_strong() -> None:
     np.testing.assert_array_equal(scenario.sample(rng()).truth, near)
 
 
-def test_the_highest_peak_of_the_beam_is_a_path() -> None:
-    scenario = TowPastLine(ranges=WAY[::10])
+def test_highest_beam_peak_is_a_path() -> None:
+    scenario = TowPastLine(ranges=RANGES[::10])
     grid, power = beam(scenario, scenario.field())
-    off = np.abs(scenario.truth() - grid[power.argmax(axis=1)][:, None])
-    assert np.median(np.rad2deg(np.nanmin(off, axis=1))) < 0.7
+    error = np.abs(scenario.truth() - grid[power.argmax(axis=1)][:, None])
+    assert np.median(np.rad2deg(np.nanmin(error, axis=1))) < 0.7
 
 
-def test_another_depth_tone_model_and_way_give_another_field() -> None:
+def test_field_depends_on_depth_frequency_model_and_ranges() -> None:
     base = TowPastLine(ranges=(2000.0, 2100.0))
     others: list[dict[str, Any]] = [
         {"source_depth": 54.0},
@@ -117,7 +117,7 @@ def test_another_depth_tone_model_and_way_give_another_field() -> None:
     assert base.replace(frequency=127.0).measurement.wavelength == pytest.approx(1489 / 127)
 
 
-def test_a_configuration_makes_the_round_trip() -> None:
+def test_tow_configuration_makes_the_round_trip() -> None:
     scenario = create("swellex96", ranges=[2000.0, 2100.0], missing=[1, 43], snr_db=3.0)
     for back in (
         TowPastLine.from_dict(scenario.to_dict()),
@@ -142,7 +142,7 @@ def test_a_configuration_makes_the_round_trip() -> None:
         ({"snr_db": np.inf}, "snr_db must be finite"),
     ],
 )
-def test_a_scene_that_makes_no_sense_is_refused(change: dict[str, Any], match: str) -> None:
+def test_tow_invalid_parameter_is_rejected(change: dict[str, Any], match: str) -> None:
     with pytest.raises(ValueError, match=match):
         TowPastLine(**change)
 
@@ -150,9 +150,9 @@ def test_a_scene_that_makes_no_sense_is_refused(change: dict[str, Any], match: s
 # the study
 
 
-def test_valse_and_svalse_tell_more_paths_apart_far_away_than_the_beamformer() -> None:
+def test_valse_and_svalse_resolve_more_distant_paths_than_the_beamformer() -> None:
     """Steps 61 to 80 of the paper's 1 to 100, where many paths lie near each other."""
-    scenario = TowPastLine(ranges=WAY[60:80])
+    scenario = TowPastLine(ranges=RANGES[60:80])
     trial = scenario.sample(rng())
     score = {
         name: mean_gospa(
@@ -166,10 +166,10 @@ def test_valse_and_svalse_tell_more_paths_apart_far_away_than_the_beamformer() -
     assert score["svalse"] < 0.8 * score["cbf"]
 
 
-def test_the_study_writes_table_statements_and_pictures(
+def test_swellex96_study_writes_table_claims_and_figures(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Every tenth step, with the beamformer in place of all six methods, which take a minute."""
+    """Every tenth step, with the beamformer for all six methods, which take a minute."""
 
     def conventional(scenario: TowPastLine, name: str, seed: int, draw: int) -> tuple[Run, float]:
         trial = scenario.sample(np.random.default_rng([seed, draw]))
@@ -208,8 +208,8 @@ def correlation(a: Complex, b: Complex) -> Float:
 
 
 @recorded
-def test_the_field_of_the_modes_is_the_recorded_one() -> None:
-    """That one lacks the loss of half a cell of sediment: 0.8 % in power, less with its step."""
+def test_modal_field_matches_the_recorded_one() -> None:
+    """The recorded field lacks the loss of half a cell of sediment, 0.8 % in power."""
     z, scenario = np.load(FOLDER / "s5_shallow_198hz.npz"), TowPastLine(missing=())
     clean = z["clean"].T.astype(np.complex128)
     field = scenario.field()
@@ -220,16 +220,16 @@ def test_the_field_of_the_modes_is_the_recorded_one() -> None:
 
 
 @recorded
-def test_our_rays_are_nearer_to_the_modes_than_the_recorded_ones() -> None:
-    """Those have no phase jump at caustics; beam powers correlate by 0.92 here, by 0.90 there."""
+def test_our_rays_match_the_modes_better_than_the_recorded_ones() -> None:
+    """Recorded rays lack the phase jump at caustics: correlation 0.90, ours 0.92."""
     z, scenario = np.load(FOLDER / "s5_shallow_198hz.npz"), TowPastLine(missing=(), model="rays")
-    modal, theirs = (z[key].T.astype(np.complex128) for key in ("clean", "rays"))
-    pictures = [beam(scenario, p)[1] for p in (modal, theirs, scenario.field())]
-    there, here = (
-        np.median([np.corrcoef(a, b)[0, 1] for a, b in zip(pictures[0], other, strict=True)])
-        for other in pictures[1:]
+    modal, recorded_rays = (z[key].T.astype(np.complex128) for key in ("clean", "rays"))
+    powers = [beam(scenario, p)[1] for p in (modal, recorded_rays, scenario.field())]
+    recorded_mean, our_mean = (
+        np.median([np.corrcoef(a, b)[0, 1] for a, b in zip(powers[0], other, strict=True)])
+        for other in powers[1:]
     )
-    assert here > there > 0.85
+    assert our_mean > recorded_mean > 0.85
     level = 10 * np.log10(
         (np.abs(scenario.field()) ** 2).mean(axis=1) / (np.abs(modal) ** 2).mean(axis=1)
     )
@@ -238,28 +238,28 @@ def test_our_rays_are_nearer_to_the_modes_than_the_recorded_ones() -> None:
 
 
 @recorded
-def test_the_paths_have_the_recorded_angles() -> None:
+def test_path_angles_match_the_recorded_ones() -> None:
     with open(FOLDER / "arrivals.csv", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     names, doa, _ = TowPastLine().paths()
     top = {int(row["step"]): -np.inf for row in rows}
     for row in rows:
         top[int(row["step"])] = max(top[int(row["step"])], float(row["level_db"]))
-    strong_ = [r for r in rows if float(r["level_db"]) > top[int(r["step"])] - 15]
-    ours = np.rad2deg([doa[int(r["step"]) - 1, names.index(r["path"])] for r in strong_])
-    assert np.isnan(ours).mean() < 0.06  # rays that graze their turning point, or touch none
-    off = np.abs(ours - [float(r["angle_deg"]) for r in strong_])
-    assert np.nanmax(off) < 0.05
+    strong = [r for r in rows if float(r["level_db"]) > top[int(r["step"])] - 15]
+    ours = np.rad2deg([doa[int(r["step"]) - 1, names.index(r["path"])] for r in strong])
+    assert np.isnan(ours).mean() < 0.06  # rays at or beyond their turning point
+    error = np.abs(ours - [float(r["angle_deg"]) for r in strong])
+    assert np.nanmax(error) < 0.05
 
 
 @recorded
-def test_the_tables_are_the_recorded_ones() -> None:
-    guide, way = environment(), track()
+def test_shipped_tables_match_the_recorded_ones() -> None:
+    guide, ship = environment(), track()
     ssp = np.loadtxt(FOLDER / "ssp.csv", delimiter=",", skiprows=1)
     np.testing.assert_array_equal(np.stack([guide.depths, guide.speeds], axis=1), ssp)
     with open(FOLDER / "track.csv", encoding="utf-8") as file:
         np.testing.assert_array_equal(
-            way["range_m"], [float(r["range_m"]) for r in csv.DictReader(file)]
+            ship["range_m"], [float(r["range_m"]) for r in csv.DictReader(file)]
         )
     with open(FOLDER / "array.csv", encoding="utf-8") as file:
         elements = list(csv.DictReader(file))

@@ -9,8 +9,8 @@ import pytest
 from arrivals.measurement_models import ArraySamples, FlatBand, SensorArray, Tones
 from arrivals.motion_models import DelayDrift, DelayWalk
 from arrivals.scenarios import Trial, create
-from arrivals.scenarios.reproduce.interpolation.figures import SOURCES
 from arrivals.scenarios.reproduce.interpolation.trials import (
+    SOURCES,
     bound_deg,
     draws,
     filter_directions,
