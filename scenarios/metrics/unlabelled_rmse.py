@@ -13,7 +13,7 @@ def best_assignment_rmse(truth: ArrayLike, found: ArrayLike, period: float | Non
     """Compute the RMSE of unlabelled angles, a fixed number of them in each step.
 
     In each step the estimates are assigned to the true angles so that the sum of squares is
-    smallest. There is no cut-off: large errors count in full. For varying numbers see `rmse`.
+    smallest. Large errors count in full, without a cut-off. For varying numbers see `rmse`.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Agreement with the recorded per-step results of the published program (section 12.5).
 
 The recordings do not ship. Run by hand: ARRIVALS_DATA=FOLDER python -m pytest
-tests/scenarios/reproduce/test_recorded_results.py, FOLDER with svalse/fig4_001.npz and svalse/fig6_001.npz.
+tests/scenarios/reproduce/test_recorded_results.py; FOLDER has svalse/fig4_001.npz and fig6_001.npz.
 """
 
 import os
