@@ -87,7 +87,13 @@ class Method:
         return type(made)(**made.set_params(**nested).get_params(deep=False))
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the configuration for a results file."""
+        """Return the configuration for a results file.
+
+        Returns
+        -------
+        dict
+            Keys `tracker`, `params` and `label`.
+        """
         params = {name: to_plain(value) for name, value in self.params.items()}
         return {"tracker": self.tracker, "params": params, "label": self.label}
 

@@ -97,7 +97,11 @@ class AutoregressiveField(SourceField):
 
     Parameters
     ----------
-    doa_deg, end_deg, distances, snr_db
+    doa_deg, distances : sequence of float
+        As in `SourceField`.
+    end_deg : sequence of float, optional
+        As in `SourceField`.
+    snr_db : float
         As in `SourceField`.
     coefficients : sequence of sequences of float
         AR coefficients of each source, whose power is 1.

@@ -19,7 +19,11 @@ class MovingSources(RSSScenario):
 
     Parameters
     ----------
-    n_sources, n_sensors, radius, n_snapshots, alpha, noise_db, power_db, power_std_db
+    n_sources, n_sensors, n_snapshots : int
+        As in `RSSScenario`.
+    radius : float, optional
+        As in `RSSScenario`.
+    alpha, noise_db, power_db, power_std_db : float
         As in `RSSScenario`.
     n_steps : int
         Number of time steps, of 1 s.
@@ -47,9 +51,15 @@ class CrossingSources(MovingSources):
 
     Parameters
     ----------
-    n_sources, n_sensors, radius, n_snapshots, alpha, noise_db, power_db, power_std_db
+    n_sources, n_sensors, n_snapshots : int
         As in `RSSScenario`.
-    n_steps, q
+    radius : float, optional
+        As in `RSSScenario`.
+    alpha, noise_db, power_db, power_std_db : float
+        As in `RSSScenario`.
+    n_steps : int
+        As in `MovingSources`.
+    q : float
         As in `MovingSources`.
     start_std, speed_std : float
         Standard deviations of the initial state, m and m/s; the initial velocity is zero.
@@ -87,9 +97,15 @@ class BirthsAndDeaths(MovingSources):
 
     Parameters
     ----------
-    n_sources, n_sensors, radius, n_snapshots, alpha, noise_db, power_db, power_std_db
+    n_sources, n_sensors, n_snapshots : int
         As in `RSSScenario`.
-    n_steps, q
+    radius : float, optional
+        As in `RSSScenario`.
+    alpha, noise_db, power_db, power_std_db : float
+        As in `RSSScenario`.
+    n_steps : int
+        As in `MovingSources`.
+    q : float
         As in `MovingSources`.
     apart : float
         Spacing of the centres of the tracks, m.

@@ -128,7 +128,13 @@ class InterpolationTone(InterpolationScenario):
 
     Parameters
     ----------
-    doa_deg, end_deg, snr_db, n_sensors, n_steps, reference
+    doa_deg, snr_db : float
+        As in `InterpolationScenario`.
+    end_deg : float, optional
+        As in `InterpolationScenario`.
+    n_sensors, n_steps : int
+        As in `InterpolationScenario`.
+    reference : {"first", "centre"}
         As in `InterpolationScenario`.
     frequency : float
         Cycles per sample.
@@ -165,7 +171,13 @@ class InterpolationBand(InterpolationScenario):
 
     Parameters
     ----------
-    doa_deg, end_deg, snr_db, n_sensors, n_steps, reference
+    doa_deg, snr_db : float
+        As in `InterpolationScenario`.
+    end_deg : float, optional
+        As in `InterpolationScenario`.
+    n_sensors, n_steps : int
+        As in `InterpolationScenario`.
+    reference : {"first", "centre"}
         As in `InterpolationScenario`.
     low, high : float
         Edges of the band, cycles per sample.
@@ -204,7 +216,13 @@ class InterpolationCoupled(InterpolationScenario):
 
     Parameters
     ----------
-    doa_deg, end_deg, snr_db, n_sensors, n_steps, reference
+    doa_deg, snr_db : float
+        As in `InterpolationScenario`.
+    end_deg : float, optional
+        As in `InterpolationScenario`.
+    n_sensors, n_steps : int
+        As in `InterpolationScenario`.
+    reference : {"first", "centre"}
         As in `InterpolationScenario`.
     first, second : float
         Frequencies of two tones, cycles per sample.

@@ -29,8 +29,12 @@ class RSSTrial(Trial):
 
     Parameters
     ----------
-    measurements, truth, measurement, motion
+    measurements, truth : ndarray
         As in `Trial`; readings in Np.
+    measurement : LogNormalRSS
+        As in `Trial`.
+    motion : MotionModel
+        As in `Trial`.
     log_amplitude : ndarray, shape (n_sources,)
         True u, Np.
     x0 : ndarray, shape (n_sources, n), or None
@@ -195,7 +199,11 @@ class FixedSources(RSSScenario):
 
     Parameters
     ----------
-    n_sources, n_sensors, radius, n_snapshots, alpha, noise_db, power_db, power_std_db
+    n_sources, n_sensors, n_snapshots : int
+        As in `RSSScenario`.
+    radius : float, optional
+        As in `RSSScenario`.
+    alpha, noise_db, power_db, power_std_db : float
         As in `RSSScenario`.
     spacing : float
         Distance between neighbours, m.

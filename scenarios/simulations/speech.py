@@ -29,7 +29,11 @@ class SpeechField(SourceField):
 
     Parameters
     ----------
-    doa_deg, end_deg, distances, snr_db
+    doa_deg, distances : sequence of float
+        As in `SourceField`.
+    end_deg : sequence of float, optional
+        As in `SourceField`.
+    snr_db : float
         As in `SourceField`.
     order : int
         Order of the autoregressive model, fitted to the whole recordings; 2 in Fig. 9.
