@@ -12,17 +12,17 @@ import sys
 import tempfile
 import time
 
-from joblib import parallel_config
-
 from arrivals.scenarios import create, monte_carlo
+from arrivals.scenarios.experiments.monte_carlo import StudySettings, compute_study
 from arrivals.scenarios.simulations import SixSources
 
 TRACKERS = ["cbf", "peaks_gnn", "sbl", "ssbl", "valse", "svalse"]
 MEMORY = """
 import resource
-from arrivals.scenarios import monte_carlo
+from arrivals.scenarios.experiments.monte_carlo import StudySettings, compute_study
 from arrivals.scenarios.simulations import SixSources
-monte_carlo(SixSources(n_steps=2), ["cbf"], {runs}, out={out!r}, batch=50)
+settings = StudySettings(out={out!r}, batch=50)
+compute_study(SixSources(n_steps=2), ["cbf"], {runs}, 0, settings)
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """
 
@@ -43,11 +43,11 @@ def two_processes(runs: int) -> None:
     """Print the wall-clock time of one process and of two."""
     scenario, took = create("svalse_fig6"), {}
     for n_jobs in (1, 2):
-        with parallel_config(n_jobs=n_jobs):
-            monte_carlo(scenario, ["cbf"], 4, batch=1)  # starts the processes
-            started = time.perf_counter()
-            monte_carlo(scenario, ["ssbl", "svalse"], runs, metrics=["gospa"])
-            took[n_jobs] = time.perf_counter() - started
+        starting = StudySettings(batch=1, n_jobs=n_jobs)
+        compute_study(scenario, ["cbf"], 4, 0, starting)  # starts the processes
+        started = time.perf_counter()
+        monte_carlo(scenario, ["ssbl", "svalse"], runs, metrics=["gospa"], n_jobs=n_jobs)
+        took[n_jobs] = time.perf_counter() - started
     ratio = took[1] / took[2]
     print(f"{runs} runs: one process {took[1]:.0f} s, two {took[2]:.0f} s, {ratio:.2f} times "
           f"(limit 1.7: {'pass' if ratio >= 1.7 else 'FAIL'})", flush=True)  # fmt: skip

@@ -14,8 +14,9 @@ from pathlib import Path
 
 from joblib import parallel_config
 
-from arrivals.scenarios import create, monte_carlo
+from arrivals.scenarios import create
 from arrivals.scenarios.experiments.methods import tracker_name
+from arrivals.scenarios.experiments.monte_carlo import StudySettings, compute_study
 from arrivals.scenarios.reproduce.svalse.figures_4_to_7 import svalse_as_printed, table_methods
 from arrivals.scenarios.reproduce.svalse.figures_8_to_10 import SCENES, SNR_DB, sweep
 from arrivals.scenarios.reproduce.svalse.published_values import ACTIVATION, REBUILT, SWEEP, SWEPT
@@ -31,7 +32,9 @@ def scenes(runs: int, out: Path, quick: bool) -> None:
     print("| scene | method | GOSPA ± std of runs | rebuilt | RMSE | rebuilt | within |")
     print("|---" * 7 + "|")
     for name, known in REBUILT.items():
-        study = monte_carlo({name: create(name)}, table_methods(quick), runs, 0, out=out, batch=2)
+        study = compute_study(
+            {name: create(name)}, table_methods(quick), runs, 0, StudySettings(out=out, batch=2)
+        )
         for method in study.methods:
             gospa, rmse = (study.mean(metric, method) for metric in ("gospa", "rmse"))
             mine = f"| {name} | {method} | {gospa:.2f} ± {study.spread('gospa', method):.2f} "
@@ -74,7 +77,7 @@ def activations(runs: int, out: Path) -> None:
         for off, on in ACTIVATION
     ]
     cases = {"svalse_fig6": create("svalse_fig6")}
-    study = monte_carlo(cases, settings, runs, 0, out=out, batch=1)
+    study = compute_study(cases, settings, runs, 0, StudySettings(out=out, batch=1))
     for method, known in zip(study.methods, ACTIVATION.values(), strict=True):
         gospa, missed, false, rmse = (
             study.mean(metric, method) for metric in ("gospa", "missed", "false", "rmse")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import arrivals
@@ -21,6 +22,21 @@ from arrivals.validation import count, one_of
 Metrics = Sequence[str] | Mapping[str, Metric]
 
 
+@dataclass(frozen=True)
+class StudySettings:
+    """How a study is computed and kept; see `monte_carlo`.
+
+    `batch` is the number of runs in one task of a process, and in one call of a method with its
+    own `run_batch`.
+    """
+
+    metrics: Metrics | None = None
+    out: str | os.PathLike[str] | None = None
+    batch: int = 4
+    n_jobs: int | None = None
+    progress: bool = False
+
+
 def monte_carlo(
     scenario: str | Scenario | Mapping[str, Scenario],
     trackers: Sequence[str | Method],
@@ -29,15 +45,13 @@ def monte_carlo(
     *,
     metrics: Metrics | None = None,
     out: str | os.PathLike[str] | None = None,
-    batch: int = 4,
+    n_jobs: int | None = None,
     progress: bool = False,
 ) -> Study:
     """Compare trackers on the same draws of one or several scenarios.
 
     Run r of every scenario and every method is seeded by `SeedSequence(seed, spawn_key=(r,))`:
-    serial, threads, processes and a cluster give the same numbers. Inside
-    `joblib.parallel_config(n_jobs=2)`, or with any other backend of joblib, the runs are computed
-    in parallel.
+    serial, threads, processes and a cluster give the same numbers.
 
     Parameters
     ----------
@@ -55,9 +69,9 @@ def monte_carlo(
     out : path, optional
         A CSV file to which results are appended, or a folder in which each configuration has its
         own file. Finished runs in it are not computed again; new runs are added.
-    batch : int
-        Number of runs in one task of a process, and in one call of a method with its own
-        `run_batch`.
+    n_jobs : int, optional
+        Number of processes; -1 for all cores. If None, that of `joblib.parallel_config`, whose
+        other backends work too, and 1 without it.
     progress : bool
         Show a progress bar on standard error.
 
@@ -90,7 +104,19 @@ def monte_carlo(
     >>> study.mean("gospa", "sbl") < study.mean("gospa", "cbf")
     True
     """
-    cases, compared, measures = _cases(scenario), methods(trackers), _metrics(metrics)
+    settings = StudySettings(metrics, out, n_jobs=n_jobs, progress=progress)
+    return compute_study(scenario, trackers, runs, seed, settings)
+
+
+def compute_study(
+    scenario: str | Scenario | Mapping[str, Scenario],
+    trackers: Sequence[str | Method],
+    runs: int,
+    seed: int,
+    settings: StudySettings,
+) -> Study:
+    """Return the study of `monte_carlo`, with settings of its computation."""
+    cases, compared, measures = _cases(scenario), methods(trackers), _metrics(settings.metrics)
     count("runs", runs)
     config = {
         "version": arrivals.__version__,
@@ -100,16 +126,18 @@ def monte_carlo(
         "methods": [method.to_dict() for method in compared],
         "metrics": {name: f"{f.__module__}.{f.__qualname__}" for name, f in measures.items()},
     }
-    results = Results(config, out)
+    results = Results(config, settings.out)
     with results.writing():
         finished = _finished(results, len(compared))
         results.keep(lambda row: (row.case, row.run) in finished)
-        pending = list(_pending(cases, runs, count("batch", batch), finished))
+        pending = list(_pending(cases, runs, count("batch", settings.batch), finished))
         batches = (RunBatch(name, cases[name], compared, measures, seed, numbers)
                    for name, numbers in pending)  # fmt: skip
         total = runs * len(cases)
-        with _bar(progress, total, total - sum(len(numbers) for _, numbers in pending)) as bar:
-            for rows in _computed(batches, results):
+        with _bar(
+            settings.progress, total, total - sum(len(numbers) for _, numbers in pending)
+        ) as bar:
+            for rows in _computed(batches, results, settings.n_jobs):
                 results.add(rows)
                 bar.update(len({row.run for row in rows}))
     return Study(results, range(runs))
@@ -151,11 +179,15 @@ def _finished(results: Results, n_methods: int) -> set[tuple[str, int]]:
     return {key for key, n in last.items() if n == n_methods}
 
 
-def _computed(batches: Iterable[RunBatch], results: Results) -> Iterator[list[Row]]:
+def _computed(
+    batches: Iterable[RunBatch], results: Results, n_jobs: int | None
+) -> Iterator[list[Row]]:
     """Yield the rows of the batches in order of completion."""
     from joblib import Parallel, delayed
 
-    parallel = Parallel(return_as="generator_unordered", pre_dispatch="2*n_jobs", batch_size=1)
+    parallel = Parallel(
+        n_jobs, return_as="generator_unordered", pre_dispatch="2*n_jobs", batch_size=1
+    )
     kept = "no run is kept: out is None"
     if results.path is not None:
         kept = f"finished runs are kept in {results.path}: call again to resume"

@@ -3,7 +3,8 @@
 from functools import cache
 from typing import Any
 
-from arrivals.scenarios import Method, Study, create, monte_carlo
+from arrivals.scenarios import Method, Study, create
+from arrivals.scenarios.experiments.monte_carlo import StudySettings, compute_study
 from arrivals.scenarios.simulations import PairsInTurn
 
 SHORT = {"fig6": PairsInTurn(n_steps=3), "scenario1": create("svalse_scenario1", n_steps=2)}
@@ -24,7 +25,7 @@ def numbers(study: Study) -> list[tuple[Any, ...]]:
 
 def small(runs: int = 5, **options: Any) -> Study:
     """Run the short study."""
-    return monte_carlo(SHORT, TRACKERS, runs, seed=3, metrics=METRICS, batch=2, **options)
+    return compute_study(SHORT, TRACKERS, runs, 3, StudySettings(METRICS, batch=2, **options))
 
 
 @cache

@@ -11,7 +11,7 @@ from arrivals.motion_models import BernoulliVonMises
 from arrivals.scenarios.base import Scenario, create
 from arrivals.scenarios.bounds.snapshot import line_bound
 from arrivals.scenarios.experiments.methods import Method, methods, tracker_name
-from arrivals.scenarios.experiments.monte_carlo import monte_carlo
+from arrivals.scenarios.experiments.monte_carlo import StudySettings, compute_study
 from arrivals.scenarios.experiments.study import Study
 from arrivals.scenarios.reproduce.claims import negative, verdict
 from arrivals.scenarios.reproduce.studies import Report
@@ -77,8 +77,8 @@ def scene(
 ) -> Report:
     """Compare all methods on one scene; draw the first run, and the parts of GOSPA."""
     scenario = create(name)
-    study = monte_carlo({name: scenario}, table_methods(quick), runs, seed, out=out,
-                        batch=batch_of(runs))  # fmt: skip
+    settings = StudySettings(out=out, batch=batch_of(runs))
+    study = compute_study({name: scenario}, table_methods(quick), runs, seed, settings)
     rows = [_row(study, name, method) for method in study.methods]
     claims = [*_order(study), *_as_rebuilt(study, name), *_calibration(study)]
     lines = [*remarks, *SPREADS, *claims, _bound(scenario, runs, seed)]
@@ -202,18 +202,19 @@ def _bound(scenario: Scenario, runs: int, seed: int) -> str:
 def fig7(runs: int, seed: int, out: Path | None = None) -> Report:
     """Extreme probabilities of birth and death, on the scenario of Fig. 6."""
     panels = {f"p_d {death:g}, p_a {birth:g}": (death, birth) for death, birth in ACTIVATION}
-    settings = [
+    trackers = [
         svalse_as_printed(label, p_deactivate=death, p_activate=birth)
         for label, (death, birth) in panels.items()
     ]
     scenario = create("svalse_fig6")
-    study = monte_carlo({"svalse_fig6": scenario}, settings, runs, seed, out=out, batch=1)
+    settings = StudySettings(out=out, batch=1)
+    study = compute_study({"svalse_fig6": scenario}, trackers, runs, seed, settings)
     rows = [_activation_row(study, label, *pair) for label, pair in panels.items()]
     columns = ("p_deactivate", "p_activate", "GOSPA", "std of runs", "missed", "false", "RMSE",
                "converged", "paper's run", "paper's RMSE", "rebuilt", "its std",
                "rebuilt RMSE")  # fmt: skip
     paper = [known.paper for known in ACTIVATION.values()]
-    figures = {"tracks": draw_runs(scenario, seed, settings[:4], paper)}
+    figures = {"tracks": draw_runs(scenario, seed, trackers[:4], paper)}
     title = f"Fig. 7: probabilities of activation, svalse as printed, {runs} runs at 20 dB, degrees"
     return Report(title, columns, rows, [*_activation_claims(study), FORCED], figures)
 

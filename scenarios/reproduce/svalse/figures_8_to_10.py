@@ -11,7 +11,7 @@ from arrivals.plots.study import METHOD_COLOURS, plot_metric
 from arrivals.scenarios.base import create
 from arrivals.scenarios.bounds.snapshot import LineBound, line_bound
 from arrivals.scenarios.experiments.methods import tracker_name
-from arrivals.scenarios.experiments.monte_carlo import monte_carlo
+from arrivals.scenarios.experiments.monte_carlo import StudySettings, compute_study
 from arrivals.scenarios.experiments.study import Study
 from arrivals.scenarios.reproduce.claims import negative, verdict
 from arrivals.scenarios.reproduce.studies import Report
@@ -32,8 +32,8 @@ MEASURED = ("gospa", "distance", "missed", "false", "rmse", "converged")
 def sweep(name: str, runs: int, seed: int, out: Path | None, quick: bool) -> Study:
     """Run all methods on a scene at every SNR; the cases are the SNRs."""
     cases = {f"{snr:g}": create(name, snr_db=snr) for snr in SNR_DB}
-    return monte_carlo(cases, table_methods(quick), runs, seed, metrics=MEASURED, out=out,
-                       batch=batch_of(runs))  # fmt: skip
+    settings = StudySettings(MEASURED, out, batch=batch_of(runs))
+    return compute_study(cases, table_methods(quick), runs, seed, settings)
 
 
 def fig8(runs: int, seed: int, out: Path | None = None, quick: bool = False) -> Report:

@@ -12,6 +12,7 @@ from small_studies import METRICS, SHORT, TRACKERS, numbers, reference, small
 from arrivals.measurement_models import ArraySnapshot
 from arrivals.scenarios import Method, Scenario, Trial, create, grid, monte_carlo
 from arrivals.scenarios.experiments.methods import methods
+from arrivals.scenarios.experiments.monte_carlo import StudySettings, compute_study
 from arrivals.scenarios.metrics.registry import METRICS as KNOWN
 from arrivals.scenarios.simulations import PairsInTurn
 from arrivals.trackers import CBF, SSBL, Run, register
@@ -32,10 +33,11 @@ def test_threads_and_processes_give_serial_numbers(backend: str) -> None:
 
     with parallel_config(backend=backend, n_jobs=2):
         assert numbers(small()) == reference()
+    assert numbers(small(n_jobs=2)) == reference()
 
 
 def test_batch_size_does_not_change_numbers() -> None:
-    study = monte_carlo(SHORT, TRACKERS, 5, seed=3, metrics=METRICS, batch=5)
+    study = compute_study(SHORT, TRACKERS, 5, 3, StudySettings(METRICS, batch=5))
     for ours, theirs in zip(numbers(study), reference(), strict=True):
         assert (ours[:4], ours[5]) == (theirs[:4], theirs[5])
         assert float(ours[4]) == pytest.approx(float(theirs[4]), abs=1e-9, nan_ok=True)
@@ -120,7 +122,7 @@ def test_method_unknown_parameter_is_rejected() -> None:
 
 
 def test_grid_sets_nested_parameters() -> None:
-    made = grid("svalse", {"motion__p_activate": [0.1, 1.0], "merge": [0.0]})
+    made = grid("svalse", {"motion__p_activate": [0.1, 1.0], "solver__merge": [0.0]})
     trial = SHORT["fig6"].sample(np.random.default_rng(0))
     trackers: list[Any] = [one.make(trial, np.random.SeedSequence(0)) for one in made]
     assert [tracker.motion.p_activate for tracker in trackers] == [0.1, 1.0]
@@ -214,6 +216,6 @@ def test_progress_bar_includes_finished_runs(
 def test_svalse_has_lower_gospa_than_ssbl_on_the_same_draws() -> None:
     """Section 12.1 has -0.40 ± 0.07 on Fig. 6 for coordinate ascent; Newton steps are better."""
     scenario = PairsInTurn(n_steps=25)
-    study = monte_carlo(scenario, ["ssbl", "svalse"], 4, seed=5, metrics=["gospa"], batch=3)
+    study = compute_study(scenario, ["ssbl", "svalse"], 4, 5, StudySettings(["gospa"], batch=3))
     difference = study.paired("gospa", "svalse", "ssbl")
     assert difference.mean < -2 * difference.error < 0.0

@@ -9,6 +9,7 @@ from small_studies import SHORT, small
 from arrivals.plots.study import plot_metric
 from arrivals.scenarios import Study, monte_carlo
 from arrivals.scenarios.experiments.batch import Row
+from arrivals.scenarios.experiments.monte_carlo import StudySettings, compute_study
 from arrivals.scenarios.experiments.results_file import Results
 from arrivals.scenarios.simulations import PairsInTurn
 
@@ -47,7 +48,7 @@ def test_bootstrap_interval_covers_the_mean_of_normal_draws() -> None:
 
 
 def test_csv_rows_are_tidy_and_sorted(tmp_path: Path) -> None:
-    study = monte_carlo(SHORT, ["mvdr", "cbf"], 3, metrics=["gospa"], batch=1)
+    study = compute_study(SHORT, ["mvdr", "cbf"], 3, 0, StudySettings(["gospa"], batch=1))
     study.to_csv(tmp_path / "rows.csv")
     lines = (tmp_path / "rows.csv").read_text().splitlines()
     assert lines[0] == "case,run,method,metric,value,note"

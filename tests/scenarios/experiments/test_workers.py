@@ -13,6 +13,7 @@ import pytest
 
 from arrivals.__main__ import main
 from arrivals.scenarios import Study, monte_carlo
+from arrivals.scenarios.experiments.monte_carlo import StudySettings, compute_study
 from arrivals.scenarios.experiments.workers import parallel_map
 from arrivals.scenarios.reproduce import studies as reproduce
 from arrivals.scenarios.reproduce.studies import Report
@@ -40,10 +41,9 @@ class IsKilled(CBF):
 
 
 def study(runs: int, seed: int, out: Path | None = None) -> Report:
-    made = monte_carlo(
-        {"fig6": PairsInTurn(n_steps=3)}, ["is_killed", "cbf"], runs, seed, metrics=["gospa"],
-        out=out, batch=1,
-    )  # fmt: skip
+    settings = StudySettings(["gospa"], out, batch=1)
+    scenario = {"fig6": PairsInTurn(n_steps=3)}
+    made = compute_study(scenario, ["is_killed", "cbf"], runs, seed, settings)
     values = [(method, float(v)) for method in made.methods for v in made.array("gospa", method)]
     return Report("Killed", ["method", "GOSPA"], values)
 
