@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
-from arrivals.measurement_models.direction_measurement import check_directions
 from arrivals.measurement_models.manifolds.manifold import Manifold, Reference
 from arrivals.measurement_models.observed import ObservedSnapshots, updated
 from arrivals.trackers.base import is_missing
