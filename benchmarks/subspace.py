@@ -19,7 +19,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 
 from arrivals.measurement_models import ArraySnapshot, SensorArray
-from arrivals.measurement_models.manifolds.manifold import UniformLineManifold
+from arrivals.measurement_models.manifolds.uniform_line import UniformLineManifold
 from arrivals.scenarios import ar_signals, best_assignment_rmse
 from arrivals.trackers import MUSIC, PAST
 from arrivals.trackers.subspace.base import Subspaces, uniform_line

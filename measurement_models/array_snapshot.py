@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -16,23 +15,20 @@ from arrivals.measurement_models.arrays.plane_waves import PlaneWaves
 from arrivals.measurement_models.arrays.sensor_array import SensorArray, direction
 from arrivals.measurement_models.base import MeasurementModel
 from arrivals.measurement_models.manifolds.fourier import fourier_manifold
-from arrivals.measurement_models.manifolds.manifold import Manifold, Reference, UniformLineManifold
+from arrivals.measurement_models.manifolds.manifold import Manifold, Reference
+from arrivals.measurement_models.manifolds.uniform_line import grid_line
+from arrivals.measurement_models.observed import ObservedSnapshots
+from arrivals.measurement_models.snapshot_likelihood import (
+    composite,
+    from_composite,
+    log_known,
+    log_marginal,
+    of_state,
+)
 from arrivals.typing import Complex, Float
 from arrivals.validation import count, instance, one_of, positive, real, shaped, state
 
 LARGEST, SMALLEST = 1e140, 1e-140
-
-
-def composite(z: ArrayLike) -> Float:
-    """Return complex vectors (..., n) as real ones (..., 2n): [Re; Im].
-
-    Examples
-    --------
-    >>> composite([1 + 2j, 3 - 4j])
-    array([ 1.,  3.,  2., -4.])
-    """
-    z = np.asarray(z)
-    return np.concatenate([z.real, z.imag], axis=-1).astype(np.float64)
 
 
 @dataclass(frozen=True)
@@ -208,6 +204,33 @@ class ArraySnapshot(MeasurementModel):
             raise ValueError("no sensor of the snapshot gave a finite number")
         return array
 
+    def observe(
+        self, z: ArrayLike | None, reference: Reference = "middle"
+    ) -> ObservedSnapshots | None:
+        """Return the bins, sensors and snapshots of a measurement that have valid data.
+
+        Parameters
+        ----------
+        z : array_like, shape `shape`, or None
+            Complex; NaN where a sensor gave no number.
+        reference : {"middle", "first"}
+            As in `manifold`.
+
+        Returns
+        -------
+        ObservedSnapshots or None
+            The data without gaps, with the manifold of their bins and sensors; None if the whole
+            measurement is missing.
+
+        Raises
+        ------
+        ValueError
+            If the shape is wrong, or every sensor has a gap in some snapshot.
+        """
+        if z is None or np.isnan(z := np.asarray(z)).all():
+            return None
+        return ObservedSnapshots.of(self.looks(z), self.manifold(reference))
+
     def looks(self, z: ArrayLike) -> Complex:
         """Return a snapshot with the axes of a `Manifold`: (n_bins, n_sensors, n_snapshots)."""
         looks = self.snapshot(z).reshape(self.n_bins, self.n_snapshots, self.array.n_sensors)
@@ -250,20 +273,39 @@ class ArraySnapshot(MeasurementModel):
                 "line, one number each, for directions from broadside"
             )
 
-    def log_likelihood(self, z: ArrayLike, doa: ArrayLike) -> Float:
-        """Return ln p(z | β), the amplitudes integrated out, for directions (..., n_sources).
+    def log_likelihood(
+        self, z: ArrayLike, doa: ArrayLike, amplitude: ArrayLike | None = None
+    ) -> Float:
+        """Return ln p(z | β) for directions (..., n_sources), rad.
 
-        z ~ CN(0, power Σ a aᴴ + noise I) in every look; sensors that are NaN are left out of
-        theirs. An unknown slowness or elevation is averaged over, each value as likely.
+        z ~ CN(0, power Σ a aᴴ + noise I) in every snapshot, the amplitudes integrated out; sensors
+        that are NaN are left out of theirs. An unknown slowness or elevation is averaged over,
+        each value as likely.
+
+        Parameters
+        ----------
+        z : array_like, shape `shape` or (dim_z,)
+            One measurement, complex, or real as `composite` makes it.
+        doa : array_like, shape (..., n_sources)
+            Directions, rad.
+        amplitude : array_like, shape (..., n_sources), optional
+            Complex amplitudes where they are known: then z ~ CN(Σ w a, noise I).
+
+        Returns
+        -------
+        ndarray, shape (...)
         """
-        Y = np.moveaxis(self.looks(z), 1, 2)[..., None, :]  # (F, N, 1, M): a row a look
+        z = from_composite(z, self.shape)
         doa = np.asarray(doa, dtype=np.float64)
+        if amplitude is not None:
+            return log_known(self.snapshot(z), self.wave(doa, amplitude), self.noise)
+        Y = np.moveaxis(self.looks(z), 1, 2)[..., None, :]  # (F, N, 1, M): a row a snapshot
         a = self.waves.steering(doa.ravel())  # (S, F, M, n)
         A = np.moveaxis(a, 3, 2).reshape(*a.shape[:2], 1, *doa.shape, self.array.n_sensors)
-        looks = _log_marginal(
+        each = log_marginal(
             Y.reshape(*Y.shape[:2], *[1] * (doa.ndim - 1), -1), A, self.noise, self.power
         )
-        total = looks.sum(axis=(1, 2))  # over bins and snapshots
+        total = each.sum(axis=(1, 2))  # over bins and snapshots
         top = total.max(axis=0)
         return np.asarray(top + np.log(np.exp(total - top).mean(axis=0)))
 
@@ -326,6 +368,13 @@ class ArraySnapshot(MeasurementModel):
             da = da + plain * self.response(doa, slope=True)[0]
         return np.stack([composite((re + 1j * im) * da), composite(a), composite(1j * a)]).T
 
+    def for_likelihood(self, names: Sequence[str]) -> MeasurementModel:
+        """Return this model for `log_likelihood` at states with these names.
+
+        The direction is needed; the amplitudes are integrated out if the state has none.
+        """
+        return self if tuple(names) in ((), ("doa",)) else of_state(self, names)
+
     def _a(self, doa: ArrayLike) -> Complex:
         if not self.is_single:
             raise ValueError(
@@ -334,32 +383,3 @@ class ArraySnapshot(MeasurementModel):
                 + ("" if self.slowness is self.elevation else " and a second unknown")
             )
         return self.steering_vector(doa)
-
-
-@lru_cache(maxsize=256)
-def grid_line(
-    array: SensorArray, wavelength: float, reference: Reference
-) -> UniformLineManifold | None:
-    """Return the manifold of a line on a uniform grid within half a wavelength; else None."""
-    spacing = array.spacing
-    if spacing is None or wavelength < 2 * spacing * (1 - 1e-6):
-        return None
-    coordinates = array.positions[:, 0]
-    places = np.rint((coordinates - coordinates.min()) / spacing).astype(np.int64)
-    step = min(2 * np.pi * spacing / wavelength, np.pi)
-    return UniformLineManifold(places, step, -float(coordinates.min()) / spacing, reference)
-
-
-def _log_marginal(Y: Complex, A: Complex, noise: float, power: float) -> Float:
-    """Return ln CN(y; 0, power Σ a aᴴ + noise I), y (..., M), A (..., K, M); NaN left out."""
-    heard = ~np.isnan(Y)
-    n, y = heard.sum(axis=-1), np.where(heard, Y, 0)
-    A = A * heard[..., None, :]
-    K = A.shape[-2]
-    # matrix determinant lemma and Woodbury: only K x K matrices are factored
-    G = A.conj() @ np.swapaxes(A, -1, -2) + noise / power * np.eye(K)
-    b = (A.conj() @ y[..., None])[..., 0]
-    explained = np.einsum("...k,...k->...", b.conj(), np.linalg.solve(G, b[..., None])[..., 0])
-    log_det = np.linalg.slogdet(G)[1] + K * np.log(power / noise)
-    energy = (y.real**2 + y.imag**2).sum(axis=-1)
-    return np.asarray(-n * np.log(np.pi * noise) - log_det - (energy - explained.real) / noise)

@@ -22,8 +22,8 @@ class MeasurementModel(FrozenModel, ABC):
 
     Notes
     -----
-    Shapes: states (..., dim_x), measurements (..., dim_z), any leading axes. `dim_z` and `R` may be
-    properties, class attributes or fields of a dataclass.
+    Shapes: states (..., dim_x), measurements (..., dim_z), any leading axes. `dim_z`, `R` and
+    `needs` may be properties, class attributes or dataclass fields.
     """
 
     @property_or_field
@@ -36,12 +36,12 @@ class MeasurementModel(FrozenModel, ABC):
     def R(self) -> Float:
         """Covariance of the measurement noise, (dim_z, dim_z)."""
 
-    @property
+    @property_or_field
     def needs(self) -> tuple[str, ...]:
         """Names of the entries of a state that `h` reads; () for any state of the right size."""
         return ()
 
-    @property
+    @property_or_field
     def is_linear(self) -> bool:
         """Whether h(x) = H x, with the same H at every state."""
         return False
@@ -77,6 +77,13 @@ class MeasurementModel(FrozenModel, ABC):
             return self
         entries, everything = locate(self, names), tuple(range(len(names)))
         return self if entries == everything else SelectedEntries(self, entries, tuple(names))
+
+    def for_likelihood(self, names: Sequence[str]) -> MeasurementModel:
+        """Return this model for filters that weigh states by `log_likelihood`, where it has one.
+
+        The same as `for_state`, except for models whose likelihood needs fewer entries than `h`.
+        """
+        return self.for_state(names)
 
     @abstractmethod
     def h(self, x: ArrayLike) -> Float:
@@ -149,12 +156,12 @@ class SelectedEntries(MeasurementModel):
 
     def h(self, x: ArrayLike) -> Float:
         """Return the measurements expected of states: (..., dim_x) -> (..., dim_z)."""
-        return self.measurement.h(self._selected(x))
+        return self.measurement.h(self.select(x))
 
     def H(self, x: ArrayLike) -> Float:
         """Return the Jacobian of `h` at one state, zero for the other entries."""
         H = np.zeros((self.dim_z, len(self.names)))
-        H[:, self.entries] = self.measurement.H(self._selected(x))
+        H[:, self.entries] = self.measurement.H(self.select(x))
         return H
 
     def residual(self, z: ArrayLike, z_pred: ArrayLike) -> Float:
@@ -163,9 +170,10 @@ class SelectedEntries(MeasurementModel):
 
     def sample(self, x: ArrayLike, rng: np.random.Generator) -> Float:
         """Draw a measurement of each state: (..., dim_x) -> (..., dim_z)."""
-        return self.measurement.sample(self._selected(x), rng)
+        return self.measurement.sample(self.select(x), rng)
 
-    def _selected(self, x: ArrayLike) -> Float:
+    def select(self, x: ArrayLike) -> Float:
+        """Return the entries that the model reads of states (..., dim_x)."""
         return state(x, len(self.names))[..., self.entries]
 
 

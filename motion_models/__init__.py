@@ -7,7 +7,7 @@ from arrivals.motion_models.ar_estimation import (
     yule_walker,
 )
 from arrivals.motion_models.autoregressive import AutoregressiveSources
-from arrivals.motion_models.base import MotionModel
+from arrivals.motion_models.base import LinearMotionModel, MotionModel
 from arrivals.motion_models.bernoulli_von_mises import BernoulliVonMises
 from arrivals.motion_models.bessel import (
     bessel_ratio,
@@ -19,6 +19,8 @@ from arrivals.motion_models.bessel import (
 from arrivals.motion_models.combined import CombinedMotion
 from arrivals.motion_models.coordinated_turn import CoordinatedTurn
 from arrivals.motion_models.delay import DelayDrift, DelayWalk
+from arrivals.motion_models.direction_amplitude import DirectionAmplitudeWalk
+from arrivals.motion_models.function import FunctionMotion
 from arrivals.motion_models.linear import ConstantVelocity, LinearMotion, RandomWalk
 from arrivals.motion_models.von_mises import (
     VonMisesWalk,
@@ -36,7 +38,10 @@ __all__ = [
     "CoordinatedTurn",
     "DelayDrift",
     "DelayWalk",
+    "DirectionAmplitudeWalk",
+    "FunctionMotion",
     "LinearMotion",
+    "LinearMotionModel",
     "MotionModel",
     "RandomWalk",
     "CombinedMotion",

@@ -19,7 +19,7 @@ class MotionModel(FrozenModel, ABC):
     Notes
     -----
     Shapes: states (..., dim_x), any leading axes. Units: the model's own; `dt` in its unit of time.
-    `dim_x` may be a property, a class attribute or a field of a dataclass.
+    `dim_x`, `state_names` and `angles` may be properties, class attributes or dataclass fields.
     """
 
     @property_or_field
@@ -27,17 +27,17 @@ class MotionModel(FrozenModel, ABC):
     def dim_x(self) -> int:
         """Number of entries of one state."""
 
-    @property
+    @property_or_field
     def state_names(self) -> tuple[str, ...]:
         """Names of the entries of a state, such as ("x", "vx", "y", "vy"); () if they have none."""
         return ()
 
-    @property
+    @property_or_field
     def is_linear(self) -> bool:
         """Whether f(x) = F x, with the same F at every state."""
         return False
 
-    @property
+    @property_or_field
     def angles(self) -> tuple[int, ...]:
         """Entries of a state that are angles in rad; trackers take differences on the circle."""
         return ()

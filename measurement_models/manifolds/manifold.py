@@ -1,17 +1,13 @@
-"""What the gridless methods ask of an array: its response as a short Fourier series of an angle."""
+"""Protocol of an array's response as a short Fourier series of an angle."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import lru_cache
 from typing import Literal, Protocol
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.typing import Complex, Float, Int
-from arrivals.validation import one_of
 
 Reference = Literal["middle", "first"]
 
@@ -78,134 +74,3 @@ class Manifold(Protocol):
 
     def only(self, bins: Sequence[int] | Int) -> Manifold:
         """Return the manifold of some of the bins."""
-
-
-@dataclass(frozen=True, eq=False)
-class UniformLineManifold:
-    """A line of sensors on a uniform grid, with or without gaps, at one wavelength.
-
-    The angle is the electrical one, θ = 2π d/λ sin β for a grid of spacing d: the phase step
-    between neighbouring grid points. The harmonics are the occupied grid points, and G = I.
-
-    Parameters
-    ----------
-    places : ndarray of int, shape (n_sensors,)
-        Grid points of the sensors, in their order.
-    step : float
-        Largest electrical angle of a plane wave, 2π d/λ, rad.
-    origin : float
-        Where the origin of coordinates lies, in grid points.
-    reference : {"middle", "first"}
-        The sensor whose phase is that of the amplitude. In the middle, the amplitude's phase and
-        the angle are uncorrelated a posteriori; the papers take the first sensor.
-
-    Examples
-    --------
-    >>> line = UniformLineManifold(np.arange(5), step=np.pi, origin=2.0)
-    >>> line.harmonics
-    array([-2, -1,  0,  1,  2])
-    >>> np.rad2deg(line.to_doa([np.pi / 2])).round(6)
-    array([30.])
-    """
-
-    places: Int
-    step: float
-    origin: float
-    reference: Reference = "middle"
-
-    def __post_init__(self) -> None:
-        one_of("reference", self.reference, ("middle", "first"))
-
-    @property
-    def n_sensors(self) -> int:
-        """Number of sensors."""
-        return len(self.places)
-
-    @property
-    def n_bins(self) -> int:
-        """One frequency."""
-        return 1
-
-    @property
-    def reference_place(self) -> int:
-        """Grid point at which the phase is counted."""
-        if self.reference == "first":
-            return int(self.places[0])
-        off = np.abs(self.places - (self.places.mean() + 1e-9))
-        return int(self.places[np.argmin(off)])
-
-    @property
-    def harmonics(self) -> Int:
-        """Grid points of the sensors, counted from the reference."""
-        return self.places - self.reference_place
-
-    @property
-    def coefficients(self) -> None:
-        """Return None: the sensors are the harmonics."""
-        return
-
-    @property
-    def mirror(self) -> bool:
-        """Return False: each electrical angle has one direction."""
-        return False
-
-    @property
-    def nuisance_weights(self) -> Float:
-        """No second parameter."""
-        return np.ones(1)
-
-    def steering(self, theta: ArrayLike) -> Complex:
-        """Return the responses to angles (n,): (1, 1, n_sensors, n)."""
-        phase = np.multiply.outer(self.harmonics, np.asarray(theta, dtype=np.float64))
-        return np.asarray(np.exp(1j * phase))[None, None]
-
-    def norm_squared(self) -> float:
-        """Return ‖a(θ)‖² = M."""
-        return float(self.n_sensors)
-
-    def to_doa(self, theta: ArrayLike, slack: ArrayLike = 0.0) -> Float:
-        """Return directions from broadside, rad, NaN outside the physical range.
-
-        Angles beyond endfire by no more than `slack`, and rounding, are taken to be at endfire.
-        """
-        sine = np.asarray(theta, dtype=np.float64) / self.step
-        beyond = np.abs(sine) > 1 + np.asarray(slack) / self.step + 1e-9
-        return np.where(beyond, np.nan, np.arcsin(np.minimum(np.maximum(sine, -1), 1)))
-
-    def doa_std(self, theta: ArrayLike, std: ArrayLike) -> Float:
-        """Return half the width of the directions of θ ± std, which stays finite at endfire."""
-        inside = np.clip(np.asarray(theta, dtype=np.float64), -self.step, self.step)
-        ends = (inside + np.multiply.outer([-1.0, 1.0], np.asarray(std))) / self.step
-        low, high = np.arcsin(np.clip(ends, -1, 1))
-        return np.asarray((high - low) / 2)
-
-    def slope(self, theta: ArrayLike) -> Float:
-        """Return dθ/dβ = 2π d/λ cos β, with a cosine of at least 0.1."""
-        sine = np.asarray(theta, dtype=np.float64) / self.step
-        return np.asarray(self.step * np.sqrt(np.maximum(1 - sine * sine, 0.01)))
-
-    def from_doa(self, doa: ArrayLike) -> Float:
-        """Return electrical angles, rad."""
-        return np.asarray(self.step * np.sin(doa))
-
-    def to_amplitude(self, w: ArrayLike, theta: ArrayLike) -> Complex:
-        """Return amplitudes at the origin of the array's coordinates."""
-        shift = self.origin - self.reference_place
-        return np.asarray(np.asarray(w) * np.exp(1j * shift * np.asarray(theta)))
-
-    def without(self, sensors: Sequence[int] | Int) -> UniformLineManifold:
-        """Return the manifold of the line less some sensors."""
-        if len(sensors) == 0:
-            return self
-        return _line_without(self, tuple(map(int, sensors)))
-
-    def only(self, bins: Sequence[int] | Int) -> UniformLineManifold:
-        """Return the same: there is one bin."""
-        return self
-
-
-@lru_cache(maxsize=256)
-def _line_without(line: UniformLineManifold, sensors: tuple[int, ...]) -> UniformLineManifold:
-    """Return a line less some sensors: the same one when asked again, as what is made of it."""
-    places = np.delete(line.places, sensors)
-    return UniformLineManifold(places, line.step, line.origin, line.reference)

@@ -8,9 +8,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.measurement_models.array_snapshot import composite
 from arrivals.measurement_models.arrays.sensor_array import SensorArray
 from arrivals.measurement_models.base import MeasurementModel
+from arrivals.measurement_models.snapshot_likelihood import composite
 from arrivals.typing import Complex, Float, Int
 from arrivals.validation import instance, positive, shaped, state
 

@@ -216,5 +216,5 @@ def test_a_model_without_r_or_dim_z_is_refused() -> None:
     class Declared(NoNoise):  # annotated, but not a dataclass
         R: Float
 
-    with pytest.raises(AttributeError, match="Declared declares R, but has no value of it"):
+    with pytest.raises(AttributeError, match="Declared declares R without a value"):
         _ = Declared().R

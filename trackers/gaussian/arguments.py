@@ -17,7 +17,12 @@ PerStep = Sequence[Any] | Float | None
 
 
 def models(motion: Any, measurement: Any) -> tuple[MotionModel, MeasurementModel]:
-    """Return two models, or raise a TypeError that says which is none.
+    """Return two models, the measurement for the entries that the motion names.
+
+    Raises
+    ------
+    TypeError
+        If one is not a model, or the measurement needs an entry that the state does not have.
 
     Examples
     --------
@@ -25,10 +30,9 @@ def models(motion: Any, measurement: Any) -> tuple[MotionModel, MeasurementModel
     Traceback (most recent call last):
     TypeError: motion must be a MotionModel; got 'walk', a str
     """
-    return (
-        instance("motion", motion, MotionModel),  # type: ignore[type-abstract]  # no call
-        instance("measurement", measurement, MeasurementModel),  # type: ignore[type-abstract]
-    )
+    instance("motion", motion, MotionModel)  # type: ignore[type-abstract]  # no call
+    instance("measurement", measurement, MeasurementModel)  # type: ignore[type-abstract]
+    return motion, measurement.for_state(motion.state_names)
 
 
 def measurement_vector(z: ArrayLike, m: int) -> Float:

@@ -36,7 +36,7 @@ class FilterBase(FilterpyAttributes):
         self.motion, self.measurement = models(motion, measurement)
         self.x, self.P = real("x", x), real("P", P)
         mean, _ = self.belief(fresh=True)
-        H, R = measurement.H(mean), measurement.R
+        H, R = self.measurement.H(mean), self.measurement.R
         for name, matrix in (("F", motion.F(mean)), ("Q", motion.Q()), ("H", H), ("R", R)):
             real(f"{name} of the {'motion' if name in 'FQ' else 'measurement'}", matrix)
         check_shape("H of the measurement", H, (self.dim_z, self.dim_x))

@@ -75,7 +75,7 @@ def as_filterpy(
     >>> kf.x.round(2)
     array([1.67, 1.35])
     """
-    models(motion, measurement)
+    motion, measurement = models(motion, measurement)
     one_of("kind", kind, ("kf", "ekf", "ukf", "ckf", "enkf"))
     centre, P = shaped("x", x, motion.dim_x).copy(), covariance("P", P, motion.dim_x).copy()
     if motion.angles:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.arrays.sensor_array import SensorArray
-from arrivals.measurement_models.manifolds.manifold import UniformLineManifold
+from arrivals.measurement_models.manifolds.uniform_line import UniformLineManifold
 from arrivals.trackers.base import is_missing
 from arrivals.trackers.beamforming.covariance import RunningCovariance, spatial_smoothing
 from arrivals.trackers.direction_tracker import DirectionTracker

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
-from arrivals.measurement_models.manifolds.manifold import UniformLineManifold
+from arrivals.measurement_models.manifolds.uniform_line import UniformLineManifold
 from arrivals.trackers.registry import register
 from arrivals.trackers.subspace.base import CovarianceSubspace, Subspaces, uniform_line
 from arrivals.trackers.subspace.root_music import ENDFIRE_TOLERANCE

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
-from arrivals.measurement_models.manifolds.manifold import UniformLineManifold
+from arrivals.measurement_models.manifolds.uniform_line import UniformLineManifold
 from arrivals.trackers.registry import register
 from arrivals.trackers.subspace.base import CovarianceSubspace, Subspaces, uniform_line
 from arrivals.typing import Complex, Float

@@ -23,7 +23,7 @@ from arrivals.measurement_models import (
     watt_to_neper,
 )
 from arrivals.measurement_models.signal_strength.envelope import sample_log_envelope
-from arrivals.motion_models import CombinedMotion, ConstantVelocity, RandomWalk
+from arrivals.motion_models import CombinedMotion, ConstantVelocity, LinearMotion, RandomWalk
 from arrivals.trackers import EKF, UKF, Particle
 from arrivals.typing import Float
 
@@ -208,13 +208,14 @@ def test_filterpys_filters_take_it_and_ours_agree() -> None:
 
 
 def test_two_sources_with_unknown_powers_run_in_the_ekf_and_the_particle_filter() -> None:
-    each = CombinedMotion(RandomWalk(q=0.01), RandomWalk(q=1e-4, n_dims=1))
+    amplitude = LinearMotion([[1.0]], [[1e-4]], names=["log_amplitude"])
+    each = CombinedMotion(RandomWalk(q=0.01), amplitude)
     start = STATE + np.array([2.0, -2.0, 0.1, 2.0, 2.0, -0.1])
     model = TWO.replace(log_gain=None, sigma=0.3)
     z = model.sample(np.tile(STATE, (40, 1)), np.random.default_rng(3))
     z[5, 2], z[7] = np.nan, np.nan
     P0 = np.diag([9.0, 9.0, 0.1] * 2)
-    pair = CombinedMotion(each, each)
+    pair = CombinedMotion(each, each, names=())
     for tracker in (EKF(pair, model, start, P0),
                     Particle(pair, model, start, P0, n_particles=3000, rng=1)):  # fmt: skip
         x = tracker.run(z).x[-1]

@@ -245,16 +245,18 @@ def test_gaps_leave_out_bins_then_snapshots_then_sensors() -> None:
     Y[:, :, 2] = np.nan
     Y[1, 3, 0] = np.nan
     Y[2] *= 0
-    heard = ObservedSnapshots.of(Y)
-    assert heard.bins.tolist() == [False, True, False]  # the last one is silent
-    assert heard.sensors.tolist() == [True, True, True, False]
-    assert heard.snapshots.tolist() == [True, True, False, True, True]
-    assert heard.block(Y).shape == (1, 3, 4)
+    observed = ObservedSnapshots.of(Y)
+    assert observed.bins.tolist() == [False, True, False]  # the last one is silent
+    assert observed.sensors.tolist() == [True, True, True, False]
+    assert observed.times.tolist() == [True, True, False, True, True]
+    assert observed.snapshots.shape == (1, 3, 4)
     assert ObservedSnapshots.of(np.zeros((2, 3, 1), dtype=complex)).bins.all()
 
 
 def test_sensors_that_take_turns_in_being_silent_are_refused() -> None:
     Y = np.ones((1, 3, 3), dtype=complex)
     Y[0, [0, 1, 2], [0, 1, 2]] = np.nan
-    with pytest.raises(ValueError, match="best look 2 of 3 did, but each has a NaN in some other"):
+    with pytest.raises(
+        ValueError, match="at most 2 of 3 sensors at once, each with a NaN elsewhere"
+    ):
         ObservedSnapshots.of(Y)

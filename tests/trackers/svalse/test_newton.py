@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from newton_states import MODEL, scene, with_facts
 
 from arrivals.measurement_models import ArraySnapshot, SensorArray
-from arrivals.measurement_models.manifolds.manifold import UniformLineManifold
+from arrivals.measurement_models.manifolds.uniform_line import UniformLineManifold
 from arrivals.trackers.svalse.components import ComponentPrior
 from arrivals.trackers.svalse.newton.candidates import (
     Grid,

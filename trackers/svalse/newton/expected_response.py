@@ -37,7 +37,7 @@ class ExpectedResponse:
 
     Examples
     --------
-    >>> from arrivals.measurement_models.manifolds.manifold import UniformLineManifold
+    >>> from arrivals.measurement_models.manifolds.uniform_line import UniformLineManifold
     >>> response = ExpectedResponse(UniformLineManifold(np.arange(3), step=np.pi, origin=1.0))
     >>> response(np.zeros((1, 1)), np.full((1, 1), 0.2))[0, 0, 0].real.round(4)
     array([[0.9048, 1.    , 0.9048]])

@@ -1,0 +1,97 @@
+"""Likelihoods of complex snapshots, and complex vectors as real ones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from arrivals.measurement_models.base import MeasurementModel, SelectedEntries, locate
+from arrivals.typing import Complex, Float
+
+
+def composite(z: ArrayLike) -> Float:
+    """Return complex vectors (..., n) as real ones (..., 2n): [Re; Im].
+
+    Examples
+    --------
+    >>> composite([1 + 2j, 3 - 4j])
+    array([ 1.,  3.,  2., -4.])
+    """
+    z = np.asarray(z)
+    return np.concatenate([z.real, z.imag], axis=-1).astype(np.float64)
+
+
+def from_composite(z: ArrayLike, shape: tuple[int, ...]) -> Complex | Float:
+    """Return a measurement of this shape, made complex again if it is composite.
+
+    Examples
+    --------
+    >>> from_composite([1.0, 3.0, 2.0, -4.0], (2,))
+    array([1.+2.j, 3.-4.j])
+    """
+    z, n = np.asarray(z), int(np.prod(shape))
+    if z.shape == shape or z.shape != (2 * n,) or np.iscomplexobj(z):
+        return z
+    return np.asarray(z[:n] + 1j * z[n:]).reshape(shape)
+
+
+def log_known(z: Complex, expected: Complex, noise: float) -> Float:
+    """Return ln CN(z; expected, noise I) of one measurement at expected ones (..., *z.shape).
+
+    Entries that are NaN in z are left out.
+
+    Examples
+    --------
+    >>> log_known(np.array([1j, np.nan]), np.zeros((3, 2), dtype=complex), noise=1.0).round(4)
+    array([-2.1447, -2.1447, -2.1447])
+    """
+    there = ~np.isnan(z)
+    e = (z - expected)[..., there]
+    energy = (e.real**2 + e.imag**2).sum(axis=-1)
+    return np.asarray(-there.sum() * np.log(np.pi * noise) - energy / noise)
+
+
+def log_marginal(Y: Complex, A: Complex, noise: float, power: float) -> Float:
+    """Return ln CN(y; 0, power Σ a aᴴ + noise I), y (..., M), A (..., K, M); NaN left out."""
+    there = ~np.isnan(Y)
+    n, y = there.sum(axis=-1), np.where(there, Y, 0)
+    A = A * there[..., None, :]
+    K = A.shape[-2]
+    # matrix determinant lemma and Woodbury: only K x K matrices are factored
+    G = A.conj() @ np.swapaxes(A, -1, -2) + noise / power * np.eye(K)
+    b = (A.conj() @ y[..., None])[..., 0]
+    explained = np.einsum("...k,...k->...", b.conj(), np.linalg.solve(G, b[..., None])[..., 0])
+    log_det = np.linalg.slogdet(G)[1] + K * np.log(power / noise)
+    energy = (y.real**2 + y.imag**2).sum(axis=-1)
+    return np.asarray(-n * np.log(np.pi * noise) - log_det - (energy - explained.real) / noise)
+
+
+class StateSnapshot(SelectedEntries):
+    """A model of snapshots whose `log_likelihood` takes whole states.
+
+    `entries` are those of the direction, and of the parts of the amplitude if it is in the state.
+    """
+
+    def log_likelihood(self, z: ArrayLike, x: ArrayLike) -> Float:
+        """Return ln p(z | x) at states (..., n): (...)."""
+        own = self.select(x)
+        w = own[..., 1:2] + 1j * own[..., 2:3] if len(self.entries) > 1 else None
+        model: Any = self.measurement
+        likelihood: Float = model.log_likelihood(z, own[..., :1], w)
+        return likelihood
+
+
+def of_state(model: MeasurementModel, names: Sequence[str]) -> StateSnapshot:
+    """Return a model of snapshots for states with a direction, with its amplitude or without.
+
+    Raises
+    ------
+    TypeError
+        If the state has no direction, or only one part of the amplitude.
+    """
+    alone = "doa" in names and not set(names) & set(model.needs[1:])
+    entries = (names.index("doa"),) if alone else locate(model, names)
+    return StateSnapshot(model, entries, tuple(names))
