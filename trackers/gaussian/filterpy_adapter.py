@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.base import MeasurementModel
 from arrivals.motion_models.base import MotionModel
-from arrivals.trackers.gaussian.arguments import models
+from arrivals.trackers.gaussian.arguments import check_models
 from arrivals.trackers.gaussian.circular import Angles, add, difference, mean
 from arrivals.trackers.gaussian.kalman import check_linear
 from arrivals.typing import Float
@@ -75,7 +75,7 @@ def as_filterpy(
     >>> kf.x.round(2)
     array([1.67, 1.35])
     """
-    models(motion, measurement)
+    motion, measurement = check_models(motion, measurement)
     one_of("kind", kind, ("kf", "ekf", "ukf", "ckf", "enkf"))
     centre, P = shaped("x", x, motion.dim_x).copy(), covariance("P", P, motion.dim_x).copy()
     if motion.angles:

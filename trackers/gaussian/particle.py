@@ -9,13 +9,13 @@ from arrivals.measurement_models.base import MeasurementModel
 from arrivals.motion_models.base import MotionModel, gaussian
 from arrivals.trackers.base import Tracker, is_missing
 from arrivals.trackers.estimates import StateEstimate
-from arrivals.trackers.gaussian.arguments import measurement_vector, models
+from arrivals.trackers.gaussian.arguments import measurement_vector
 from arrivals.trackers.gaussian.circular import circular_mean, difference, spread, wrapped
 from arrivals.trackers.gaussian.equations import LOG_2PI, likelihood
 from arrivals.trackers.gaussian.linalg import cholesky
 from arrivals.trackers.registry import register
 from arrivals.typing import Float, Int
-from arrivals.validation import count, covariance, probability, real, shaped
+from arrivals.validation import count, covariance, instance, probability, real, shaped
 
 
 def systematic_resample(weights: ArrayLike, rng: np.random.Generator) -> Int:
@@ -118,7 +118,10 @@ class Particle(Tracker):
         rng: int | np.random.Generator,
         resample_below: float = 0.5,
     ) -> None:
-        self.motion, self.measurement = models(motion, measurement)
+        self.motion = instance("motion", motion, MotionModel)  # type: ignore[type-abstract]  # any
+        instance("measurement", measurement, MeasurementModel)  # type: ignore[type-abstract]  # any
+        exact = hasattr(measurement, "log_likelihood")  # it reads a direction alone
+        self.measurement = measurement if exact else measurement.for_state(motion.state_names)
         self.x, self.P = self._checked(x, P)
         self.n_particles = count("n_particles", n_particles)
         self.resample_below = probability("resample_below", resample_below)
