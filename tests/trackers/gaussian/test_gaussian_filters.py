@@ -419,7 +419,7 @@ def test_raw_snapshots_are_refused_with_the_cure() -> None:
 
 @pytest.mark.parametrize("kind", ["ekf", "ukf", "ckf", "enkf"])
 def test_angles_in_filterpy_are_warned_of(kind: Any) -> None:
-    with pytest.warns(UserWarning, match="IMMEstimator.*to 0.*arrivals.trackers take the circle"):
+    with pytest.warns(UserWarning, match="IMMEstimator.*to 0.*arrivals.trackers wrap them"):
         as_filterpy(VonMisesWalk(9.0), ANGLE, kind, x=[0.0], P=[[1.0]])
 
 
