@@ -144,8 +144,6 @@ def violations(place: str, source: str) -> list[str]:
     }
     banned = [f"arrivals.{name}" for name in above.get(folder, FOLDERS)] + [*FOLDERS]
     late = ["filterpy"]  # only inside a function
-    if place == "arrivals/trackers/gaussian/filterpy_ekf.py":  # itself imported inside a function
-        late.remove("filterpy")
     if folder not in ("scenarios", *APPLICATIONS):
         banned += ["matplotlib", "sklearn", "joblib", "tqdm", "scipy.io", "soundfile", "h5py"]
     if place == "arrivals/trackers/conformance/checks.py":

@@ -12,12 +12,12 @@ from arrivals.trackers.estimates import (
     SourceEstimate,
     StateEstimate,
 )
+from arrivals.trackers.gaussian.base import GaussianFilter
 from arrivals.trackers.gaussian.ekf import EKF
 from arrivals.trackers.gaussian.filterpy_adapter import as_filterpy
 from arrivals.trackers.gaussian.imm import IMM, Filter
 from arrivals.trackers.gaussian.kalman import Kalman
 from arrivals.trackers.gaussian.particle import Particle
-from arrivals.trackers.gaussian.smoothing import GaussianFilter
 from arrivals.trackers.gaussian.ukf import UKF
 from arrivals.trackers.interpolation.interpolation_ekf import InterpolationEKF
 from arrivals.trackers.multi_target.peaks_gnn import PeaksGNN

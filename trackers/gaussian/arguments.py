@@ -1,4 +1,4 @@
-"""What a Kalman-type tracker is given from call to call: checked, and in one shape."""
+"""Checks of the arguments of Gaussian filters."""
 
 from __future__ import annotations
 
@@ -16,27 +16,50 @@ from arrivals.validation import covariance, instance, real
 PerStep = Sequence[Any] | Float | None
 
 
-def models(motion: Any, measurement: Any) -> tuple[MotionModel, MeasurementModel]:
-    """Return two models, the measurement for the entries that the motion names.
+def check_models(motion: Any, measurement: Any) -> tuple[MotionModel, MeasurementModel]:
+    """Return a motion model, and the measurement model for the entries of its state.
 
     Raises
     ------
     TypeError
-        If one is not a model, or the measurement needs an entry that the state does not have.
+        If one is not a model, or the measurement reads an entry that the state lacks.
 
     Examples
     --------
-    >>> models("walk", None)
+    >>> check_models("walk", None)
     Traceback (most recent call last):
     TypeError: motion must be a MotionModel; got 'walk', a str
     """
-    instance("motion", motion, MotionModel)  # type: ignore[type-abstract]  # no call
-    instance("measurement", measurement, MeasurementModel)  # type: ignore[type-abstract]
+    motion = instance("motion", motion, MotionModel)  # type: ignore[type-abstract]  # no call
+    measurement = instance("measurement", measurement, MeasurementModel)  # type: ignore[type-abstract]
     return motion, measurement.for_state(motion.state_names)
 
 
+def belief_arrays(x: ArrayLike, P: ArrayLike, n: int) -> tuple[Float, Float]:
+    """Return a mean (n,) and a covariance (n, n) of an assigned belief.
+
+    Examples
+    --------
+    >>> belief_arrays([1.0], [[1.0]], 2)
+    Traceback (most recent call last):
+    ValueError: x must have shape (2,) or (2, 1); got (1,)
+    """
+    mean = real("x", x)
+    if mean.shape not in ((n,), (n, 1)):
+        raise ValueError(f"x must have shape ({n},) or ({n}, 1); got {mean.shape}")
+    if not np.isfinite(mean).all():
+        raise ValueError(f"x must be finite; got {mean.ravel().tolist()}")
+    return mean.reshape(n), covariance("P", P, n)
+
+
 def measurement_vector(z: ArrayLike, m: int) -> Float:
-    """Return a measurement as (m,), a copy; NaN alone stands for NaN everywhere."""
+    """Return a measurement as (m,), a copy; NaN alone stands for NaN everywhere.
+
+    Examples
+    --------
+    >>> measurement_vector(np.nan, 2), measurement_vector([[1], [2]], 2)
+    (array([nan, nan]), array([1., 2.]))
+    """
     array = np.array(z)
     if array.shape == (m,) and array.dtype == np.float64:
         return array  # the usual case
@@ -50,9 +73,15 @@ def measurement_vector(z: ArrayLike, m: int) -> Float:
     return array.reshape(m)
 
 
-def missing_mask(z: Float | None) -> Bool | None:
-    """Return where measurements (..., m) are missing, or None if nowhere."""
-    if z is None or np.vdot(z, z) < np.inf:  # NaN fails too; quicker than isfinite
+def missing_mask(z: Float) -> Bool | None:
+    """Return where measurements (..., m) are missing, or None if nowhere.
+
+    Examples
+    --------
+    >>> missing_mask(np.array([1.0, np.nan])), missing_mask(np.ones(2))
+    (array([False,  True]), None)
+    """
+    if np.vdot(z, z) < np.inf:  # false with NaN too; faster than isfinite
         return None
     if np.isinf(z).any():
         raise ValueError(f"z must be finite, or NaN where missing; got {z.tolist()}")
@@ -60,24 +89,36 @@ def missing_mask(z: Float | None) -> Bool | None:
     return missing if missing.any() else None
 
 
-def noise_matrix(R: ArrayLike, m: int) -> Float:
-    """Return the noise of m measurements: R, or R times the unit matrix if it is a number.
+def measurement_and_mask(z: ArrayLike | None, m: int) -> tuple[Float, Bool | None]:
+    """Return a measurement as (m,), NaN where missing, and where it is missing, None if nowhere.
 
     Examples
     --------
-    >>> noise_matrix(2.0, 2)
+    >>> measurement_and_mask(None, 2)
+    (array([nan, nan]), array([ True,  True]))
+    """
+    z = measurement_vector(np.nan if z is None else z, m)
+    return z, missing_mask(z)
+
+
+def covariance_matrix(name: str, value: ArrayLike, n: int) -> Float:
+    """Return a covariance (n, n): the value, or the value times the unit matrix if it is a number.
+
+    Examples
+    --------
+    >>> covariance_matrix("R", 2.0, 2)
     array([[2., 0.],
            [0., 2.]])
     """
-    return covariance("R", np.multiply(np.eye(m), R) if np.ndim(R) == 0 else R, m)
+    return covariance(name, np.multiply(np.eye(n), value) if np.ndim(value) == 0 else value, n)
 
 
-def matrix_of(name: str, value: ArrayLike, n: int) -> Float:
+def matrix_with_columns(name: str, value: ArrayLike, n: int) -> Float:
     """Return a real matrix with n columns.
 
     Examples
     --------
-    >>> matrix_of("H", [1.0, 2.0], 2)
+    >>> matrix_with_columns("H", [1.0, 2.0], 2)
     Traceback (most recent call last):
     ValueError: H must have shape (m, 2); got (2,)
     """
@@ -87,30 +128,36 @@ def matrix_of(name: str, value: ArrayLike, n: int) -> Float:
     return matrix
 
 
-def check_shape(name: str, matrix: Float, shape: tuple[int, ...]) -> None:
-    """Raise a ValueError if an array has another shape.
+def control_effect(u: ArrayLike, B: ArrayLike | None) -> Float:
+    """Return B u of a control input that is not zero.
 
     Examples
     --------
-    >>> check_shape("R", np.eye(2), (3, 3))
-    Traceback (most recent call last):
-    ValueError: R must have shape (3, 3); got (2, 2)
+    >>> control_effect(2.0, [[0.5], [1.0]])
+    array([1., 2.])
     """
-    if matrix.shape != shape:
-        raise ValueError(f"{name} must have shape {shape}; got {matrix.shape}")
+    if B is None:
+        cure = "take LinearMotion(..., control=B)"
+        raise ValueError(f"motion must have a control matrix where u is given; got none: {cure}")
+    B, u = np.asarray(B, dtype=np.float64), real("u", u).ravel()
+    if u.shape != (B.shape[1],):
+        raise ValueError(f"u must have shape ({B.shape[1]},); got {u.shape}")
+    return np.asarray(B @ u)
 
 
 def per_step_values(name: str, values: PerStep, n_steps: int) -> Sequence[Any] | Float:
-    """Return one value a step, None where none are given.
+    """Return one value for each step, None where none are given.
 
     Examples
     --------
     >>> per_step_values("Fs", [1, 2], 3)
     Traceback (most recent call last):
-    ValueError: Fs must have one entry a step, 3; got 2
+    ValueError: Fs must have one entry for each of 3 steps; got 2
     """
     if values is None:
         return [None] * n_steps
     if len(values) != n_steps:
-        raise ValueError(f"{name} must have one entry a step, {n_steps}; got {len(values)}")
+        raise ValueError(
+            f"{name} must have one entry for each of {n_steps} steps; got {len(values)}"
+        )
     return values

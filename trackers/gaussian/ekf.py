@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from arrivals.trackers.gaussian.base import GaussianFilter
 from arrivals.trackers.gaussian.linearization import Linearization, at_each
-from arrivals.trackers.gaussian.smoothing import GaussianFilter
 from arrivals.trackers.registry import register
 from arrivals.typing import Float
 

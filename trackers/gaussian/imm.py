@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike
 
 from arrivals.trackers.base import Tracker, is_missing
 from arrivals.trackers.estimates import StateEstimate
+from arrivals.trackers.gaussian.base import GaussianFilter
 from arrivals.trackers.gaussian.circular import Angles, add, difference, spread
 from arrivals.trackers.gaussian.equations import likelihood
-from arrivals.trackers.gaussian.smoothing import GaussianFilter
 from arrivals.trackers.registry import register
 from arrivals.typing import Float
 from arrivals.validation import shaped

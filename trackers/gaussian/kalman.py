@@ -10,13 +10,16 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.base import MeasurementModel
 from arrivals.motion_models.base import MotionModel
+from arrivals.trackers.gaussian.arguments import covariance_matrix, matrix_with_columns
+from arrivals.trackers.gaussian.base import GaussianFilter
+from arrivals.trackers.gaussian.equations import predict_gaussian, update_gaussian
 from arrivals.trackers.gaussian.linalg import apply
 from arrivals.trackers.gaussian.linearization import Linearization
-from arrivals.trackers.gaussian.smoothing import GaussianFilter
 from arrivals.trackers.registry import register
 from arrivals.typing import Float
+from arrivals.validation import shaped
 
-Slope = Callable[[Float], Float]
+ArrayFunction = Callable[[Float], Float]
 
 
 @register("kalman")
@@ -65,6 +68,44 @@ class Kalman(GaussianFilter):
         super().__init__(motion, measurement, x, P)
         check_linear(motion, measurement)
 
+    def predict(
+        self,
+        u: ArrayLike | None = None,
+        *,
+        dt: float = 1.0,
+        F: ArrayLike | None = None,
+        Q: ArrayLike | None = None,
+        B: ArrayLike | None = None,
+    ) -> None:
+        """Predict mean and covariance; parameters as in `GaussianFilter.predict`."""
+        x, P = self.belief()
+        n = len(x)
+        F = self.motion.F(x, dt) if F is None else shaped("F", F, n, n)
+        Q = self.motion.Q(dt) if Q is None else covariance_matrix("Q", Q, n)
+        # x = F x + B u   (4.20)
+        x = self.add_control(F.dot(x), u, B)
+        # P = F P F' + Q   (4.20)
+        P = predict_gaussian(P, F, Q)
+        self.record_prediction(x, P, dt)
+
+    def update(
+        self, z: ArrayLike | None, R: ArrayLike | None = None, H: ArrayLike | None = None
+    ) -> None:
+        """Update mean and covariance by a measurement; parameters as in `GaussianFilter.update`."""
+        x, P = self.belief()
+        replaced = None if H is None else matrix_with_columns("H", H, len(x))
+        measured = self.check_measurement(z, R, replaced)
+        if measured is None:
+            self.record_missed()
+            return
+        z, missing, R = measured
+        H = self.measurement.H(x) if replaced is None else replaced
+        # y = z - H x   (4.21)
+        y = self.innovation(z, H.dot(x), missing, plain=replaced is not None)
+        # S = H P H' + R,  K = P H' S^-1,  x = x + K y   (4.21)
+        # P = (I - K H) P (I - K H)' + K R K'   (Joseph)
+        self.record_update(z, update_gaussian(x, P, y, H, R, missing, self.inv))
+
     def linearize_motion(self, x: Float, P: Float, dt: float) -> Linearization:
         """Return F x and F."""
         F = self.motion.F(_first(x), dt)
@@ -77,19 +118,24 @@ class Kalman(GaussianFilter):
 
 
 def check_linear(motion: MotionModel, measurement: MeasurementModel, dt: float = 1.0) -> None:
-    """Raise a TypeError that names the model that is not linear, if one is not."""
+    """Raise a TypeError that names the model that is not linear, if one is not.
+
+    A model whose `is_linear` is false is evaluated at a few states.
+    """
+    n = motion.dim_x
     f, F = partial(motion.f, dt=dt), partial(motion.F, dt=dt)
-    _linear("motion", motion, f, F, motion.dim_x)
-    _linear("measurement", measurement, measurement.h, measurement.H, motion.dim_x)
+    if not (motion.is_linear or _is_linear(f, F, n)):
+        raise TypeError(f"motion must be linear; got {motion!r}: use ekf or ukf")
+    if not (measurement.is_linear or _is_linear(measurement.h, measurement.H, n)):
+        raise TypeError(f"measurement must be linear; got {measurement!r}: use ekf or ukf")
+
+
+def _is_linear(function: ArrayFunction, jacobian: ArrayFunction, n: int) -> bool:
+    """Return True if a function is its Jacobian times the state, at states in general position."""
+    states = 10 * np.cos(np.arange(3 * n, dtype=np.float64).reshape(3, n))
+    return np.allclose(function(states), states @ jacobian(states[0]).T, rtol=1e-9, atol=1e-9)
 
 
 def _first(x: Float) -> Float:
     """Return one state of a batch: the matrices are the same at all of them."""
     return x if x.ndim == 1 else _first(x[0])
-
-
-def _linear(name: str, model: object, function: Slope, jacobian: Slope, n: int) -> None:
-    """Check at a few states in general position that a function is its Jacobian times the state."""
-    states = 10 * np.cos(np.arange(3 * n, dtype=np.float64).reshape(3, n))
-    if not np.allclose(function(states), states @ jacobian(states[0]).T, rtol=1e-9, atol=1e-9):
-        raise TypeError(f"{name} must be linear; got {model!r}: use ekf or ukf")

@@ -9,10 +9,10 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.base import MeasurementModel
 from arrivals.motion_models.base import MotionModel
+from arrivals.trackers.gaussian.base import GaussianFilter
 from arrivals.trackers.gaussian.circular import difference, spread, wrapped
 from arrivals.trackers.gaussian.linalg import apply, cholesky
 from arrivals.trackers.gaussian.linearization import Linearization
-from arrivals.trackers.gaussian.smoothing import GaussianFilter
 from arrivals.trackers.registry import register
 from arrivals.typing import Float
 from arrivals.validation import number, positive

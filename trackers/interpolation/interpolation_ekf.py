@@ -16,11 +16,11 @@ from arrivals.motion_models.base import MotionModel
 from arrivals.motion_models.delay import DelayWalk
 from arrivals.trackers.base import is_missing
 from arrivals.trackers.estimates import DirectionEstimate
-from arrivals.trackers.gaussian.arguments import noise_matrix
+from arrivals.trackers.gaussian.arguments import covariance_matrix
+from arrivals.trackers.gaussian.base import GaussianFilter
 from arrivals.trackers.gaussian.equations import GaussianUpdate, update_gaussian
 from arrivals.trackers.gaussian.linalg import apply, symmetric
 from arrivals.trackers.gaussian.linearization import Linearization
-from arrivals.trackers.gaussian.smoothing import GaussianFilter
 from arrivals.trackers.interpolation.sample_buffer import SampleBuffer
 from arrivals.trackers.interpolation.updates import DelayObservation, move
 from arrivals.trackers.interpolation.variants import (
@@ -196,7 +196,7 @@ class InterpolationEKF(GaussianFilter):
             return
         x, P = self.belief()
         snapshot = self._snapshot(z)
-        noise = None if R is None else noise_matrix(R, self.dim_z)
+        noise = None if R is None else covariance_matrix("R", R, self.dim_z)
         heard = self.heard.then(self.measurement.frame(snapshot))
         found = self._by_sensors(x, P, heard, noise)
         if noise is None:
@@ -351,7 +351,12 @@ class InterpolationEKF(GaussianFilter):
     # -- one snapshot --------------------------------------------------------------------------
 
     def predict_belief(
-        self, x: Float, P: Float, dt: float, F: ArrayLike | None, Q: ArrayLike | None
+        self,
+        x: Float,
+        P: Float,
+        dt: float,
+        F: ArrayLike | None = None,
+        Q: ArrayLike | None = None,
     ) -> tuple[Float, Float]:
         """Return the predictions of beliefs, symmetric to the last bit."""
         x, P = super().predict_belief(x, P, dt, F, Q)

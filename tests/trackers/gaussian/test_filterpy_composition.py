@@ -354,3 +354,14 @@ def test_d13_weights_survive_measurements_that_both_models_deem_impossible() -> 
         bank.update([300.0, 300.0])
     np.testing.assert_allclose(other.mu, [0.5, 0.5])  # both likelihoods are at their floor
     assert ours.mu[1] > 1 - 1e-12
+
+
+def test_d12_as_filterpy_ekf_is_copied_and_pickled() -> None:
+    ekf = as_filterpy(WALK, BEARING, "ekf", x=X, P=P)
+    copies = copy.deepcopy(ekf), pickle.loads(pickle.dumps(ekf))
+    for each in (ekf, *copies):
+        each.predict()
+        each.update(BEARING.h(X))
+    for each in copies:
+        assert isinstance(each, ExtendedKalmanFilter)
+        np.testing.assert_array_equal(each.x, ekf.x)

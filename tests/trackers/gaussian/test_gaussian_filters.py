@@ -348,7 +348,7 @@ BAD_CALLS: list[tuple[Any, type[Exception], str]] = [
         ValueError,
         r"R must have shape \(1, 1\); got \(2, 2\)",
     ),
-    (lambda f: f.predict(1.0), ValueError, r"u needs a motion with a control matrix"),
+    (lambda f: f.predict(1.0), ValueError, "motion must have a control matrix where u is given"),
     (
         lambda f: f.predict([1.0, 2.0], B=np.ones((2, 1))),
         ValueError,
@@ -364,7 +364,7 @@ BAD_CALLS: list[tuple[Any, type[Exception], str]] = [
     (
         lambda f: f.batch_filter(ZS, Fs=[np.eye(2)]),
         ValueError,
-        "Fs must have one entry a step, 3; got 1",
+        "Fs must have one entry for each of 3 steps; got 1",
     ),
     (
         lambda f: f.rts_smoother(ZS, [P]),
@@ -419,7 +419,7 @@ def test_raw_snapshots_are_refused_with_the_cure() -> None:
 
 @pytest.mark.parametrize("kind", ["ekf", "ukf", "ckf", "enkf"])
 def test_angles_in_filterpy_are_warned_of(kind: Any) -> None:
-    with pytest.warns(UserWarning, match="IMMEstimator.*to 0.*arrivals.trackers take the circle"):
+    with pytest.warns(UserWarning, match="IMMEstimator.*to 0.*arrivals.trackers wrap them"):
         as_filterpy(VonMisesWalk(9.0), ANGLE, kind, x=[0.0], P=[[1.0]])
 
 
