@@ -5,7 +5,8 @@ from abc import ABC, abstractmethod
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.parameters import FrozenModel, property_or_field
+from arrivals.abstract_fields import property_or_field
+from arrivals.parameters import FrozenModel
 from arrivals.typing import Float
 from arrivals.validation import state
 

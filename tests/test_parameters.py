@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from recording_tracker import SNAPSHOTS, Hands
+from recording_tracker import SNAPSHOTS, EchoTracker
 
 from arrivals.measurement_models import ArraySnapshot, MeasurementModel, SensorArray
 from arrivals.motion_models import BernoulliVonMises, LinearMotion, RandomWalk, VonMisesWalk
@@ -39,7 +39,7 @@ def test_parameters_have_nested_names() -> None:
 VonMisesWalkOfSources = BernoulliVonMises(kappa=20.0)
 
 
-def test_setting_reaches_into_parts_and_leaves_the_old_ones_alone() -> None:
+def test_set_params_replaces_nested_parts() -> None:
     tracker = SVALSE(SNAPSHOTS, VonMisesWalkOfSources)
     old = tracker.measurement
     tracker.set_params(motion__kappa=30.0, measurement__array__speed=340.0, solver__merge=0.0)
@@ -50,16 +50,16 @@ def test_setting_reaches_into_parts_and_leaves_the_old_ones_alone() -> None:
     assert VonMisesWalkOfSources.kappa == 20.0
 
 
-def test_setting_a_part_and_its_parameter_changes_the_new_part() -> None:
+def test_set_params_of_a_part_and_its_parameter_changes_the_new_part() -> None:
     tracker = SVALSE(SNAPSHOTS)
     tracker.set_params(motion__kappa=30.0, motion=BernoulliVonMises(p_activate=0.2))
     assert tracker.motion == BernoulliVonMises(kappa=30.0, p_activate=0.2)
 
 
-def test_setting_reaches_into_a_tracker_inside_a_tracker() -> None:
-    inner = Hands(VonMisesWalk(5.0))
-    outer = Hands(inner=inner).set_params(inner__motion__kappa=7.0)
-    assert isinstance(outer.inner, Hands)
+def test_set_params_reaches_a_nested_tracker() -> None:
+    inner = EchoTracker(VonMisesWalk(5.0))
+    outer = EchoTracker(inner=inner).set_params(inner__motion__kappa=7.0)
+    assert isinstance(outer.inner, EchoTracker)
     assert outer.inner.motion == VonMisesWalk(7.0)
     assert inner.motion == VonMisesWalk(5.0)
 
@@ -89,7 +89,7 @@ def test_refused_parameters_change_nothing(
     assert tracker.get_params(deep=False) == before
 
 
-def test_model_is_replaced_not_changed() -> None:
+def test_replace_returns_a_new_model() -> None:
     walk = BernoulliVonMises()
     assert walk.replace(kappa=3.0) == BernoulliVonMises(kappa=3.0)
     assert walk == BernoulliVonMises()
@@ -100,7 +100,7 @@ def test_model_is_replaced_not_changed() -> None:
         walk.kappa = 1.0  # type: ignore[misc]
 
 
-def test_models_are_shared_by_copies_and_remade_by_pickle() -> None:
+def test_models_are_shared_by_copies_and_rebuilt_by_pickle() -> None:
     motion = LinearMotion([[1.0, 1.0], [0.0, 1.0]], np.eye(2))
     for model in (motion, SNAPSHOTS, RandomWalk(q=0.5)):
         assert copy.copy(model) is model
@@ -131,11 +131,11 @@ def test_configuration_is_plain_and_complete() -> None:
     assert rebuilt.get_params(deep=False) == tracker.get_params(deep=False)
 
 
-def test_configuration_may_hold_a_tracker() -> None:
-    outer = Hands(VonMisesWalk(2.0), inner=CBF(SNAPSHOTS, max_sources=2))
+def test_configuration_contains_nested_trackers() -> None:
+    outer = EchoTracker(VonMisesWalk(2.0), inner=CBF(SNAPSHOTS, max_sources=2))
     config = json.loads(json.dumps(outer.to_dict()))
     assert config["inner"]["type"] == "cbf"
-    rebuilt = Hands.from_dict(config)
+    rebuilt = EchoTracker.from_dict(config)
     assert isinstance(rebuilt.inner, CBF)
     assert rebuilt.get_params()["inner__max_sources"] == 2
     assert rebuilt.motion == VonMisesWalk(2.0)
@@ -146,7 +146,7 @@ class Several(FrozenModel):
     parts: Any
 
 
-def test_list_of_parts_makes_the_round_trip() -> None:
+def test_list_of_parts_survives_the_round_trip() -> None:
     several = Several([VonMisesWalk(3.0), RandomWalk(q=0.5), 4])
     assert Several.from_dict(json.loads(json.dumps(several.to_dict()))) == several
 

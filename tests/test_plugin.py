@@ -1,4 +1,4 @@
-"""A tracker from somebody else's package, installed on its own, is found, made and checked."""
+"""A tracker of another package, installed separately, is found, created and checked."""
 
 import shutil
 import subprocess
@@ -13,7 +13,7 @@ PLUGIN = Path(__file__).parent / "plugin"
 
 
 def run(*command: str | Path, cwd: Path) -> str:
-    """Run a command and return what it printed; show what it said if it fails."""
+    """Run a command and return its output; show the output if it fails."""
     done = subprocess.run(
         [str(word) for word in command],
         cwd=cwd,
@@ -29,7 +29,7 @@ def run(*command: str | Path, cwd: Path) -> str:
 
 @pytest.fixture(scope="module")
 def python(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An environment that sees all that is installed in this one, and has the plug-in."""
+    """Return the interpreter of an environment with the plug-in and all packages of this one."""
     folder = tmp_path_factory.mktemp("plugin")
     venv.create(folder / "env", with_pip=False)
     scheme = {"base": str(folder / "env"), "platbase": str(folder / "env")}
@@ -44,7 +44,7 @@ def python(tmp_path_factory: pytest.TempPathFactory) -> Path:
     source = shutil.copytree(
         PLUGIN, folder / "source", ignore=ignored, copy_function=shutil.copyfile
     )
-    source.chmod(0o755)  # it may come from a folder that cannot be written to
+    source.chmod(0o755)  # the source folder may be read-only
     pip = [sys.executable, "-m", "pip", "--python", str(executable)]
     install = ["install", "--no-index", "--no-deps", "--no-build-isolation", str(source)]
     run(*pip, *install, cwd=folder)
@@ -57,7 +57,7 @@ def test_plugin_is_not_in_this_environment() -> None:
     assert "lag_one" not in available()
 
 
-def test_plugin_is_listed_found_and_made(python: Path, tmp_path: Path) -> None:
+def test_plugin_is_listed_found_and_created(python: Path, tmp_path: Path) -> None:
     script = """
 import sys
 import arrivals.trackers
@@ -65,7 +65,7 @@ from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.trackers import Tracker, available, create, find
 
 assert {"lag_one", "svalse"} <= set(available()), available()
-assert "lag_one" not in sys.modules, "it is imported before anybody asks for it"
+assert "lag_one" not in sys.modules, "it must be imported on demand only"
 kind = find("lag_one")
 assert (kind.__module__, kind.__name__) == ("lag_one", "LagOne")
 array = SensorArray.ula(8, spacing=0.5)
@@ -95,7 +95,7 @@ print("passed")
     assert run(python, "-c", script, cwd=tmp_path) == "passed\n"
 
 
-def test_plugin_cannot_take_a_name_of_ours(python: Path, tmp_path: Path) -> None:
+def test_plugin_with_a_registered_name_is_refused(python: Path, tmp_path: Path) -> None:
     script = """
 from lag_one import LagOne
 from arrivals.trackers import register

@@ -40,7 +40,7 @@ def animals() -> Registry[Animal]:
     return registry
 
 
-def test_registered_class_is_found_made_and_given_back_unchanged(
+def test_registered_class_is_found_created_and_unchanged(
     animals: Registry[Animal],
 ) -> None:
     assert animals.register("cat")(Cat) is Cat
@@ -50,7 +50,7 @@ def test_registered_class_is_found_made_and_given_back_unchanged(
     assert (animals.name_of(Dog), animals.name_of(Animal)) == ("dog", None)
 
 
-def test_taken_name_is_an_error_and_no_overwrite(animals: Registry[Animal]) -> None:
+def test_taken_name_is_refused(animals: Registry[Animal]) -> None:
     with pytest.raises(
         ValueError, match=r"animal name 'dog' is taken by tests\.test_registry\.Dog"
     ):
@@ -60,13 +60,13 @@ def test_taken_name_is_an_error_and_no_overwrite(animals: Registry[Animal]) -> N
 
 
 @pytest.mark.parametrize("stranger", [int, Dog(), lambda: Dog()])
-def test_only_what_derives_from_the_base_enters(animals: Registry[Animal], stranger: Any) -> None:
+def test_class_without_the_base_is_refused(animals: Registry[Animal], stranger: Any) -> None:
     with pytest.raises(TypeError, match="is not an animal: derive it from Animal"):
         animals.register("stranger")(stranger)
     assert animals.available() == ["dog"]
 
 
-def test_unknown_name_is_answered_with_the_nearest() -> None:
+def test_unknown_name_is_refused_with_similar_names() -> None:
     with pytest.raises(ValueError, match="there is no tracker 'svasle'; did you mean svalse"):
         create("svasle")
     with pytest.raises(
@@ -75,7 +75,7 @@ def test_unknown_name_is_answered_with_the_nearest() -> None:
         find("xyz")
 
 
-def test_built_in_trackers_are_made_by_name() -> None:
+def test_built_in_trackers_are_created_by_name() -> None:
     assert {"cbf", "svalse", "valse"} <= set(available())
     tracker = create("cbf", measurement=SNAPSHOTS, max_sources=1)
     assert isinstance(tracker, CBF)
@@ -87,7 +87,7 @@ def test_built_in_trackers_are_made_by_name() -> None:
 
 @pytest.fixture
 def foreign(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[list[EntryPoint]]:
-    """Pretend that packages are installed which bring animals; the list may be added to."""
+    """Simulate installed packages with animals; tests append to the list of entry points."""
     (tmp_path / "farm.py").write_text(
         "from test_registry import Animal\nclass Cow(Animal): pass\nclass Rock: pass\n"
     )
@@ -109,7 +109,7 @@ def point(name: str, value: str, group: str = "arrivals.test_animals") -> EntryP
     return EntryPoint(name=name, value=value, group=group)
 
 
-def test_foreign_class_is_listed_unloaded_and_imported_on_demand(
+def test_foreign_class_is_listed_and_imported_on_demand(
     animals: Registry[Animal], foreign: list[EntryPoint]
 ) -> None:
     foreign += [point("cow", "farm:Cow"), point("other", "farm:Cow", "another.group")]
@@ -129,14 +129,14 @@ def test_foreign_class_may_be_named_by_another_path(
     assert animals.find("cow") is animals.find("cow")
 
 
-def test_package_seen_twice_is_no_collision(
+def test_repeated_entry_point_is_accepted(
     animals: Registry[Animal], foreign: list[EntryPoint]
 ) -> None:
     foreign += [point("cow", "farm:Cow"), point("cow", "farm:Cow")]
     assert animals.find("cow").__name__ == "Cow"
 
 
-def test_foreign_class_cannot_take_our_name(
+def test_foreign_class_with_a_registered_name_is_refused(
     animals: Registry[Animal], foreign: list[EntryPoint]
 ) -> None:
     foreign.append(point("dog", "farm:Cow"))
@@ -147,7 +147,7 @@ def test_foreign_class_cannot_take_our_name(
     assert animals.available() == ["dog"]
 
 
-def test_two_foreign_classes_cannot_share_a_name(
+def test_two_foreign_classes_of_one_name_are_refused(
     animals: Registry[Animal], foreign: list[EntryPoint]
 ) -> None:
     foreign += [point("cow", "farm:Cow"), point("cow", "byre:Cow")]
@@ -155,7 +155,7 @@ def test_two_foreign_classes_cannot_share_a_name(
         animals.create("cow")
 
 
-def test_foreign_thing_of_the_wrong_kind_is_refused(
+def test_foreign_class_without_the_base_is_refused(
     animals: Registry[Animal], foreign: list[EntryPoint]
 ) -> None:
     foreign.append(point("rock", "farm:Rock"))
@@ -163,13 +163,13 @@ def test_foreign_thing_of_the_wrong_kind_is_refused(
         animals.find("rock")
 
 
-def test_our_trackers_come_without_entry_points() -> None:
+def test_built_in_trackers_have_no_entry_points() -> None:
     ours = [p for p in importlib.metadata.entry_points(group="arrivals.trackers")
             if p.value.startswith("arrivals.")]  # fmt: skip
     assert ours == []
 
 
-def test_a_tracker_that_cannot_be_imported_says_so(
+def test_tracker_that_cannot_be_imported_is_named(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     point = EntryPoint("broken", "no_such_package_here:Thing", "arrivals.trackers")

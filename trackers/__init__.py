@@ -1,10 +1,12 @@
-"""The methods, and the registry that finds them by name."""
+"""Trackers, their estimates, and the registry of trackers."""
 
 from arrivals.trackers.autoregressive.ar_kalman_qrd_rls import ARKalmanQRDRLS
 from arrivals.trackers.autoregressive.qrd_rls import QRDRLS
-from arrivals.trackers.base import Tracker
+from arrivals.trackers.base import Tracker, is_missing
 from arrivals.trackers.beamforming.cbf import CBF
 from arrivals.trackers.beamforming.mvdr import MVDR
+from arrivals.trackers.beamforming.spectrum import find_peaks, refine_peaks
+from arrivals.trackers.direction_tracker import DirectionTracker
 from arrivals.trackers.estimates import (
     DirectionEstimate,
     Estimate,
@@ -25,6 +27,7 @@ from arrivals.trackers.registry import available, create, find, register
 from arrivals.trackers.rss.rss_ml import RSSML
 from arrivals.trackers.rss.rss_vb import RSSVB
 from arrivals.trackers.run import Run
+from arrivals.trackers.sparse_bayes.fixed_point import FixedPointSolver
 from arrivals.trackers.sparse_bayes.sbl import SBL
 from arrivals.trackers.sparse_bayes.ssbl import SSBL
 from arrivals.trackers.subspace.esprit import ESPRIT
@@ -41,10 +44,12 @@ __all__ = [
     "CBF",
     "CoordinateSolver",
     "DirectionEstimate",
+    "DirectionTracker",
     "EKF",
     "ESPRIT",
     "Estimate",
     "Filter",
+    "FixedPointSolver",
     "IMM",
     "InterpolationEKF",
     "Kalman",
@@ -73,5 +78,8 @@ __all__ = [
     "available",
     "create",
     "find",
+    "find_peaks",
+    "is_missing",
+    "refine_peaks",
     "register",
 ]

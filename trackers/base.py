@@ -1,4 +1,4 @@
-"""What every tracker promises."""
+"""Base class of all trackers."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from arrivals.validation import positive
 
 
 class Tracker(Configurable, ABC):
-    """A method with a belief that moves: `predict`, then `update`, as in filterpy.
+    """Base of all trackers: a method with a belief, `predict`, then `update`, as in filterpy.
 
-    A tracker has models; their numbers are its parameters. Its constructor names every parameter
-    and keeps it under that name. `predict` and `update` rebind arrays and never write into them,
-    and a call that raises leaves the belief as it was.
+    A tracker has models; their numbers are its parameters. The constructor names every parameter
+    and keeps it as an attribute of that name. `predict` and `update` rebind arrays and never write
+    into them, and a call that raises does not change the belief.
 
     Attributes
     ----------
     x : ndarray, shape (dim_x,)
-        The belief's mean; NaN in unused places where the number of sources varies.
+        Mean of the belief; NaN in unused slots where the number of sources varies.
     P : ndarray, shape (dim_x, dim_x)
-        Its covariance; zero in unused places.
+        Covariance of the belief; zero in unused slots.
     """
 
     x: Float
@@ -38,24 +38,38 @@ class Tracker(Configurable, ABC):
 
     @abstractmethod
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
-        """Move the belief by `dt`; `u` is filterpy's control input, None or 0 for none."""
+        """Predict the belief after a time step.
+
+        Parameters
+        ----------
+        u : array_like, optional
+            Control input, as in filterpy; None or 0 for none.
+        dt : float
+            Time step.
+        """
 
     @abstractmethod
     def update(self, z: ArrayLike | None) -> None:
-        """Correct the belief by a measurement; None or NaN: it was missed."""
+        """Update the belief with a measurement.
+
+        Parameters
+        ----------
+        z : array_like or None
+            Measurement; None or NaN if it is missing, which does not change the belief.
+        """
 
     @property
     @abstractmethod
     def estimate(self) -> Estimate:
-        """What the tracker believes now."""
+        """Present estimate, a frozen record."""
 
     def run(self, measurements: Iterable[ArrayLike | None], dt: float = 1.0) -> Run:
-        """Predict and update for each measurement, from the present state.
+        """Predict and update for each measurement, starting from the present state.
 
         Parameters
         ----------
         measurements : array_like, shape (n_steps, ...), or any iterable
-            One a step; None or NaN where one was missed.
+            One per step; None or NaN where it is missing.
         dt : float
             Time between steps.
 
@@ -76,19 +90,41 @@ class Tracker(Configurable, ABC):
     def run_batch(
         self, measurements: Iterable[Iterable[ArrayLike | None]], dt: float = 1.0
     ) -> list[Run]:
-        """Run independent sequences, the leading axis, each from the present state.
+        """Run independent sequences, each starting from the present state.
 
-        The tracker itself stays as it is.
+        The tracker itself does not change.
+
+        Parameters
+        ----------
+        measurements : array_like, shape (n_sequences, n_steps, ...), or nested iterables
+            Sequences of measurements, as in `run`.
+        dt : float
+            Time between steps.
+
+        Returns
+        -------
+        list of Run
+            One per sequence.
         """
         return [copy.deepcopy(self).run(sequence, dt) for sequence in measurements]
 
     def set_params(self, **params: Any) -> Self:
-        """Change parameters by name (`motion__kappa=300.0` reaches into a part); keep the belief.
+        """Change parameters by name and keep the belief.
+
+        Parameters
+        ----------
+        **params : object
+            New values; `motion__kappa=300.0` changes a parameter of a part.
+
+        Returns
+        -------
+        Tracker
+            The tracker itself.
 
         Raises
         ------
         ValueError, TypeError
-            If there is no such parameter or its value is refused; nothing has changed then.
+            If there is no such parameter or its value is invalid; nothing has changed then.
         """
         changed = self.changed_params(params)
         checked = type(self)(**changed)
@@ -105,7 +141,17 @@ class Tracker(Configurable, ABC):
 
 
 def is_missing(z: ArrayLike | None) -> bool:
-    """Tell whether a measurement is missing: None, or nothing but NaN.
+    """Return True if a measurement is missing: None, or all NaN.
+
+    Parameters
+    ----------
+    z : array_like or None
+        Measurement.
+
+    Returns
+    -------
+    bool
+        True if it is missing.
 
     Examples
     --------

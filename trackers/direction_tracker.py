@@ -18,11 +18,25 @@ from arrivals.trackers.run import Run, RunRecorder
 from arrivals.typing import Bool, Float, Int
 from arrivals.validation import positive
 
-ENDED: Any = object()  # in place of a measurement: this sequence has ended, others go on
+ENDED: Any = object()  # in place of a measurement after the end of a shorter sequence
 
 
 def padded(values: Float | Int | Bool, n: int, filler: float) -> Float:
-    """Return the first n values as floats, filled up to length n.
+    """Return the first n values as floats, padded to length n.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n_values,)
+        Values.
+    n : int
+        Length of the result.
+    filler : float
+        Padding value.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Padded values.
 
     Examples
     --------
@@ -127,15 +141,37 @@ class BatchDirectionTracker(DirectionTracker):
 
     @abstractmethod
     def step_batch(self, trackers: Sequence[Self], step: Sequence[Any], dt: float) -> None:
-        """Predict and update copies of this tracker, each with its own measurement."""
+        """Predict and update copies of this tracker, each with its own measurement.
+
+        Parameters
+        ----------
+        trackers : sequence of trackers
+            Copies whose sequences have not ended.
+        step : sequence
+            A measurement for each.
+        dt : float
+            Time step.
+        """
 
     def run_batch(
         self, measurements: Iterable[Iterable[ArrayLike | None]], dt: float = 1.0
     ) -> list[Run]:
-        """Run independent sequences, the leading axis, each from the present state.
+        """Run independent sequences, each starting from the present state.
 
         A step of all sequences is one array call. Results equal those of single runs up to
         rounding. The tracker itself does not change.
+
+        Parameters
+        ----------
+        measurements : array_like, shape (n_sequences, n_steps, ...), or nested iterables
+            Sequences of measurements, as in `run`.
+        dt : float
+            Time between steps.
+
+        Returns
+        -------
+        list of Run
+            One per sequence.
         """
         positive("dt", dt)
         sequences = [list(sequence) for sequence in measurements]

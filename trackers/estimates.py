@@ -1,4 +1,4 @@
-"""What a tracker believes after a step, as frozen records that know their rows in a tracks file."""
+"""Estimates of one step as frozen records, with their rows in a tracks file."""
 
 from __future__ import annotations
 
@@ -12,10 +12,16 @@ from arrivals.typing import Complex, Float, Int
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """What was found in one step; the first axis of every array counts what was found.
+    """Base of the estimates of one step; the first axis of every array counts sources.
 
-    A kind of estimate is a frozen dataclass: `per_source` maps the name of each array field to
-    what fills it up in the rectangular arrays of a `Run`; all other fields are one number a step.
+    A subclass is a frozen dataclass: `per_source` maps the name of each array field to the value
+    that pads the rectangular arrays of a `Run`; all other fields are one number per step.
+    `columns` names the entries of a row in a tracks file.
+
+    Examples
+    --------
+    >>> DirectionEstimate.empty(noise=0.1).per_step()
+    ('converged', 'iterations', 'noise')
     """
 
     per_source: ClassVar[dict[str, Any]] = {}
@@ -27,36 +33,54 @@ class Estimate:
         return len(getattr(self, next(iter(self.per_source))))
 
     def rows(self) -> list[tuple[Any, ...]]:
-        """Return one row for each source, in the order of `columns`."""
+        """Return one row per source.
+
+        Returns
+        -------
+        list of tuple
+            Cells in the order of `columns`.
+        """
         raise NotImplementedError
 
     def per_step(self) -> tuple[str, ...]:
-        """Return the names of the fields that are one number a step."""
+        """Return the names of the fields that are one number per step.
+
+        Returns
+        -------
+        tuple of str
+            Names.
+        """
         return tuple(f.name for f in fields(self) if f.name not in self.per_source)
 
 
 @dataclass(frozen=True, eq=False)
 class DirectionEstimate(Estimate):
-    """Directions of arrival found in one step.
+    """Directions of arrival of the sources detected in one step.
 
     Parameters
     ----------
-    doa : ndarray, shape (n_found,)
+    doa : ndarray, shape (n_sources,)
         Directions of arrival, rad.
-    std : ndarray, shape (n_found,)
-        Their standard deviations, rad; NaN where the method gives none.
-    existence : ndarray, shape (n_found,)
-        Probability that the source is there; NaN where the method gives none.
-    amplitude : ndarray, shape (n_found,)
-        Complex amplitude at the origin of the array's coordinates; NaN where there is none.
-    label : ndarray of int, shape (n_found,)
-        Stays with a source while it is tracked; -1 from methods that do not track.
+    std : ndarray, shape (n_sources,)
+        Standard deviations, rad; NaN if the method does not estimate them.
+    existence : ndarray, shape (n_sources,)
+        Probability of existence; NaN if the method does not estimate it.
+    amplitude : ndarray, shape (n_sources,)
+        Complex amplitude at the origin of the array's coordinates; NaN if not estimated.
+    label : ndarray of int, shape (n_sources,)
+        Identity of a tracked source; -1 for methods that do not track.
     converged : bool
         False if an iterative method stopped before it met its tolerance.
     iterations : int
-        Iterations that this step took; 0 for a method without.
+        Number of iterations of this step; 0 for methods without iteration.
     noise : float
-        Estimated variance of the noise at one sensor; NaN where the method gives none.
+        Estimated noise variance of one sensor; NaN if the method does not estimate it.
+
+    Examples
+    --------
+    >>> one = np.ones(1)
+    >>> DirectionEstimate(0.5 * one, 0.01 * one, one, one + 0j, np.array([7])).n_found
+    1
     """
 
     doa: Float
@@ -79,7 +103,17 @@ class DirectionEstimate(Estimate):
 
     @classmethod
     def empty(cls, **others: Any) -> Self:
-        """Return the estimate of a step in which no source was detected.
+        """Return the estimate of a step without a detected source.
+
+        Parameters
+        ----------
+        **others : object
+            Fields with one number per step.
+
+        Returns
+        -------
+        DirectionEstimate
+            Arrays of length zero.
 
         Examples
         --------
@@ -90,7 +124,13 @@ class DirectionEstimate(Estimate):
         return cls(none, none, none, none.astype(complex), none.astype(np.int64), **others)
 
     def rows(self) -> list[tuple[Any, ...]]:
-        """Return label, direction and its standard deviation in degrees, existence, level in dB."""
+        """Return label, direction and its standard deviation in degrees, existence, level in dB.
+
+        Returns
+        -------
+        list of tuple
+            One row per source.
+        """
         with np.errstate(divide="ignore"):
             level_db = 20 * np.log10(np.abs(self.amplitude))
         degrees = np.rad2deg([self.doa, self.std])
@@ -141,31 +181,38 @@ class SourceEstimate(DirectionEstimate):
 
 @dataclass(frozen=True, eq=False)
 class PositionEstimate(Estimate):
-    """Positions found in one step.
+    """Positions of the sources detected in one step.
 
     Parameters
     ----------
-    position : ndarray, shape (n_found, 2)
+    position : ndarray, shape (n_sources, 2)
         Positions, m.
-    covariance : ndarray, shape (n_found, 2, 2)
-        Their covariances, m².
-    log_amplitude : ndarray, shape (n_found,)
+    covariance : ndarray, shape (n_sources, 2, 2)
+        Covariances, m².
+    log_amplitude : ndarray, shape (n_sources,)
         Logarithm of the source's amplitude, neper.
-    existence : ndarray, shape (n_found,)
-        Probability that the source is there; NaN where the method gives none.
-    label : ndarray of int, shape (n_found,)
-        Stays with a source while it is tracked; -1 from methods that do not track.
+    existence : ndarray, shape (n_sources,)
+        Probability of existence; NaN if the method does not estimate it.
+    label : ndarray of int, shape (n_sources,)
+        Identity of a tracked source; -1 for methods that do not track.
     converged : bool
         False if an iterative method stopped before it met its tolerance.
     iterations : int
-        Iterations that this step took; 0 for a method without.
+        Number of iterations of this step; 0 for methods without iteration.
     fit : float
-        Probability of a larger misfit than this step's, if the solution is right; NaN where the
-        method gives none.
+        p-value: probability of a larger misfit than this step's, if the solution is right; NaN if
+        the method does not compute it.
     poor_fit : bool
-        The misfit is too large for the solution, or the model, to be right.
+        True if the misfit is too large for the solution, or the model, to be right.
     diverged : bool
-        The solution is not to be believed at all.
+        True if the solution is invalid.
+
+    Examples
+    --------
+    >>> one = np.ones(1)
+    >>> P = np.diag([4.0, 9.0])[None]
+    >>> PositionEstimate(np.array([[1.0, 2.0]]), P, 0 * one, one, np.array([7])).rows()[0][1:5]
+    (np.float64(1.0), np.float64(2.0), np.float64(2.0), np.float64(3.0))
     """
 
     position: Float
@@ -191,7 +238,13 @@ class PositionEstimate(Estimate):
     )  # fmt: skip
 
     def rows(self) -> list[tuple[Any, ...]]:
-        """Return label, position, standard deviations and correlation, existence, level in dB."""
+        """Return label, position, standard deviations and correlation, existence, level in dB.
+
+        Returns
+        -------
+        list of tuple
+            One row per source.
+        """
         x, y = self.position.T
         variance = np.diagonal(self.covariance, axis1=-2, axis2=-1)
         std_x, std_y = np.sqrt(variance).T
@@ -205,12 +258,14 @@ class PositionEstimate(Estimate):
 
 @dataclass(frozen=True, eq=False)
 class StateEstimate(Estimate):
-    """Mean and covariance of a state; "what was found" are its entries.
+    """Mean and covariance of a state; its entries take the place of sources.
 
     Parameters
     ----------
     x : ndarray, shape (n,)
+        Mean.
     P : ndarray, shape (n, n)
+        Covariance.
 
     Examples
     --------
@@ -225,6 +280,12 @@ class StateEstimate(Estimate):
     columns: ClassVar[tuple[str, ...]] = ("entry", "x", "std")
 
     def rows(self) -> list[tuple[Any, ...]]:
-        """Return number, mean and standard deviation of each entry of the state."""
+        """Return number, mean and standard deviation of each entry of the state.
+
+        Returns
+        -------
+        list of tuple
+            One row per entry.
+        """
         std = np.sqrt(np.maximum(self.P.diagonal(), 0))
         return list(zip(range(len(self.x)), self.x.tolist(), std.tolist(), strict=True))

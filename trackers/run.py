@@ -1,4 +1,4 @@
-"""Estimates over time: rectangular arrays that know how to write themselves."""
+"""Estimates over time as rectangular arrays, and the tracks file."""
 
 from __future__ import annotations
 
@@ -18,26 +18,37 @@ from arrivals.typing import Float
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """What a tracker found over time.
+    """Estimates of a tracker over time.
 
-    The fields of its estimates are attributes, arrays over time: `run.doa` (n_steps, n_slots) is
-    padded with NaN where less was found, `run.label` with -1; `run.converged` (n_steps,).
+    The fields of the estimates are attributes, arrays over time: `run.doa` (n_steps, n_slots) is
+    padded with NaN, `run.label` with -1; `run.converged` is (n_steps,).
 
     Parameters
     ----------
     kind : type of Estimate
+        Class of the estimates.
     fields : mapping of str to ndarray
-        The estimates' fields, first axis time.
+        Fields of the estimates, first axis time.
     x : ndarray, shape (n_steps, dim_x)
-        The tracker's `x` after each step.
+        `x` of the tracker after each step.
     n_found : ndarray of int, shape (n_steps,)
+        Number of sources of each estimate.
     time : ndarray, shape (n_steps,)
-        Seconds, or the unit of the `dt` that the tracker was run with.
+        Times, s, or in the unit of `dt`.
     elapsed : float
-        Wall-clock time that the run took, s.
+        Wall-clock time of the run, s.
     extras : mapping of str to ndarray
-        What else a tracker keeps of every step, first axis time, and no estimate holds; they are
-        attributes too, such as `run.signals` (n_steps, n_sources).
+        Results per step that are not part of an estimate, first axis time; attributes too, such as
+        `run.signals` (n_steps, n_sources).
+
+    Examples
+    --------
+    >>> from arrivals.measurement_models import ArraySnapshot, SensorArray
+    >>> from arrivals.trackers import CBF
+    >>> model = ArraySnapshot(SensorArray.ula(8, spacing=0.5), wavelength=1.0)
+    >>> run = CBF(model, max_sources=1).run([model.steering_vector(0.5), None])
+    >>> run.doa.round(2).ravel(), run.n_found
+    (array([0.5, nan]), array([1, 0]))
     """
 
     kind: type[Estimate]
@@ -55,7 +66,7 @@ class Run:
                 return arrays[name]
             except (AttributeError, KeyError):
                 pass
-        raise AttributeError(f"this run has no {name!r}")
+        raise AttributeError(f"run has no attribute {name!r}")
 
     def __dir__(self) -> list[str]:
         return [*super().__dir__(), *self.fields, *self.extras]
@@ -69,7 +80,18 @@ class Run:
         return len(self.time)
 
     def estimate(self, step: int) -> Estimate:
-        """Return the estimate of one step."""
+        """Return the estimate of one step.
+
+        Parameters
+        ----------
+        step : int
+            Index of the step.
+
+        Returns
+        -------
+        Estimate
+            Estimate of class `kind`.
+        """
         n = int(self.n_found[step])
         return self.kind(
             **{
@@ -79,19 +101,26 @@ class Run:
         )
 
     def rows(self) -> Iterator[tuple[Any, ...]]:
-        """Give the rows of the tracks file: step (from 0), time, then the estimate's columns."""
+        """Iterate over the rows of the tracks file.
+
+        Yields
+        ------
+        tuple
+            Step (from 0), time, then the columns of the estimate.
+        """
         for step, time in enumerate(self.time.tolist()):
             for row in self.estimate(step).rows():
                 yield (step, time, *row)
 
     def to_csv(self, path: str | os.PathLike[str], *, time: ArrayLike | None = None) -> None:
-        """Write the tracks file; it appears under its name only when it is complete.
+        """Write the tracks file; it has its final name only when it is complete.
 
         Parameters
         ----------
-        path : path
+        path : str or path
+            Name of the CSV file.
         time : array_like, shape (n_steps,), optional
-            Times to write in place of the run's own, s.
+            Times, s; those of the run if None.
         """
         run = self if time is None else self.at(time)
         with atomic_write(path) as file:
@@ -100,7 +129,18 @@ class Run:
             writer.writerows(map(text, run.rows()))
 
     def at(self, time: ArrayLike) -> Run:
-        """Return the same run with other times, (n_steps,)."""
+        """Return the same run with other times.
+
+        Parameters
+        ----------
+        time : array_like, shape (n_steps,)
+            Times, s.
+
+        Returns
+        -------
+        Run
+            A copy with the times.
+        """
         time = np.asarray(time, dtype=np.float64)
         if time.shape != self.time.shape:
             raise ValueError(f"time must have shape {self.time.shape}; got {time.shape}")
@@ -108,12 +148,12 @@ class Run:
 
 
 def header(kind: type[Estimate]) -> tuple[str, ...]:
-    """Return the column names of a tracks file of such estimates."""
+    """Return the column names of a tracks file of a class of estimates."""
     return ("step", "time_s", *kind.columns)
 
 
 def text(row: tuple[Any, ...]) -> list[str]:
-    """Return the cells of a row of a tracks file: numbers to 9 digits, nothing for NaN.
+    """Return the cells of a row of a tracks file: numbers to 9 digits, empty for NaN.
 
     Examples
     --------
@@ -125,7 +165,7 @@ def text(row: tuple[Any, ...]) -> list[str]:
 
 
 class RunRecorder:
-    """Arrays over time that grow with the estimates added, and hold little beyond them."""
+    """Recorder of estimates in arrays that double in length when they are full."""
 
     def __init__(self, kind: type[Estimate]) -> None:
         self._kind = kind
@@ -133,40 +173,40 @@ class RunRecorder:
         self._n = 0
 
     def add(self, estimate: Estimate, x: Float) -> None:
-        """Add one step."""
+        """Append the estimate and the state of one step."""
         values = {"n_found": estimate.n_found, "x": x}
         values |= {name: getattr(estimate, name) for name in vars(estimate)}
         for name, value in values.items():
             array = np.asarray(value)
-            column = self._room(name, array)
+            column = self._column_for(name, array)
             if name in self._kind.per_source:
                 column[self._n, : len(array)] = array
             else:
                 column[self._n] = array
         self._n += 1
 
-    def _room(self, name: str, value: NDArray[Any]) -> NDArray[Any]:
-        """Return the column, enlarged if it is too short in time or too narrow in slots."""
+    def _column_for(self, name: str, value: NDArray[Any]) -> NDArray[Any]:
+        """Return a column, enlarged if it has too few steps or slots."""
         column = self._columns.get(name)
         if column is not None and self._n < len(column) and column.shape[1:] == value.shape:
             return column  # the usual case
-        wanted = (self._n + 1, *value.shape)
+        required = (self._n + 1, *value.shape)
         if column is None:
-            column = self._columns[name] = self._fresh(name, (16, *value.shape), value.dtype)
-        if any(have < want for have, want in zip(column.shape, wanted, strict=True)):
+            column = self._columns[name] = self._padded(name, (16, *value.shape), value.dtype)
+        if any(have < need for have, need in zip(column.shape, required, strict=True)):
             steps = column.shape[0] if column.shape[0] > self._n else 2 * column.shape[0]
             shape = (steps, *np.maximum(column.shape[1:], value.shape).tolist())
-            larger = self._fresh(name, shape, column.dtype)
+            larger = self._padded(name, shape, column.dtype)
             larger[tuple(slice(n) for n in column.shape)] = column
             column = self._columns[name] = larger
         return column
 
-    def _fresh(self, name: str, shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:
+    def _padded(self, name: str, shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:
         filler = self._kind.per_source.get(name, 0)
         return np.full(shape, filler, dtype=dtype)
 
     def run(self, dt: float, elapsed: float) -> Run:
-        """Return what was recorded."""
+        """Return the recorded steps as a run."""
         columns = {name: np.full((0, 0), filler) for name, filler in self._kind.per_source.items()}
         columns |= {
             field.name: np.array([field.default])[:0]

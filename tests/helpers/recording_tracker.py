@@ -1,4 +1,4 @@
-"""A tracker that shows what it is told, for the tests of what all trackers share."""
+"""A tracker that reports its measurements as directions, for tests of the base classes."""
 
 from typing import Any
 
@@ -7,17 +7,14 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.motion_models import VonMisesWalk
-from arrivals.trackers import (
-    DirectionEstimate,
-    Tracker,
-)
+from arrivals.trackers import DirectionEstimate, Tracker
 
 ARRAY = SensorArray.ula(5, spacing=0.5)
 SNAPSHOTS = ArraySnapshot(ARRAY, wavelength=1.0)
 
 
-class Hands(Tracker):
-    """Shows what it is told: z holds the directions."""
+class EchoTracker(Tracker):
+    """Reports the measurement z as directions, rad."""
 
     def __init__(self, motion: VonMisesWalk | None = None, inner: Tracker | None = None) -> None:
         self.motion, self.inner = motion, inner

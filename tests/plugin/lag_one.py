@@ -1,4 +1,4 @@
-"""One direction of arrival, from the phase step between neighbouring sensors."""
+"""Direction of arrival from the phase step between neighbouring sensors."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,7 +10,7 @@ from arrivals.validation import instance, positive
 
 
 class LagOne(Tracker):
-    """The mean phase step of a uniform line, remembered with a forgetting factor.
+    """Exponentially weighted mean phase step of a uniform line.
 
     Parameters
     ----------
@@ -27,11 +27,11 @@ class LagOne(Tracker):
         self.x, self.P = np.full(1, np.nan), np.zeros((1, 1))
 
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
-        """Forget a little."""
+        """Apply forgetting."""
         self.lag, self.power = self.lag * self.memory**dt, self.power * self.memory**dt
 
     def update(self, z: ArrayLike | None) -> None:
-        """Add the products of neighbours, those of which both are heard."""
+        """Add the products of neighbouring sensors that both have valid data."""
         if is_missing(z):
             return
         z = self.measurement.snapshot(np.asarray(z))
@@ -40,15 +40,15 @@ class LagOne(Tracker):
         power = self.power + np.nansum(np.abs(products))
         if power > 0:
             model = self.measurement
-            turn = 2 * np.pi * (model.array.spacing or np.inf) / model.wavelengths[0]
-            sine = np.angle(lag) / turn
+            phase_scale = 2 * np.pi * (model.array.spacing or np.inf) / model.wavelengths[0]
+            sine = np.angle(lag) / phase_scale
             self.x = np.arcsin(np.clip([sine], -1.0, 1.0))
             self.P = np.array([[1 - abs(lag) / power]])
         self.lag, self.power = lag, power
 
     @property
     def estimate(self) -> DirectionEstimate:
-        """The one direction, once something was heard."""
+        """Direction, after the first valid measurement."""
         doa = self.x[~np.isnan(self.x)]
         n = len(doa)
         std = np.sqrt(np.maximum(self.P[0, :n], 0.0))

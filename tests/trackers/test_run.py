@@ -1,4 +1,4 @@
-"""Estimates, runs, the tracks file and missed measurements."""
+"""Estimates, runs, the tracks file and missing measurements."""
 
 import dataclasses
 import pickle
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike
-from recording_tracker import Hands, directions
+from recording_tracker import EchoTracker, directions
 
 from arrivals.files import atomic_write
 from arrivals.trackers import (
@@ -26,7 +26,7 @@ from arrivals.typing import Float
 # estimates and their rows
 
 
-def test_row_of_a_direction_is_in_degrees_and_db() -> None:
+def test_direction_row_is_in_degrees_and_db() -> None:
     estimate = DirectionEstimate(
         doa=np.deg2rad([30.0, -90.0, 5.0]),
         std=np.deg2rad([1.0, np.nan, 0.0]),
@@ -52,7 +52,7 @@ def positions(n: int) -> PositionEstimate:
     )
 
 
-def test_row_of_a_position_has_deviations_and_correlation() -> None:
+def test_position_row_has_deviations_and_correlation() -> None:
     assert positions(2).columns == (
         "label", "x_m", "y_m", "std_x_m", "std_y_m", "corr", "existence", "level_db",
     )  # fmt: skip
@@ -61,7 +61,7 @@ def test_row_of_a_position_has_deviations_and_correlation() -> None:
     assert positions(0).rows() == []
 
 
-def test_bare_estimate_has_no_rows() -> None:
+def test_estimate_without_rows_is_not_implemented() -> None:
     @dataclass(frozen=True, eq=False)
     class Levels(Estimate):
         level: Float
@@ -75,8 +75,8 @@ def test_bare_estimate_has_no_rows() -> None:
 # runs
 
 
-def test_run_is_padded_where_less_was_found() -> None:
-    run = Hands().run([[0.1, 0.2], None, [0.3], [0.1, 0.2, 0.3]], dt=0.5)
+def test_run_is_padded_with_nan() -> None:
+    run = EchoTracker().run([[0.1, 0.2], None, [0.3], [0.1, 0.2, 0.3]], dt=0.5)
     nan = np.nan
     np.testing.assert_array_equal(
         run.doa, [[0.1, 0.2, nan], [nan] * 3, [0.3, nan, nan], [0.1, 0.2, 0.3]]
@@ -90,12 +90,12 @@ def test_run_is_padded_where_less_was_found() -> None:
     assert run.converged.tolist() == [True] * 4
     assert (run.n_steps, len(run), run.elapsed > 0) == (4, 4, True)
     assert {"doa", "label", "noise", "time"} <= set(dir(run))
-    with pytest.raises(AttributeError, match="this run has no 'position'"):
+    with pytest.raises(AttributeError, match="this run has no attribute 'position'"):
         _ = run.position
 
 
 @pytest.mark.parametrize("n_steps", [1, 15, 16, 17, 100])
-def test_every_estimate_comes_back_from_a_run(n_steps: int) -> None:
+def test_run_returns_every_recorded_estimate(n_steps: int) -> None:
     rng = np.random.default_rng(n_steps)
     given = [
         directions(rng.normal(size=n), converged=bool(n % 2), iterations=int(n), noise=float(n))
@@ -126,8 +126,8 @@ def test_run_of_positions() -> None:
     np.testing.assert_array_equal(run.estimate(1).rows(), positions(2).rows())
 
 
-def test_run_of_nothing_has_all_fields(tmp_path: Path) -> None:
-    run = Hands().run([])
+def test_run_without_steps_has_all_fields(tmp_path: Path) -> None:
+    run = EchoTracker().run([])
     assert (len(run), run.n_found.shape, run.doa.shape[0], run.label.dtype.kind) == (
         0,
         (0,),
@@ -139,20 +139,20 @@ def test_run_of_nothing_has_all_fields(tmp_path: Path) -> None:
     assert (tmp_path / "tracks.csv").read_text() == HEADER
 
 
-def test_run_does_not_keep_the_room_it_grew_in() -> None:
-    run = Hands().run([[0.1]] * 17)
+def test_run_does_not_keep_spare_memory() -> None:
+    run = EchoTracker().run([[0.1]] * 17)
     assert run.doa.base is None
     assert run.doa.shape == (17, 1)
 
 
 @pytest.mark.parametrize("dt", [0.0, -1.0, np.nan])
-def test_time_runs_forward(dt: float) -> None:
+def test_dt_must_be_positive(dt: float) -> None:
     with pytest.raises(ValueError, match="dt must be finite and positive"):
-        Hands().run([[0.1]], dt=dt)
+        EchoTracker().run([[0.1]], dt=dt)
 
 
-def test_batch_starts_every_sequence_from_the_present_state() -> None:
-    tracker = Hands()
+def test_run_batch_starts_every_sequence_from_the_present_state() -> None:
+    tracker = EchoTracker()
     tracker.predict()
     one, two = tracker.run_batch([[[0.1], [0.2]], [None]])
     assert one.x.ravel().tolist() == [2.0, 3.0]
@@ -166,7 +166,7 @@ HEADER = "step,time_s,label,doa_deg,std_deg,existence,level_db\n"
 
 
 def tracks() -> Run:
-    return Hands().run([np.deg2rad([30.0, -10.0]), None, [1 / 3]], dt=0.25)
+    return EchoTracker().run([np.deg2rad([30.0, -10.0]), None, [1 / 3]], dt=0.25)
 
 
 def test_tracks_file(tmp_path: Path) -> None:
@@ -192,7 +192,7 @@ def test_tracks_file_of_positions(tmp_path: Path) -> None:
     )
 
 
-def test_tracks_file_takes_other_times(tmp_path: Path) -> None:
+def test_tracks_file_with_other_times(tmp_path: Path) -> None:
     run = tracks()
     run.to_csv(tmp_path / "tracks.csv", time=[10.0, 20.0, 30.5])
     times = [line.split(",")[1] for line in (tmp_path / "tracks.csv").read_text().splitlines()]
@@ -204,7 +204,7 @@ def test_tracks_file_takes_other_times(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("error", [OSError("disk full"), KeyboardInterrupt()])
-def test_error_half_way_leaves_the_old_file_and_nothing_else(
+def test_to_csv_after_an_error_keeps_the_old_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException
 ) -> None:
     path = tmp_path / "tracks.csv"
@@ -223,7 +223,7 @@ def test_error_half_way_leaves_the_old_file_and_nothing_else(
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_file_appears_only_when_complete(tmp_path: Path) -> None:
+def test_atomic_write_makes_the_file_when_complete(tmp_path: Path) -> None:
     path = tmp_path / "new.txt"
     with atomic_write(path) as file:
         file.write("half\n")
@@ -232,28 +232,28 @@ def test_file_appears_only_when_complete(tmp_path: Path) -> None:
     assert path.read_text() == "half\n"
 
 
-def test_folder_that_is_not_there_is_named(tmp_path: Path) -> None:
+def test_to_csv_with_missing_folder_raises_with_its_name(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError, match=r"folder .*nowhere does not exist"):
         tracks().to_csv(tmp_path / "nowhere" / "tracks.csv")
 
 
-def test_folder_in_place_of_the_file_is_left_alone(tmp_path: Path) -> None:
+def test_to_csv_to_a_folder_raises(tmp_path: Path) -> None:
     (tmp_path / "tracks.csv").mkdir()
     with pytest.raises(OSError, match=r"tracks\.csv"):
         tracks().to_csv(tmp_path / "tracks.csv")
     assert [path.name for path in tmp_path.iterdir()] == ["tracks.csv"]
 
 
-# missed measurements
+# missing measurements
 
 
 @pytest.mark.parametrize(
     "z", [None, np.nan, [np.nan, np.nan], np.full((2, 3), np.nan), complex(np.nan, 0.0)]
 )
-def test_nothing_but_nan_is_missed(z: ArrayLike | None) -> None:
+def test_is_missing_of_none_and_all_nan_is_true(z: ArrayLike | None) -> None:
     assert is_missing(z)
 
 
 @pytest.mark.parametrize("z", [0.0, [np.nan, 1.0], np.inf, [], "nan", [True], 3, 1j])
-def test_anything_else_is_not(z: ArrayLike) -> None:
+def test_is_missing_of_other_values_is_false(z: ArrayLike) -> None:
     assert not is_missing(z)

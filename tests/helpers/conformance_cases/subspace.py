@@ -14,7 +14,7 @@ CIRCLE = ArraySnapshot(SensorArray.uca(7, radius=0.5), wavelength=1.0, noise=1e-
 
 
 def two_sources(model: ArraySnapshot, n_steps: int = 12) -> Measurements:
-    """Two sources; one sensor fails once, and once there is silence."""
+    """Return snapshots of two sources; one sensor fails once, the last snapshot is zero."""
     rng = np.random.default_rng(5)
     phases = np.exp(2j * np.pi * rng.random((n_steps, 2)))
     z = model.simulate(np.full((n_steps, 2), [0.5, -0.4]), phases, rng)
@@ -23,20 +23,17 @@ def two_sources(model: ArraySnapshot, n_steps: int = 12) -> Measurements:
     return z
 
 
-def line(name: str, kind: Any, model: ArraySnapshot, **params: Any) -> Any:
+def case(name: str, kind: Any, model: ArraySnapshot, **params: Any) -> Any:
     return name, lambda: kind(model, **params), two_sources(model)
 
 
 TRACKERS: list[tuple[str, MakeTracker, Measurements]] = [
-    line("music", MUSIC, LINE, n_directions=91),
-    line("music", MUSIC, CIRCLE, n_sources="aic", max_sources=2, n_directions=90),
-    line("music", MUSIC, LINE, n_sources=2, smoothing=4, backward=True, interval=3),
-    line("root_music", RootMUSIC, GAPS, n_sources=2),
-    line("root_music", RootMUSIC, LINE, n_sources=None, smoothing=5),
-    line("esprit", ESPRIT, GAPS, n_sources=2),
-    line("esprit", ESPRIT, LINE, forgetting=1.0, interval=2),
-    line("past", PAST, GAPS, n_sources=2),
-    line("past", PAST, LINE, max_sources=4, interval=2),
-    line("past", PAST, LINE, n_sources=2, method="root_music"),
-    line("past", PAST, CIRCLE, n_sources=2, method="music", n_directions=90),
+    case("music", MUSIC, LINE, n_directions=91),
+    case("music", MUSIC, CIRCLE, n_sources="aic", max_sources=2, n_directions=90),
+    case("music", MUSIC, LINE, n_sources=2, smoothing=4, backward=True, interval=3),
+    case("root_music", RootMUSIC, GAPS, n_sources=2),
+    case("esprit", ESPRIT, GAPS, forgetting=1.0, interval=2),
+    case("past", PAST, GAPS, n_sources=2),
+    case("past", PAST, LINE, max_sources=4, interval=2),
+    case("past", PAST, CIRCLE, n_sources=2, method="music", n_directions=90),
 ]

@@ -1,0 +1,69 @@
+"""Beamforming, SBL, (S)VALSE and peaks_gnn, for `test_conformance`."""
+
+import numpy as np
+
+from arrivals.measurement_models import ArraySnapshot, ElementResponse, SensorArray
+from arrivals.motion_models import BernoulliVonMises
+from arrivals.trackers import (
+    CBF,
+    SBL,
+    SSBL,
+    SVALSE,
+    VALSE,
+    CoordinateSolver,
+    NewtonSolver,
+    PeaksGNN,
+)
+from arrivals.trackers.conformance import MakeTracker, Measurements
+
+LINE = ArraySnapshot(SensorArray.ula(9, spacing=0.5), wavelength=1.0, noise=1e-3)
+CIRCLE = ArraySnapshot(SensorArray.uca(7, radius=0.5), wavelength=1.0, noise=1e-3)
+WIDEBAND = CIRCLE.replace(wavelength=[1.0, 1.4], n_snapshots=2)
+SLOWNESS = WIDEBAND.replace(
+    slowness=[0.9, 1.0, 1.1], response=ElementResponse.first_order([0.3] * 7)
+)
+GAPS = ArraySnapshot(SensorArray.ula(10, 0.4, missing=[2]), wavelength=1.0, noise=1e-3)
+
+
+def two_sources(model: ArraySnapshot, n_steps: int = 4) -> Measurements:
+    """Return snapshots of two sources: the second starts late, a sensor fails, the end is zero."""
+    on = np.arange(n_steps) > 0
+    doa = np.stack([0.5 + 0.02 * np.arange(n_steps), np.where(on, -0.4, np.nan)], axis=-1)
+    z = model.simulate(doa, [1.0, 0.8j], np.random.default_rng(5))
+    z[1, ..., 3] = np.nan
+    z[-1] = 0.0
+    return z
+
+
+TRACKERS: list[tuple[str, MakeTracker, Measurements]] = [
+    ("cbf", lambda: CBF(LINE, n_directions=91), two_sources(LINE)),
+    ("cbf", lambda: CBF(CIRCLE, n_directions=90, max_sources=2), two_sources(CIRCLE)),
+    ("valse", lambda: VALSE(GAPS, solver=NewtonSolver(max_components=3)), two_sources(GAPS)),
+    ("sbl", lambda: SBL(CIRCLE, n_directions=90, max_sources=2), two_sources(CIRCLE)),
+    ("ssbl", lambda: SSBL(GAPS, n_directions=91, n_neighbours=1), two_sources(GAPS)),
+    ("peaks_gnn", lambda: PeaksGNN(CIRCLE, detector="mvdr", confirm_steps=1), two_sources(CIRCLE)),
+    ("peaks_gnn", lambda: PeaksGNN(LINE, detector=CBF(LINE, threshold_db=6.0)), two_sources(LINE)),
+    ("valse", lambda: VALSE(LINE, engine="coordinate"), two_sources(LINE)),
+    ("svalse", lambda: SVALSE(GAPS, BernoulliVonMises(kappa=50.0)), two_sources(GAPS)),
+    ("svalse", lambda: SVALSE(GAPS, engine="coordinate"), two_sources(GAPS)),
+    (
+        "svalse",
+        lambda: SVALSE(
+            LINE,
+            solver=CoordinateSolver(posterior="mixture", tolerance=1e-6),
+            reference="first",
+        ),
+        two_sources(LINE, n_steps=3),
+    ),
+    ("cbf", lambda: CBF(SLOWNESS, n_directions=90), two_sources(SLOWNESS)),
+    (
+        "valse",
+        lambda: VALSE(WIDEBAND, solver=NewtonSolver(tempering=2.0, max_snr_db=25.0)),
+        two_sources(WIDEBAND),
+    ),
+    (
+        "svalse",
+        lambda: SVALSE(SLOWNESS, BernoulliVonMises(sigma_doa=0.05), memory="posterior"),
+        two_sources(SLOWNESS),
+    ),
+]
