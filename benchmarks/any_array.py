@@ -29,6 +29,7 @@ from arrivals.trackers import CBF, SVALSE, VALSE, NewtonSolver, Tracker
 from arrivals.trackers.run import Run
 from arrivals.typing import Bool, Complex, Float
 
+METHODS = ("svalse", "valse", "cbf")
 MERGED: dict[str, Any] = {"merge": np.deg2rad(1.5)}  # of VALSE, as in SVALSE
 
 
@@ -225,11 +226,8 @@ def infrasound() -> None:
     """Shipped infrasound recording: three arrivals, and detections outside of them."""
     model, steps, at = brp2012()
     spans = ((420, 435, 320), (610, 800, 250), (805, 895, 321))
-    for name, specified in (
-        ("svalse", "319.6 / 249.7 / 322.0, 5.7; 28 %"),
-        ("valse", "319.8 / 249.7 / 321.8, 10.8; -"),
-        ("cbf", "equal, 116; -"),
-    ):
+    figures = "319.6 / 249.7 / 322.0, 5.7; 28 %", "319.8 / 249.7 / 321.8, 10.8; -", "equal, 116; -"
+    for name, specified in zip(METHODS, figures, strict=True):
         run = tracker(name, model).run(steps)
         best = strongest(run)
         within = [(at >= start) & (at <= end) for start, end, _ in spans]
@@ -268,11 +266,8 @@ def bluetooth(folder: Path) -> None:
     model = ArraySnapshot(SensorArray.uca(8, radius=0.0596), wavelength=0.123)
     motion = BernoulliVonMises(sigma_doa=np.deg2rad(2.0))
     places = packets(folder)
-    for name, specified in (
-        ("svalse", "3.6, 89 %; 0.63"),
-        ("valse", "3.6, 90 %; 0.77"),
-        ("cbf", "3.6, 90 %; 0.77"),
-    ):
+    figures = "3.6, 89 %; 0.63", "3.6, 90 %; 0.77", "3.6, 90 %; 0.77"
+    for name, specified in zip(METHODS, figures, strict=True):
         errors, scatter = [], []
         for place in places:
             for beacon, z in place.snapshots.items():
@@ -323,7 +318,7 @@ def mixtures(
         w = rng.standard_normal((n_steps, N, n, 2)) @ np.array([1, 1j]) / np.sqrt(2)
         w = np.where(np.isnan(truth)[:, None], 0, w)
         z = (single * w[:, :, None]).sum(axis=-1)[:, 0 if N == 1 else slice(None)]
-        runs = [_ble_tracker(name, model, motion).run(z) for name in ("svalse", "valse", "cbf")]
+        runs = [_ble_tracker(name, model, motion).run(z) for name in METHODS]
         totals.append(
             [mean_gospa(truth, np.rad2deg(r.doa), c=20.0, period=360.0).total for r in runs]
         )
