@@ -10,22 +10,25 @@ if TYPE_CHECKING:
 else:
 
     class property_or_field:  # noqa: N801  (a decorator)
-        """An abstract property that a dataclass derived from it may declare as a field.
+        """A property that a class derived from it may declare as a field of a dataclass.
 
         A dataclass takes an inherited class attribute for the default of a field. This one hides
-        from classes that annotate its name, so that their field has no default; every other
-        subclass must define the property.
+        from classes that annotate its name. All others must define it if it is abstract.
         """
 
-        __isabstractmethod__ = True
-
         def __init__(self, function):
-            self.__name__, self.__doc__ = function.__name__, function.__doc__
+            self.function, self.__name__, self.__doc__ = (
+                function,
+                function.__name__,
+                function.__doc__,
+            )
+            self.__isabstractmethod__ = getattr(function, "__isabstractmethod__", False)
 
         def __get__(self, instance, owner):
-            name, cls = self.__name__, owner.__name__
-            if instance is not None:
-                raise AttributeError(f"{cls} declares {name}, but has no value of it")
-            if any(name in inspect.get_annotations(base) for base in owner.__mro__):
-                raise AttributeError(f"{name} is a field of {cls}")
-            return self
+            if instance is None:
+                if any(self.__name__ in inspect.get_annotations(base) for base in owner.__mro__):
+                    raise AttributeError(f"{self.__name__} is a field of {owner.__name__}")
+                return self
+            if self.__isabstractmethod__:
+                raise AttributeError(f"{owner.__name__} declares {self.__name__} without a value")
+            return self.function(instance)
