@@ -305,11 +305,7 @@ def test_function_measurement_runs_in_a_filter_with_named_entries() -> None:
         (lambda: FunctionMotion(turning, Q=np.eye(3)).f(np.ones(3)), ValueError, r"f\(x, dt\)"),
         (lambda: FunctionMeasurement(None, R=1.0), TypeError, "h must be a function"),  # type: ignore[arg-type]
         (lambda: FunctionMeasurement(range_of, R=-1.0), ValueError, "R must have no negative"),
-        (
-            lambda: FunctionMeasurement(range_of, R=np.eye(2)).h([1.0, 2.0]),
-            ValueError,
-            r"h\(x\) must",
-        ),
+        (lambda: FunctionMeasurement(range_of, R=np.eye(2)).h([1, 2]), ValueError, r"h\(x\) must"),
         (lambda: CombinedMeasurement(BEARINGS, 3), TypeError, "second must be a Measurement"),  # type: ignore[arg-type]
         (lambda: DirectionAmplitudeWalk(3, 0.1), TypeError, "direction must be a VonMisesWalk"),  # type: ignore[arg-type]
         (lambda: DirectionAmplitudeWalk(VonMisesWalk(9.0), -1), ValueError, "amplitude_noise must"),

@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 from scipy.stats import multivariate_normal
 
-from arrivals.measurement_models import ArraySnapshot, SensorArray, UniformLineManifold, composite
+from arrivals.measurement_models import ArraySnapshot, SensorArray, composite
 from arrivals.measurement_models.manifolds.manifold import Reference
+from arrivals.measurement_models.manifolds.uniform_line import UniformLineManifold
 from arrivals.typing import Complex, Float
 
 LINE = SensorArray.ula(6, 0.5, missing=[1])

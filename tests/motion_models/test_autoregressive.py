@@ -11,13 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import solve_discrete_lyapunov, solve_toeplitz
 
-from arrivals.motion_models import (
-    AutoregressiveSources,
-    autocovariance,
-    partial_autocorrelation,
-    select_order,
-    yule_walker,
-)
+from arrivals.motion_models import AutoregressiveSources, select_order, yule_walker
+from arrivals.motion_models.ar_estimation import autocovariance, partial_autocorrelation
 from arrivals.motion_models.companion_form import companion_layout, pole_radius, stabilised
 from arrivals.typing import Float
 

@@ -14,9 +14,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from arrivals.measurement_models import SensorArray, direction, steering_vector
+from arrivals.measurement_models import SensorArray, steering_vector
 from arrivals.measurement_models.arrays.files import from_description
-from arrivals.measurement_models.arrays.sensor_array import grid_spacing
+from arrivals.measurement_models.arrays.sensor_array import direction, grid_spacing
 from arrivals.typing import Float
 
 angles = st.floats(-np.pi, np.pi)

@@ -14,11 +14,11 @@ from arrivals.measurement_models import (
     InterpolationDelay,
     Phasor,
     SensorArray,
-    SourceCorrelation,
     Tones,
 )
 from arrivals.measurement_models.delays.delay_line import SourceAtCentre
 from arrivals.measurement_models.delays.interpolation import window
+from arrivals.measurement_models.delays.source_correlation import SourceCorrelation
 from arrivals.motion_models import (
     CombinedMotion,
     ConstantVelocity,

@@ -10,15 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.special import logsumexp
 
-from arrivals.measurement_models import (
-    ArraySnapshot,
-    ElementResponse,
-    FourierManifold,
-    SensorArray,
-    UniformLineManifold,
-)
+from arrivals.measurement_models import ArraySnapshot, ElementResponse, SensorArray
 from arrivals.measurement_models.arrays.plane_waves import PlaneWaves
-from arrivals.measurement_models.manifolds.fourier import fourier_manifold
+from arrivals.measurement_models.manifolds.fourier import FourierManifold, fourier_manifold
+from arrivals.measurement_models.manifolds.uniform_line import UniformLineManifold
 from arrivals.typing import Complex, Float
 
 CIRCLE = SensorArray.uca(8, radius=0.65)

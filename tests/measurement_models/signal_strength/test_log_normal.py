@@ -11,18 +11,14 @@ from scipy.differentiate import jacobian
 from scipy.special import logsumexp
 from scipy.stats import chi, norm
 
-from arrivals.measurement_models import (
-    LogNormalRSS,
-    db_to_neper,
-    dbm_to_neper,
-    doppler_log_gain,
+from arrivals.measurement_models import LogNormalRSS, db_to_neper, dbm_to_neper, neper_to_db
+from arrivals.measurement_models.signal_strength.decibels import neper_to_dbm, watt_to_neper
+from arrivals.measurement_models.signal_strength.envelope import (
     envelope_moments,
     log_envelope_moments,
-    neper_to_db,
-    neper_to_dbm,
-    watt_to_neper,
+    sample_log_envelope,
 )
-from arrivals.measurement_models.signal_strength.envelope import sample_log_envelope
+from arrivals.measurement_models.signal_strength.path_loss import doppler_log_gain
 from arrivals.motion_models import CombinedMotion, ConstantVelocity, LinearMotion, RandomWalk
 from arrivals.trackers import EKF, UKF, Particle
 from arrivals.typing import Float

@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from arrivals.measurement_models import ArraySnapshot, LinearMeasurement, SensorArray
-from arrivals.motion_models import ConstantVelocity, RandomWalk, VonMisesWalk, log_density
+from arrivals.motion_models import ConstantVelocity, RandomWalk, VonMisesWalk
+from arrivals.motion_models.von_mises import log_density
 from arrivals.trackers import Kalman, Particle
 from arrivals.trackers.conformance import difference
 from arrivals.trackers.gaussian.particle import systematic_resample

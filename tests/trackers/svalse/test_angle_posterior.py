@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from arrivals.motion_models import bessel_ratios
+from arrivals.motion_models.bessel import bessel_ratios
 from arrivals.trackers.svalse.coordinate import angle_posterior as ap
 from arrivals.typing import Complex
 
