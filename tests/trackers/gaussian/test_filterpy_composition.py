@@ -310,7 +310,7 @@ def test_d11_filterpys_filters_inside_our_imm() -> None:
             bank.predict()
             bank.update(z)
         assert_twins(mixed, right, 1e-9, "x P mu log_likelihood")
-    with pytest.raises(ValueError, match=r"dt must be 1 for .*, which has a step length of its own"):
+    with pytest.raises(ValueError, match=r"dt must be 1 for .*, which has a step length"):
         mixed.predict(dt=0.5)
 
 
