@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
+from inspect import get_annotations
 from typing import Any
 
 import numpy as np
@@ -33,6 +35,22 @@ def check_models(motion: Any, measurement: Any) -> tuple[MotionModel, Measuremen
     motion = instance("motion", motion, MotionModel)  # type: ignore[type-abstract]  # no call
     measurement = instance("measurement", measurement, MeasurementModel)  # type: ignore[type-abstract]
     return motion, measurement.for_state(motion.state_names)
+
+
+@cache
+def overrides(kind: type, base: type, name: str) -> bool:
+    """Return True if a class, or one between it and its base, defines a member of the base.
+
+    Cached, so that a step of a filter need not call a member that has its default.
+
+    Examples
+    --------
+    >>> from arrivals.motion_models import RandomWalk, VonMisesWalk
+    >>> [overrides(kind, MotionModel, "angles") for kind in (RandomWalk, VonMisesWalk)]
+    [False, True]
+    """
+    between = kind.__mro__[: kind.__mro__.index(base)]
+    return any(name in vars(each) or name in get_annotations(each) for each in between)
 
 
 def belief_arrays(x: ArrayLike, P: ArrayLike, n: int) -> tuple[Float, Float]:

@@ -19,6 +19,7 @@ from arrivals.trackers.gaussian.arguments import (
     covariance_matrix,
     matrix_with_columns,
     measurement_and_mask,
+    overrides,
 )
 from arrivals.trackers.gaussian.circular import wrapped
 from arrivals.trackers.gaussian.equations import GaussianUpdate, likelihood
@@ -170,8 +171,8 @@ class GaussianFilter(Tracker):
         """Return z - z_pred, 0 where missing: the model's residual, a difference if `plain`."""
         if missing is not None:
             z = np.where(missing, z_pred, z)
-        if plain or type(self.measurement).residual is MeasurementModel.residual:
-            return z - z_pred  # without a call: a model that has no residual of its own
+        if plain or not overrides(type(self.measurement), MeasurementModel, "residual"):
+            return z - z_pred
         return self.measurement.residual(z, z_pred)
 
     def belief(self) -> tuple[Float, Float]:
@@ -243,9 +244,7 @@ class GaussianFilter(Tracker):
     def state_angles(self) -> tuple[int, ...]:
         """Entries of the state that are angles."""
         motion = self.state_motion
-        if type(motion).angles is MotionModel.angles:
-            return ()  # without a call: a model that names no angles
-        return motion.angles
+        return motion.angles if overrides(type(motion), MotionModel, "angles") else ()
 
     @property
     def dim_x(self) -> int:

@@ -1,4 +1,4 @@
-"""States some of whose entries are angles: differences, sums and means on the circle."""
+"""Differences, sums and moments of states some of whose entries are angles."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Angles = tuple[int, ...]
 
 
 def wrapped(x: Float, angles: Angles) -> Float:
-    """Return states (..., n) with the entries that are angles brought into [-π, π).
+    """Return states (..., n) with their angles in [-π, π).
 
     Examples
     --------
@@ -27,7 +27,7 @@ def wrapped(x: Float, angles: Angles) -> Float:
 
 
 def difference(x1: Float, x2: Float, angles: Angles = ()) -> Float:
-    """Return x1 - x2 of states (..., n), angles the shorter way round.
+    """Return x1 - x2 of states (..., n), angles in [-π, π).
 
     Examples
     --------
@@ -49,7 +49,7 @@ def add(x: Float, step: Float, angles: Angles = ()) -> Float:
 
 
 def mean(points: Float, weights: Float, angles: Angles = ()) -> Float:
-    """Return the mean of points (..., m, n) in the tangent space at the first of them.
+    """Return the mean of points (..., m, n), by differences from the first of them.
 
     Examples
     --------
@@ -62,7 +62,7 @@ def mean(points: Float, weights: Float, angles: Angles = ()) -> Float:
 
 
 def circular_mean(points: Float, weights: Float, angles: Angles = ()) -> Float:
-    """Return the mean of points (m, n), of angles the direction of their mean vector.
+    """Return the mean of points (m, n); for angles, the direction of their mean vector.
 
     Examples
     --------
@@ -76,13 +76,49 @@ def circular_mean(points: Float, weights: Float, angles: Angles = ()) -> Float:
     return centre
 
 
-def spread(steps: Float, weights: Float) -> Float:
-    """Return Σ w d dᵀ of steps d (..., m, n) from a mean.
+def weighted_covariance(steps: Float, weights: Float) -> Float:
+    """Return Σ w d dᵀ of differences d (..., m, n) from a mean.
 
     Examples
     --------
-    >>> spread(np.array([[1.0], [-1.0]]), np.array([0.5, 0.5]))
+    >>> weighted_covariance(np.array([[1.0], [-1.0]]), np.array([0.5, 0.5]))
     array([[1.]])
     """
     dot = multiplication(steps)
     return dot(transposed(weights[..., :, None] * steps), steps)
+
+
+def mixture(
+    means: Float, covariances: Float, weights: Float, angles: Angles = ()
+) -> tuple[Float, Float]:
+    """Return means and covariances of Gaussian mixtures of the same m components.
+
+    x = Σ wᵢ xᵢ, P = Σ wᵢ (Pᵢ + (xᵢ-x)(xᵢ-x)ᵀ), by differences from the component of most weight.
+
+    Parameters
+    ----------
+    means : ndarray, shape (m, n)
+    covariances : ndarray, shape (m, n, n)
+    weights : ndarray, shape (..., m)
+        Weights of each mixture.
+    angles : tuple of int
+        Entries that are angles.
+
+    Returns
+    -------
+    means, covariances : ndarray, shapes (..., n), (..., n, n)
+
+    Examples
+    --------
+    >>> x, P = mixture(np.array([[3.0], [-3.0]]), np.ones((2, 1, 1)), np.array([0.5, 0.5]), (0,))
+    >>> x.round(4), P.round(4)
+    (array([-3.1416]), array([[1.02]]))
+    """
+    m, n = means.shape
+    heaviest = weights.reshape(-1, m).sum(axis=0).argmax() if angles else 0
+    origin = means[heaviest]
+    steps = difference(means, origin, angles)
+    shift = weights.dot(steps)
+    within = weights.dot(covariances.reshape(m, n * n)).reshape(*shift.shape, n)
+    between = weighted_covariance(steps - shift[..., None, :], weights)
+    return add(origin, shift, angles), within + between

@@ -1,11 +1,11 @@
-"""Interacting multiple models: several filters, and the probability that each is right."""
+"""Interacting multiple models: filters of one state, and the probabilities of their models."""
 
 from __future__ import annotations
 
 import copy
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Protocol, Self, cast, runtime_checkable
 
 import numpy as np
@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from arrivals.trackers.base import Tracker, is_missing
 from arrivals.trackers.estimates import StateEstimate
 from arrivals.trackers.gaussian.base import GaussianFilter
-from arrivals.trackers.gaussian.circular import Angles, add, difference, spread
+from arrivals.trackers.gaussian.circular import Angles, mixture
 from arrivals.trackers.gaussian.equations import likelihood
 from arrivals.trackers.registry import register
 from arrivals.typing import Float
@@ -25,7 +25,21 @@ TINY = sys.float_info.min
 
 @runtime_checkable
 class Filter(Protocol):
-    """What can serve inside an `IMM`: trackers of ours, filters of filterpy, and one's own."""
+    """Protocol of the filters of an `IMM`: trackers, filters of filterpy, or a user's own.
+
+    Attributes
+    ----------
+    x, P : array_like
+        Mean (n,) or (n, 1), and covariance (n, n); both can be assigned.
+    likelihood : float
+        Likelihood of the last measurement.
+
+    Examples
+    --------
+    >>> from filterpy.kalman import KalmanFilter
+    >>> isinstance(KalmanFilter(dim_x=2, dim_z=1), Filter), isinstance("filter", Filter)
+    (True, False)
+    """
 
     x: Any
     P: Any
@@ -35,68 +49,69 @@ class Filter(Protocol):
         """Likelihood of the last measurement."""
 
     def predict(self, u: Any = None) -> Any:
-        """Move the belief; the first argument is the control input."""
+        """Predict the belief; the first argument is the control input."""
 
     def update(self, z: Any) -> Any:
-        """Correct the belief."""
+        """Update the belief by a measurement."""
 
 
 @register("imm")
 class IMM(Tracker):
-    """The interacting-multiple-model filter, over any filters with the same state.
+    """Interacting-multiple-model filter, over any filters of the same state.
 
     Parameters
     ----------
     filters : sequence of Filter
-        At least two; the tracker moves them. Their states have the same entries.
+        At least two; `predict` and `update` change them. Their states have the same entries.
     mu : array_like, shape (n_filters,)
-        Probability of each at first; brought to sum 1.
+        Initial probabilities of the models; they are normalized to sum 1.
     M : array_like, shape (n_filters, n_filters)
-        Probabilities to go from model i (row) to model j in a step.
+        Transition probabilities from model i (row) to model j in one step.
     angles : tuple of int, optional
-        Entries of the state that are angles; those that the members' motion models name if None.
+        Entries of the state that are angles; None for those of the filters' motion models.
 
     Attributes
     ----------
     mu : ndarray, shape (n_filters,)
-        Probabilities of the models: predicted ones after `predict`.
+        Probabilities of the models; predicted ones after `predict`.
     cbar, omega : ndarray, shapes (n_filters,), (n_filters, n_filters)
         Predicted and mixing probabilities of the last `predict`.
     x_prior, P_prior, x_post, P_post : ndarray
-        The mixed belief after the last `predict` and the last `update`.
+        Mixture's belief after the last `predict` and after the last `update`.
     likelihood : ndarray, shape (n_filters,)
-        Of the last measurement, by model.
+        Likelihoods of the last measurement by the models.
     log_likelihood : float
-        Of the last measurement, by the mixture.
+        Log likelihood of the last measurement by the mixture.
 
     Raises
     ------
     TypeError
-        If a member lacks one of x, P, likelihood, predict, update.
+        If a filter lacks one of x, P, likelihood, predict, update.
     ValueError
-        If sizes differ, or `mu` or a row of `M` are no probabilities.
+        If sizes differ, or `mu` or a row of `M` does not hold probabilities.
 
     Notes
     -----
-    Attributes are called as in `filterpy.kalman.IMMEstimator`, and after each update the numbers
-    are the same, with these exceptions: angles are averaged on the circle; models are weighed in
-    the log domain; a missed measurement leaves the predicted probabilities as they are; a second
-    update without a `predict` is no second transition. After `predict`, `x` and `P` are mixed by
-    the predicted probabilities, where filterpy takes those before the step.
+    Attributes have the names of `filterpy.kalman.IMMEstimator`, and after each update the numbers
+    are equal, with these exceptions: angles are averaged on the circle; probabilities are computed
+    in the log domain; a missing measurement does not change the predicted probabilities; a second
+    update without a `predict` does not apply the transition again. After `predict`, `x` and `P`
+    are combined by the predicted probabilities; filterpy takes those before the step.
 
     References
     ----------
     Blom and Bar-Shalom, "The interacting multiple model algorithm for systems with Markovian
-    switching coefficients", IEEE TAC 33(8), 1988.
+    switching coefficients", IEEE TAC 33(8), 1988; equation numbers of Bar-Shalom, Li, Kirubarajan,
+    *Estimation with Applications to Tracking and Navigation*, 2001, sec. 11.6.6.
 
     Examples
     --------
     >>> from arrivals.measurement_models import LinearMeasurement
     >>> from arrivals.motion_models import RandomWalk
     >>> from arrivals.trackers.gaussian.kalman import Kalman
-    >>> seen = LinearMeasurement([[1.0]], [[0.01]])
-    >>> calm, wild = (Kalman(RandomWalk(q, 1), seen, [0.0], [[1.0]]) for q in (1e-4, 1.0))
-    >>> tracker = IMM([calm, wild], mu=[0.5, 0.5], M=[[0.95, 0.05], [0.05, 0.95]])
+    >>> position = LinearMeasurement([[1.0]], [[0.01]])
+    >>> slow, fast = (Kalman(RandomWalk(q, 1), position, [0.0], [[1.0]]) for q in (1e-4, 1.0))
+    >>> tracker = IMM([slow, fast], mu=[0.5, 0.5], M=[[0.95, 0.05], [0.05, 0.95]])
     >>> _ = tracker.run([[0.0], [0.0], [0.1]])
     >>> bool(tracker.mu[0] > 0.7)
     True
@@ -113,58 +128,66 @@ class IMM(Tracker):
         angles: Angles | None = None,
     ) -> None:
         self.filters, self.N = filters, len(filters)
-        _check_members(filters)
+        _check_filters(filters)
         self.mu = _probabilities("mu", shaped("mu", mu, self.N))
         self.M = _probabilities("M", shaped("M", M, self.N, self.N))
         self.angles = angles
         self.omega, self.cbar = np.zeros((self.N, self.N)), self.mu @ self.M
         self.likelihood = np.ones(self.N)
         self.log_likelihood = 0.0
-        self._combine()
+        self.combine()
         self.x_prior, self.P_prior = self.x.copy(), self.P.copy()
         self.x_post, self.P_post = self.x.copy(), self.P.copy()
 
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
-        """Mix the members' beliefs, each by the odds of having come from there, and move them.
+        """Mix the beliefs of the filters, and predict each from its mixed belief.
 
-        `dt` goes to our trackers; filterpy's filters know the length of their own step.
+        Parameters
+        ----------
+        u : array_like, optional
+            Control input.
+        dt : float
+            Length of the step, for the filters of this library; those of filterpy have their own.
         """
+        # c_j = Σ_i M_ij mu_i   (11.6.6-8)
         cbar = self.mu.dot(self.M)
+        # omega_ij = M_ij mu_i / c_j   (11.6.6-7)
         omega = self.M * self.mu[:, None] / np.maximum(cbar, TINY)
-        x, P = mixture(*self._members(), omega.T, self._circular())
-        before = [dict(vars(member)) for member in self.filters]
-        try:
-            for i, member in enumerate(self.filters):
-                _hold(member, x[i], P[i])
-                _predict(member, u, dt)
-        except Exception:
-            _restore(self.filters, before)
-            raise
-        self.mu = self.cbar = cbar
-        self.omega = omega
-        self._combine()
+        # x0_j = Σ_i omega_ij x_i,  P0_j = Σ_i omega_ij (P_i + (x_i - x0_j)(x_i - x0_j)')
+        x0, P0 = mixture(*self._beliefs(), omega.T, self.state_angles)  # (11.6.6-9), (11.6.6-10)
+
+        def predict_member(j: int, member: Filter) -> None:
+            _set_belief(member, x0[j], P0[j])
+            _predict(member, u, dt)
+
+        _for_all(self.filters, predict_member)
+        self.mu, self.cbar, self.omega = cbar, cbar, omega
+        self.combine()
         self.x_prior, self.P_prior = self.x.copy(), self.P.copy()
 
     def update(self, z: ArrayLike | None) -> None:
-        """Correct each member, and weigh it by how well it foretold the measurement."""
-        gap = is_missing(z)
-        before = [dict(vars(member)) for member in self.filters]
-        try:
-            for member in self.filters:
-                member.update(None if gap else z)
-        except Exception:
-            _restore(self.filters, before)
-            raise
-        if gap:
+        """Update each filter, and its probability by the likelihood of the measurement.
+
+        Parameters
+        ----------
+        z : array_like
+            Measurement; None or NaN where it is missing.
+        """
+        if is_missing(z):
+            _for_all(self.filters, lambda j, member: member.update(None))
             self.likelihood, self.log_likelihood = np.ones(self.N), 0.0
         else:
-            self._weigh()
+            _for_all(self.filters, lambda j, member: member.update(z))
+            self.update_probabilities()
+            self.combine()
         self.x_post, self.P_post = self.x.copy(), self.P.copy()
 
-    def _weigh(self) -> None:
-        """Set μ ∝ c̄ Λ, in the log domain."""
+    def update_probabilities(self) -> None:
+        """Set the probabilities of the models to c_j Λ_j / Σ c Λ, in the log domain."""
+        # Λ_j = N(y_j; 0, S_j)   (11.6.6-11)
         logs = [_log_likelihood(member) for member in self.filters]
         priors = [math.log(p) if p > 0 else -math.inf for p in self.mu.tolist()]
+        # mu_j = c_j Λ_j / c,  c = Σ_j c_j Λ_j   (11.6.6-14), (11.6.6-15)
         odds = [log + prior for log, prior in zip(logs, priors, strict=True)]
         top = max(odds)
         weights = [math.exp(each - top) for each in odds]
@@ -172,18 +195,21 @@ class IMM(Tracker):
         self.mu = np.array([weight / total for weight in weights])
         self.log_likelihood = top + math.log(total)
         self.likelihood = np.array([likelihood(log) for log in logs])
-        self._combine()
 
-    def _combine(self) -> None:
-        x, P = mixture(*self._members(), self.mu, self._circular())
+    def combine(self) -> None:
+        """Set mean and covariance to those of the mixture of the filters."""
+        # x = Σ mu_j x_j,  P = Σ mu_j (P_j + (x_j - x)(x_j - x)')   (11.6.6-16), (11.6.6-17)
+        x, P = mixture(*self._beliefs(), self.mu, self.state_angles)
         self.x, self.P = x.reshape(np.shape(self.filters[0].x)), P
 
-    def _members(self) -> tuple[Float, Float]:
+    def _beliefs(self) -> tuple[Float, Float]:
         means = np.array([member.x for member in self.filters], dtype=np.float64)
         covariances = np.array([member.P for member in self.filters], dtype=np.float64)
         return means.reshape(self.N, -1), covariances
 
-    def _circular(self) -> Angles:
+    @property
+    def state_angles(self) -> Angles:
+        """Entries of the state that are angles: `angles`, or those of the filters' motions."""
         if self.angles is not None:
             return self.angles
         motions = [getattr(member, "motion", None) for member in self.filters]
@@ -195,72 +221,49 @@ class IMM(Tracker):
         return StateEstimate(self.x.ravel(), self.P)
 
     def __sklearn_clone__(self) -> Self:
-        return copy.deepcopy(self)  # the members' beliefs are among its parameters
+        return copy.deepcopy(self)  # the filters' beliefs are among its parameters
 
 
-def mixture(
-    means: Float, covariances: Float, weights: Float, angles: Angles = ()
-) -> tuple[Float, Float]:
-    """Return means and covariances of Gaussian mixtures of the same m parts.
-
-    x = Σ wᵢ xᵢ, P = Σ wᵢ (Pᵢ + (xᵢ-x)(xᵢ-x)ᵀ), in the tangent space at the part that weighs most.
-
-    Parameters
-    ----------
-    means : ndarray, shape (m, n)
-    covariances : ndarray, shape (m, n, n)
-    weights : ndarray, shape (..., m)
-        Of each mixture.
-    angles : tuple of int
-        Entries that are angles.
-
-    Returns
-    -------
-    means, covariances : ndarray, shapes (..., n), (..., n, n)
-
-    Examples
-    --------
-    >>> x, P = mixture(np.array([[3.0], [-3.0]]), np.ones((2, 1, 1)), np.array([0.5, 0.5]), (0,))
-    >>> x.round(4), P.round(4)
-    (array([-3.1416]), array([[1.02]]))
-    """
-    m, n = means.shape
-    heaviest = weights.reshape(-1, m).sum(axis=0).argmax() if angles else 0
-    origin = means[heaviest]
-    steps = difference(means, origin, angles)
-    shift = weights.dot(steps)
-    within = weights.dot(covariances.reshape(m, n * n)).reshape(*shift.shape, n)
-    between = spread(steps - shift[..., None, :], weights)
-    return add(origin, shift, angles), within + between
-
-
-def _check_members(filters: Sequence[Filter]) -> None:
+def _check_filters(filters: Sequence[Filter]) -> None:
     if len(filters) < 2:
-        raise ValueError(f"filters must hold two filters at least; got {len(filters)}")
+        raise ValueError(f"filters must have at least two entries; got {len(filters)}")
     for member in filters:
         if not isinstance(member, Filter):
-            wanted = ("x", "P", "predict", "update", "likelihood")
-            lacks = [name for name in wanted if not hasattr(member, name)]
+            names = ("x", "P", "predict", "update", "likelihood")
+            missing = [name for name in names if not hasattr(member, name)]
             raise TypeError(
-                f"a member must have x, P, predict(u), update(z), likelihood; "
-                f"{type(member).__name__} lacks {', '.join(lacks)}"
+                "filters must have x, P, predict(u), update(z), likelihood; "
+                f"got {type(member).__name__} without {', '.join(missing)}"
             )
     shapes = [np.shape(member.x) for member in filters]
     if len(set(shapes)) != 1:
-        raise ValueError(f"the members' x must have one shape; got {shapes}")
+        raise ValueError(f"filters must have x of one shape; got {shapes}")
 
 
 def _probabilities(name: str, values: Float) -> Float:
-    """Return values whose last axis is brought to sum 1, those that do untouched."""
+    """Return values normalized along the last axis, unchanged where their sum is 1."""
     totals = values.sum(axis=-1, keepdims=True)
     if not ((values >= 0).all() and (totals > 0).all()):
         raise ValueError(f"{name} must hold probabilities; got {values.tolist()}")
     if name == "M" and np.abs(totals - 1).max() > 1e-6:
-        raise ValueError(f"the rows of M must have sum 1; got {totals.ravel().tolist()}")
+        raise ValueError(f"M must have rows of sum 1; got {totals.ravel().tolist()}")
     return values if np.abs(totals - 1).max() < 1e-12 else values / totals
 
 
-def _hold(member: Filter, x: Float, P: Float) -> None:
+def _for_all(filters: Sequence[Filter], step: Callable[[int, Filter], object]) -> None:
+    """Call a step of all filters; where one raises, all have their attributes of before."""
+    before = [dict(vars(member)) for member in filters]
+    try:
+        for j, member in enumerate(filters):
+            step(j, member)
+    except Exception:
+        for member, attributes in zip(filters, before, strict=True):
+            vars(member).clear()
+            vars(member).update(attributes)
+        raise
+
+
+def _set_belief(member: Filter, x: Float, P: Float) -> None:
     if isinstance(member, GaussianFilter):
         member.set_belief(x, P)  # without the checks of a belief that a user assigned
     else:
@@ -271,7 +274,8 @@ def _predict(member: Filter, u: ArrayLike | None, dt: float) -> None:
     if isinstance(member, Tracker):
         member.predict(u, dt=dt)
     elif dt != 1:
-        raise ValueError(f"{type(member).__name__} keeps the length of its own step; got dt={dt}")
+        name = type(member).__name__
+        raise ValueError(f"dt must be 1 for {name}, which has a step length of its own; got {dt}")
     elif u is None:
         member.predict()
     else:
@@ -285,9 +289,3 @@ def _log_likelihood(member: Filter) -> float:
 
 def _angles(motion: object) -> Angles:
     return cast(Angles, getattr(motion, "angles", ()))
-
-
-def _restore(members: Sequence[Filter], before: list[dict[str, Any]]) -> None:
-    for member, attributes in zip(members, before, strict=True):
-        vars(member).clear()
-        vars(member).update(attributes)

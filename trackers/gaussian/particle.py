@@ -10,7 +10,12 @@ from arrivals.motion_models.base import MotionModel, gaussian
 from arrivals.trackers.base import Tracker, is_missing
 from arrivals.trackers.estimates import StateEstimate
 from arrivals.trackers.gaussian.arguments import measurement_vector
-from arrivals.trackers.gaussian.circular import circular_mean, difference, spread, wrapped
+from arrivals.trackers.gaussian.circular import (
+    circular_mean,
+    difference,
+    weighted_covariance,
+    wrapped,
+)
 from arrivals.trackers.gaussian.equations import LOG_2PI, likelihood
 from arrivals.trackers.gaussian.linalg import cholesky
 from arrivals.trackers.registry import register
@@ -208,7 +213,7 @@ class Particle(Tracker):
         angles = self.motion.angles
         self.particles, self.weights = particles, weights
         self.x = self._x = circular_mean(particles, weights, angles)
-        self.P = self._P = spread(difference(particles, self.x, angles), weights)
+        self.P = self._P = weighted_covariance(difference(particles, self.x, angles), weights)
 
     @property
     def likelihood(self) -> float:

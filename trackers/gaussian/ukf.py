@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from arrivals.measurement_models.base import MeasurementModel
 from arrivals.motion_models.base import MotionModel
 from arrivals.trackers.gaussian.base import GaussianFilter
-from arrivals.trackers.gaussian.circular import difference, spread, wrapped
+from arrivals.trackers.gaussian.circular import difference, weighted_covariance, wrapped
 from arrivals.trackers.gaussian.linalg import apply, cholesky
 from arrivals.trackers.gaussian.linearization import Linearization
 from arrivals.trackers.registry import register
@@ -132,7 +132,7 @@ class UKF(GaussianFilter):
         rest = moved - shift[..., None, :]
         cross = (covariance[:, None] * steps).swapaxes(-1, -2) @ rest
         jacobian = np.asarray(np.linalg.solve(P, cross), np.float64).swapaxes(-1, -2)
-        extra_noise = spread(rest, covariance) - jacobian @ cross
+        extra_noise = weighted_covariance(rest, covariance) - jacobian @ cross
         return Linearization(middle[..., 0, :] + shift, jacobian, extra_noise, jittered)
 
     @staticmethod

@@ -315,7 +315,7 @@ BAD_PARTS: list[tuple[Any, type[Exception], str]] = [
     (lambda: Kalman(VonMisesWalk(9.0), ANGLE, [0.0], [[1.0]]), TypeError, "motion must be linear"),
     (lambda: UKF(WALK, SEEN, X, P, alpha=0.0), ValueError, "alpha must be finite and positive"),
     (lambda: UKF(WALK, SEEN, X, P, kappa=-2.0), ValueError, "kappa must be above -2"),
-    (lambda: IMM([], [], []), ValueError, "two filters at least; got 0"),
+    (lambda: IMM([], [], []), ValueError, "filters must have at least two entries; got 0"),
 ]
 
 

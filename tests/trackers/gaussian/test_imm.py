@@ -1,4 +1,4 @@
-"""The IMM: laws of mixtures, and what it does with faulty members."""
+"""IMM: laws of mixtures, angles, and filters that raise."""
 
 import copy
 from typing import Any
@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from arrivals.measurement_models import LinearMeasurement
-from arrivals.motion_models import ConstantVelocity, RandomWalk, VonMisesWalk
+from arrivals.motion_models import CombinedMotion, ConstantVelocity, RandomWalk, VonMisesWalk
 from arrivals.trackers import EKF, IMM, UKF, Kalman, Particle, create
 from arrivals.trackers.conformance import difference
-from arrivals.trackers.gaussian.imm import mixture
+from arrivals.trackers.gaussian.circular import mixture
 
 SEEN = LinearMeasurement([[1.0]], [[0.04]])
 M = np.array([[0.9, 0.1], [0.2, 0.8]])
@@ -46,6 +46,21 @@ def test_turning_a_mixture_turns_its_mean(turn: float, weight: float) -> None:
     )
     assert np.cos(y[0] - x[0] - turn) == pytest.approx(1.0)
     np.testing.assert_allclose(P, V, atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", [EKF, UKF])
+@pytest.mark.parametrize("turned", [False, True])
+def test_imm_over_a_combined_circular_state_averages_on_the_circle(kind: Any, turned: bool) -> None:
+    walks = RandomWalk(0.1, 1), VonMisesWalk(50.0)
+    motion, angle = CombinedMotion(*walks[::-1] if turned else walks), 0 if turned else 1
+    position = LinearMeasurement(np.eye(2), np.eye(2))
+    x = np.zeros(2)
+    x[angle] = np.pi - 0.05
+    members = [kind(motion, position, sign * x, np.eye(2)) for sign in (1, -1)]
+    bank = IMM(members, [0.5, 0.5], np.full((2, 2), 0.5))
+    assert abs(bank.x[angle]) == pytest.approx(np.pi)
+    bank.predict()
+    assert abs(bank.x[angle]) == pytest.approx(np.pi)
 
 
 def test_equal_members_are_one_filter() -> None:
@@ -143,17 +158,25 @@ def test_a_member_that_fails_leaves_all_as_they_were(call: str) -> None:
 @pytest.mark.parametrize(
     ("changes", "error", "message"),
     [
-        ({"filters": [member(1.0)], "mu": [1.0], "M": [[1.0]]}, ValueError, "two filters"),
-        ({"filters": [member(1.0), "text"]}, TypeError, "str lacks x, P, predict, update, like"),
+        (
+            {"filters": [member(1.0)], "mu": [1.0], "M": [[1.0]]},
+            ValueError,
+            "filters must have at least two entries; got 1",
+        ),
+        (
+            {"filters": [member(1.0), "text"]},
+            TypeError,
+            "got str without x, P, predict, update, likelihood",
+        ),
         ({"mu": [0.5]}, ValueError, r"mu must have shape \(2,\); got \(1,\)"),
         ({"mu": [-0.5, 1.5]}, ValueError, "mu must hold probabilities"),
         ({"mu": [0.0, 0.0]}, ValueError, "mu must hold probabilities"),
         ({"M": np.eye(3)}, ValueError, r"M must have shape \(2, 2\)"),
-        ({"M": np.ones((2, 2))}, ValueError, r"the rows of M must have sum 1; got \[2.0, 2.0\]"),
+        ({"M": np.ones((2, 2))}, ValueError, r"M must have rows of sum 1; got \[2.0, 2.0\]"),
         (
             {"filters": [member(1.0), Kalman(RandomWalk(1.0, 1), SEEN, [[0.0]], [[1.0]])]},
             ValueError,
-            r"the members' x must have one shape; got \[\(1,\), \(1, 1\)\]",
+            r"filters must have x of one shape; got \[\(1,\), \(1, 1\)\]",
         ),
     ],
 )
