@@ -22,16 +22,7 @@ from arrivals.trackers import SVALSE
 from arrivals.trackers.svalse.components import ComponentPosterior, ComponentPrior
 from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver, SingleSnapshotAscent
 from arrivals.trackers.svalse.newton.candidates import LOG_2PI
-from arrivals.trackers.svalse.newton.elbo import (
-    KL_CONSTANT,
-    MU,
-    N_FACTS,
-    ODDS,
-    PRIOR_KAPPA,
-    PRIOR_MU,
-    S,
-    evaluate,
-)  # fmt: skip
+from arrivals.trackers.svalse.newton.elbo import Components, evaluate  # fmt: skip
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
 from arrivals.trackers.svalse.newton.solver import NewtonSolver
 from arrivals.trackers.svalse.newton.state import log_odds
@@ -93,22 +84,22 @@ def divergence(c: Complex, prior: complex) -> float:
 def bound(y: Complex, manifold: Manifold, known: ComponentPrior, fit: ComponentPosterior) -> float:
     """Return the ELBO of a fast fit, F, from its angles and variances."""
     on = np.flatnonzero(fit.active)
-    facts = np.zeros((1, N_FACTS, max(len(on), 1)))
-    facts[:, KL_CONSTANT] = LOG_2PI
-    facts[0, ODDS] = log_odds(np.array(known.birth))
+    components = Components.zeros(1, max(len(on), 1))
+    components.kl_constant[:] = LOG_2PI
+    components.log_odds[0] = log_odds(np.array(known.birth))
     n = len(known.mu)
     old = on < n
-    facts[0, MU, : len(on)] = fit.theta[on]
-    facts[0, S, : len(on)] = -2 * np.log(fit.resultant[on])
-    facts[0, PRIOR_MU, : len(on)][old] = known.mu[on[old]]
-    facts[0, PRIOR_KAPPA, : len(on)][old] = known.kappa[on[old]]
-    facts[0, KL_CONSTANT, : len(on)][old] += log_i0(known.kappa[on[old]])
-    facts[0, ODDS, : len(on)][old] = log_odds(known.existence[on[old]])
+    components.mu[0, : len(on)] = fit.theta[on]
+    components.variance[0, : len(on)] = -2 * np.log(fit.resultant[on])
+    components.prior_mu[0, : len(on)][old] = known.mu[on[old]]
+    components.prior_kappa[0, : len(on)][old] = known.kappa[on[old]]
+    components.kl_constant[0, : len(on)][old] += log_i0(known.kappa[on[old]])
+    components.log_odds[0, : len(on)][old] = log_odds(known.existence[on[old]])
     power = float(np.vdot(y, y).real) / len(y)
     nu, tau = np.array([[fit.noise / power]]), np.array([[fit.power / power]])
     Y = (y / np.sqrt(power))[None, None, :, None]
     state = evaluate(
-        ExpectedResponse(manifold), Y, facts, np.array([len(on)]), nu, tau, np.zeros(1)
+        ExpectedResponse(manifold), Y, components, np.array([len(on)]), nu, tau, np.zeros(1)
     )
     return float(state.F[0] - len(y) * np.log(power))
 

@@ -23,9 +23,9 @@ from arrivals.measurement_models import ArraySnapshot
 from arrivals.scenarios import create
 from arrivals.trackers import SVALSE, Tracker
 from arrivals.trackers.svalse.newton.candidates import LOG_2PI
-from arrivals.trackers.svalse.newton.elbo import KL_CONSTANT, MU, N_FACTS, S, evaluate
+from arrivals.trackers.svalse.newton.elbo import Components, evaluate
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
-from arrivals.trackers.svalse.newton.step import ascend
+from arrivals.trackers.svalse.newton.step import newton_step
 from arrivals.typing import Complex, Float
 
 
@@ -148,18 +148,20 @@ def calls() -> None:
     """Array calls of one Newton step, six components, without and with learning the noise."""
     model, z, truth = draw("svalse_fig4", range(1, 2))
     manifold, y = model.manifold(), z[0, :1]
-    facts = np.zeros((1, N_FACTS, 6))
-    facts[0, MU] = manifold.from_doa(truth[0])
-    facts[0, S], facts[0, KL_CONSTANT] = 1e-3, LOG_2PI
+    components = Components.zeros(1, 6)
+    components.mu[0] = manifold.from_doa(truth[0])
+    components.variance[0], components.kl_constant[0] = 1e-3, LOG_2PI
     given: list[Any] = [
-        (y / np.sqrt((np.abs(y) ** 2).mean()))[:, None, :, None], facts, np.array([6]),
+        (y / np.sqrt((np.abs(y) ** 2).mean()))[:, None, :, None], components, np.array([6]),
         np.full((1, 1), 0.01), np.full((1, 1), 0.2), np.zeros(1),
     ]  # fmt: skip
     response = ExpectedResponse(manifold)
-    state = evaluate(response, *[array.view(Counted) for array in given])
+    counted: list[Any] = [Components(each.packed.view(Counted)) if isinstance(each, Components)
+               else each.view(Counted) for each in given]  # fmt: skip
+    state = evaluate(response, *counted)
     for learn in (False, True):
         Counted.calls = 0
-        ascend(response, state, np.array([learn]))
+        newton_step(response, state, np.array([learn]))
         what = f"array calls of a Newton step {'with' if learn else 'without'} ν and τ"
         row(what, f"{Counted.calls}", "", None)
 

@@ -4,21 +4,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models import ArraySnapshot, SensorArray
-from arrivals.trackers.svalse.components import ComponentPrior
-from arrivals.trackers.svalse.newton.elbo import (
-    KL_CONSTANT,
-    MU,
-    N_FACTS,
-    ODDS,
-    PRIOR_KAPPA,
-    PRIOR_MU,
-    Evaluation,
-    S,
-    evaluate,
-)
+from arrivals.motion_models.bessel import log_i0
+from arrivals.trackers.svalse.components import ComponentPosterior, ComponentPrior
+from arrivals.trackers.svalse.newton.elbo import Components, Evaluation, evaluate
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
+from arrivals.trackers.svalse.newton.state import log_odds
 from arrivals.trackers.svalse.svalse import SVALSE
-from arrivals.typing import Complex, Float
+from arrivals.typing import Complex
 
 MODEL = ArraySnapshot(SensorArray.ula(15, spacing=0.5), wavelength=1.0)
 
@@ -39,18 +31,38 @@ def scene(seed: int, model: ArraySnapshot = MODEL, K: int = 5) -> Evaluation:
     rng = np.random.default_rng(seed)
     doa = np.linspace(-1.1, 1.0, K) + rng.uniform(-0.1, 0.1, K)
     y = model.replace(noise=K / 100).simulate(doa, np.exp(2j * np.pi * rng.random(K)), rng)
-    facts = np.zeros((1, N_FACTS, K))
-    facts[0, MU] = model.manifold().from_doa(doa) + 0.03 * rng.standard_normal(K)
-    facts[0, S] = rng.uniform(5e-4, 3e-3, K)
-    facts[0, PRIOR_MU] = facts[0, MU] + 0.1
-    facts[0, PRIOR_KAPPA] = np.where(np.arange(K) % 2, 120.0, 0.0)
-    facts[0, KL_CONSTANT] = np.log(2 * np.pi * np.i0(facts[0, PRIOR_KAPPA]))
-    facts[0, ODDS] = np.where(np.arange(K) % 2, np.log(3.0), -2.2)
-    return with_facts(ExpectedResponse(model.manifold()), unit(y)[None, None, :, None], facts)
+    components = Components.zeros(1, K)
+    components.mu[0] = model.manifold().from_doa(doa) + 0.03 * rng.standard_normal(K)
+    components.variance[0] = rng.uniform(5e-4, 3e-3, K)
+    components.prior_mu[0] = components.mu[0] + 0.1
+    components.prior_kappa[0] = np.where(np.arange(K) % 2, 120.0, 0.0)
+    components.kl_constant[0] = np.log(2 * np.pi * np.i0(components.prior_kappa[0]))
+    components.log_odds[0] = np.where(np.arange(K) % 2, np.log(3.0), -2.2)
+    response = ExpectedResponse(model.manifold())
+    return evaluation_of(response, unit(y)[None, None, :, None], components)
 
 
-def with_facts(
-    response: ExpectedResponse, y: Complex, facts: Float, nu: float = 0.01, tau: float = 0.2
+def evaluation_of(
+    response: ExpectedResponse,
+    y: Complex,
+    components: Components,
+    nu: float = 0.01,
 ) -> Evaluation:
-    K = np.array([facts.shape[2]])
-    return evaluate(response, y, facts, K, np.array([[nu]]), np.array([[tau]]), np.zeros(1))
+    K = np.array([components.mu.shape[1]])
+    return evaluate(response, y, components, K, np.array([[nu]]), np.array([[0.2]]), np.zeros(1))
+
+
+def active_components(prior: ComponentPrior, posterior: ComponentPosterior) -> Components:
+    """Return the active components of a posterior, one at least, with their priors."""
+    on = np.flatnonzero(posterior.active)
+    components = Components.zeros(1, max(len(on), 1))
+    components.kl_constant[:] = np.log(2 * np.pi)
+    components.log_odds[:] = log_odds(np.array(prior.birth))
+    components.mu[0, : len(on)] = posterior.theta[on]
+    components.variance[0, : len(on)] = -2 * np.log(posterior.resultant[on])
+    for i, k in enumerate(on):
+        if k < len(prior.mu):
+            components.prior_mu[0, i], components.prior_kappa[0, i] = prior.mu[k], prior.kappa[k]
+            components.kl_constant[0, i] += log_i0(prior.kappa[k])
+            components.log_odds[0, i] = log_odds(prior.existence[k])
+    return components

@@ -39,7 +39,7 @@ def power_floor(floor: float | None, n_looks: int) -> float:
     return 0.0 if n_looks == 1 else 3.0
 
 
-def first_noise(y: Complex, places: Int, snr_db: float | None) -> float:
+def initial_noise(y: Complex, places: Int, snr_db: float | None) -> float:
     """Start ν from an expected signal-to-noise ratio; or from the small eigenvalues of the lags.
 
     Parameters
@@ -60,7 +60,7 @@ def first_noise(y: Complex, places: Int, snr_db: float | None) -> float:
     return max(float(smallest.mean()), NOISE_FLOOR * power / M)
 
 
-def quiet_noise(Y: Complex) -> Float:
+def noise_from_eigenvalues(Y: Complex) -> Float:
     """Return the noise of each bin, (n_bins,), by the smaller half of its covariance's eigenvalues.
 
     Divided by what noise alone would leave there if the larger half were sources.
@@ -74,7 +74,7 @@ def quiet_noise(Y: Complex) -> Float:
     --------
     >>> rng = np.random.default_rng(0)
     >>> noise = rng.standard_normal((1, 8, 1000, 2)) @ np.array([1, 1j]) / np.sqrt(2)
-    >>> quiet_noise(noise + 10 * rng.standard_normal(1000)).round(1)
+    >>> noise_from_eigenvalues(noise + 10 * rng.standard_normal(1000)).round(1)
     array([0.9])
     """
     M, N = Y.shape[1:]

@@ -7,36 +7,26 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from newton_states import MODEL, scene, with_facts
+from newton_states import MODEL, evaluation_of, scene
 
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.measurement_models.manifolds.uniform_line import UniformLineManifold
-from arrivals.trackers.svalse.components import ComponentPrior
+from arrivals.trackers.svalse.components import MERGE_DISTANCE, ComponentPrior
 from arrivals.trackers.svalse.newton.candidates import (
-    Grid,
-    births,
-    evidence,
+    CandidateGrid,
+    RemovedComponents,
+    add_candidates,
+    grid_evidence,
     removal_gains,
-    without,
 )
-from arrivals.trackers.svalse.newton.elbo import (
-    MU,
-    N_FACTS,
-    ODDS,
-    PLACE,
-    PRIOR_KAPPA,
-    PRIOR_MU,
-    Evaluation,
-    S,
-    evaluate,
-)
+from arrivals.trackers.svalse.newton.elbo import Components, Evaluation, evaluate
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
 from arrivals.trackers.svalse.newton.solver import NewtonSolver
 from arrivals.trackers.svalse.newton.step import (
-    ascend,
-    learned,
     negative_hessian,
+    newton_step,
     slopes,
+    update_variances,
     weights,
 )
 from arrivals.typing import Complex
@@ -46,16 +36,16 @@ NONE = np.zeros(1, dtype=np.bool_)
 
 
 def shifted(
-    state: Evaluation, row: int, k: int, by: float, response: ExpectedResponse
+    state: Evaluation, name: str, k: int, by: float, response: ExpectedResponse
 ) -> Evaluation:
-    facts = state.facts.copy()
-    facts[0, row, k] += by
-    return with_facts(response, state.Y, facts, state.nu[0, 0], state.tau[0, 0])
+    components = state.components.copy()
+    getattr(components, name)[0, k] += by
+    return evaluation_of(response, state.Y, components, state.nu[0, 0])
 
 
-def slope_of(state: Evaluation, row: int, k: int, h: float, response: ExpectedResponse) -> float:
+def slope_of(state: Evaluation, name: str, k: int, h: float, response: ExpectedResponse) -> float:
     """∂F by differences of the fourth order."""
-    at = {n: shifted(state, row, k, n * h, response).F[0] for n in (-2, -1, 1, 2)}
+    at = {n: shifted(state, name, k, n * h, response).F[0] for n in (-2, -1, 1, 2)}
     return float((at[-2] - 8 * at[-1] + 8 * at[1] - at[2]) / (12 * h))
 
 
@@ -67,12 +57,12 @@ def slope_of(state: Evaluation, row: int, k: int, h: float, response: ExpectedRe
 def test_gradients_are_slopes(seed: int, model: ArraySnapshot) -> None:
     state, response = scene(seed, model), ExpectedResponse(model.manifold())
     g, curvature = slopes(response, state, *weights(state))
-    of_s = 0.5 / state.facts[0, S] - 0.5 * curvature[0]
+    of_s = 0.5 / state.components.variance[0] - 0.5 * curvature[0]
     for k in range(5):
-        s = float(state.facts[0, S, k])
+        s = float(state.components.variance[0, k])
         along_mu, along_s = (
-            slope_of(state, MU, k, 1e-4, response),
-            slope_of(state, S, k, 0.01 * s, response),
+            slope_of(state, "mu", k, 1e-4, response),
+            slope_of(state, "variance", k, 0.01 * s, response),
         )
         assert g[0, k] == pytest.approx(along_mu, abs=1e-7 * np.abs(g).max())
         assert of_s[k] == pytest.approx(along_s, abs=1e-7 * np.abs(of_s).max())
@@ -83,12 +73,12 @@ def test_hessian_is_the_slope_of_the_gradient_to_a_hundredth(model: ArraySnapsho
     """At 20 dB; the term left out is a thousandth."""
     state, response = scene(0, model), ExpectedResponse(model.manifold())
     for _ in range(5):
-        state = ascend(response, state, NONE)
+        state = newton_step(response, state, NONE)
     v, P = weights(state)
     N = negative_hessian(response, state, P, slopes(response, state, v, P)[1])
     np.testing.assert_allclose(N, N.swapaxes(1, 2), atol=1e-9 * np.abs(N).max())
     for k in range(5):
-        ends = [shifted(state, MU, k, h, response) for h in (1e-6, -1e-6)]
+        ends = [shifted(state, "mu", k, h, response) for h in (1e-6, -1e-6)]
         up, down = (slopes(response, end, *weights(end))[0][0] for end in ends)
         np.testing.assert_allclose(N[0, :, k], (down - up) / 2e-6, atol=0.01 * np.abs(N).max())
 
@@ -106,7 +96,7 @@ def written_out(state: Evaluation, w: Complex, C: Complex) -> float:
     likelihood = -M * np.log(np.pi * nu) - (misfit + np.trace(J @ C).real) / nu
     amplitudes = -K * np.log(np.pi * tau) - (np.vdot(w, w).real + C.trace().real) / tau
     entropy = K * np.log(np.pi * np.e) + np.linalg.slogdet(C)[1]
-    angles = (state.facts[0, ODDS] - state.D[0]).sum()
+    angles = (state.components.log_odds[0] - state.D[0]).sum()
     return float(likelihood + amplitudes + entropy + angles)
 
 
@@ -125,7 +115,7 @@ def test_the_objective_is_the_bound_at_its_best_amplitudes(seed: int) -> None:
 def test_divergence_is_that_of_a_normal_from_a_von_mises_density() -> None:
     state = scene(3)
     for k in range(5):
-        mu, s, prior, kappa = state.facts[0, [MU, S, PRIOR_MU, PRIOR_KAPPA], k]
+        mu, s, prior, kappa = state.components.packed[0, :4, k]
         theta = mu + np.linspace(-1, 1, 200_001)
         log_q = -((theta - mu) ** 2) / (2 * s) - 0.5 * np.log(2 * np.pi * s)
         log_p = kappa * np.cos(theta - prior) - np.log(2 * np.pi * np.i0(kappa))
@@ -138,12 +128,12 @@ def test_divergence_is_that_of_a_normal_from_a_von_mises_density() -> None:
 def test_the_objective_never_falls_in_a_newton_step(seed: int, learn: bool, nu: float) -> None:
     rng, response = np.random.default_rng(seed), ExpectedResponse(MODEL.manifold())
     state = scene(seed)
-    facts = state.facts.copy()
-    facts[0, MU] += 0.3 * rng.standard_normal(5)  # far from the top
-    state = with_facts(response, state.Y, facts, nu)
+    components = state.components.copy()
+    components.mu[0] += 0.3 * rng.standard_normal(5)  # far from the top
+    state = evaluation_of(response, state.Y, components, nu)
     F = [state.F[0]]
     for _ in range(15):
-        state = ascend(response, state, np.array([learn]))
+        state = newton_step(response, state, np.array([learn]))
         F.append(state.F[0])
     assert np.diff(F).min() > -1e-6
     assert F[-1] > F[0]
@@ -152,7 +142,7 @@ def test_the_objective_never_falls_in_a_newton_step(seed: int, learn: bool, nu: 
 def test_noise_and_power_end_at_the_fixed_points_of_em() -> None:
     state, response = scene(4), ExpectedResponse(MODEL.manifold())
     for _ in range(40):
-        state = ascend(response, state, np.ones(1, dtype=np.bool_))
+        state = newton_step(response, state, np.ones(1, dtype=np.bool_))
     A, w, M = state.A[0, 0], state.W[0, 0, :, 0], 15
     J = A.conj() @ A.T
     np.fill_diagonal(J, M)
@@ -160,7 +150,7 @@ def test_noise_and_power_end_at_the_fixed_points_of_em() -> None:
     misfit = M - 2 * np.vdot(A.conj() @ state.Y[0, 0, :, 0], w).real + np.vdot(w, J @ w).real
     assert state.nu[0, 0] == pytest.approx((misfit + np.trace(J @ C).real) / M, rel=0.02)  # (58)
     assert state.tau[0, 0] == pytest.approx((np.vdot(w, w) + C.trace()).real / 5, rel=1e-4)  # (59)
-    assert learned(response, state).F[0] == pytest.approx(state.F[0], abs=1e-4)
+    assert update_variances(response, state).F[0] == pytest.approx(state.F[0], abs=1e-4)
 
 
 # -- moves ------------------------------------------------------------------------------------
@@ -168,49 +158,51 @@ def test_noise_and_power_end_at_the_fixed_points_of_em() -> None:
 
 @settings(deadline=None, max_examples=15)
 @given(st.integers(0, 10**6), st.floats(0, 1))
-def test_a_removal_changes_the_criterion_by_exactly_its_gain(seed: int, kl: float) -> None:
+def test_a_removal_changes_the_criterion_by_exactly_its_gain(seed: int, kl_weight: float) -> None:
     state, response = scene(seed), ExpectedResponse(MODEL.manifold())
-    gains = removal_gains(ExpectedResponse(MODEL.manifold()), state, kl)[0]
+    gains = removal_gains(ExpectedResponse(MODEL.manifold()), state, kl_weight)[0]
     for k in range(5):
-        facts = without(state.facts, np.array([k]))[:, :, :4]
-        rest = with_facts(response, state.Y, facts, state.nu[0, 0], state.tau[0, 0])
-        change = rest.criterion(kl) - state.criterion(kl)
+        components = state.components.without(np.array([k])).first(4)
+        rest = evaluation_of(response, state.Y, components, state.nu[0, 0])
+        change = rest.criterion(kl_weight) - state.criterion(kl_weight)
         assert change[0] == pytest.approx(gains[k], abs=1e-7)
 
 
 def test_an_addition_changes_the_evidence_by_exactly_its_gain() -> None:
     state, response = scene(0), ExpectedResponse(MODEL.manifold())
-    grid = Grid(response, 8, merge=0.0)
-    gain = evidence(grid, state)[0][0]
+    grid = CandidateGrid(response, 8, merge=0.0)
+    gain = grid_evidence(grid, state)[0][0]
     for g in (3, 40, 77):
-        new = np.zeros((1, N_FACTS, 1))
-        new[0, [MU, S], 0] = grid.theta[g], 1e-14  # a point
-        facts = np.concatenate([state.facts, new], axis=2)
-        more = with_facts(response, state.Y, facts, state.nu[0, 0], state.tau[0, 0])
+        new = Components.zeros(1, 1)
+        new.mu[0], new.variance[0] = grid.theta[g], 1e-14  # a point
+        both = np.concatenate([state.components.packed, new.packed], axis=2)
+        more = evaluation_of(response, state.Y, Components(both))
         assert more.criterion(0.0)[0] - state.criterion(0.0)[0] == pytest.approx(gain[g], abs=1e-6)
 
 
 def test_nothing_is_born_near_what_is_there_and_what_was_removed_comes_back() -> None:
     state, response = scene(0), ExpectedResponse(MODEL.manifold())
     for _ in range(5):
-        state = ascend(response, state, NONE)
-    facts = without(state.facts, np.array([3]))[:, :, :4]
-    rest = with_facts(response, state.Y, facts, state.nu[0, 0], state.tau[0, 0])
-    grid = Grid(response, 8, merge=np.deg2rad(1.5))
-    barred, room = np.zeros((1, len(grid.theta)), dtype=np.bool_), np.ones(1, dtype=np.int64)
-    memory = state.facts.copy()
-    memory[0, PLACE] = np.arange(5)
+        state = newton_step(response, state, NONE)
+    components = state.components.without(np.array([3])).first(4)
+    rest = evaluation_of(response, state.Y, components, state.nu[0, 0])
+    grid = CandidateGrid(response, 8, merge=np.deg2rad(1.5))
+    excluded, room = np.zeros((1, len(grid.theta)), dtype=np.bool_), np.ones(1, dtype=np.int64)
+    memory = state.components.with_slots(np.arange(5))
     gone = np.array([[False, False, False, True, False]])
     odds = np.array([-2.2])
-    fresh = births(grid, rest, odds, memory, gone & False, barred, room, 0.5)
-    back = births(grid, rest, odds, memory, gone, barred, room, 0.5)
+    forgotten = RemovedComponents(memory, gone & False, excluded)
+    fresh = add_candidates(grid, rest, odds, forgotten, room, 0.5)
+    back = add_candidates(grid, rest, odds, RemovedComponents(memory, gone, excluded), room, 0.5)
     assert fresh.n[0] == back.n[0] == 1
-    assert fresh.facts[0, PLACE, 0] == -1
-    assert back.facts[0, PLACE, 0] == 3  # its odds are better
-    assert back.facts[0, MU, 0] == pytest.approx(state.facts[0, MU, 3], abs=0.1)
-    barred[:] = grid.near(grid.manifold.to_doa(state.facts[0, MU, 3]))
-    elsewhere = births(grid, rest, odds, memory, gone, barred, room, 0.5)
-    doa = grid.manifold.to_doa([elsewhere.facts[0, MU, 0], state.facts[0, MU, 3]])
+    assert fresh.components.slot[0, 0] == -1
+    assert back.components.slot[0, 0] == 3  # its odds are better
+    assert back.components.mu[0, 0] == pytest.approx(state.components.mu[0, 3], abs=0.1)
+    excluded[:] = grid.near(grid.manifold.to_doa(state.components.mu[0, 3]))
+    elsewhere = add_candidates(
+        grid, rest, odds, RemovedComponents(memory, gone, excluded), room, 0.5
+    )
+    doa = grid.manifold.to_doa([elsewhere.components.mu[0, 0], state.components.mu[0, 3]])
     assert elsewhere.n[0] == 0 or abs(doa[0] - doa[1]) >= np.deg2rad(1.5)
 
 
@@ -219,20 +211,23 @@ def test_nothing_is_born_near_what_is_there_and_what_was_removed_comes_back() ->
 
 def test_unused_places_and_other_problems_make_no_difference() -> None:
     states = [scene(0, K=5), scene(1, K=3), scene(2, K=4)]
-    facts = np.zeros((3, N_FACTS, 6))
+    components = Components.zeros(3, 6)
     for i, state in enumerate(states):
-        facts[i, :, : state.facts.shape[2]] = state.facts[0]
+        packed = state.components.packed[0]
+        components.packed[i, :, : packed.shape[1]] = packed
     response, K = ExpectedResponse(MODEL.manifold()), np.array([5, 3, 4])
     y = np.concatenate([state.Y for state in states])
     nu, tau = np.full((3, 1), 0.01), np.full((3, 1), 0.2)
-    batch = evaluate(response, y, facts, K, nu, tau, np.zeros(3))
+    batch = evaluate(response, y, components, K, nu, tau, np.zeros(3))
     learn = np.array([True, False, True])
     for _ in range(4):
-        batch = ascend(response, batch, learn)
-        states = [ascend(response, state, learn[i : i + 1]) for i, state in enumerate(states)]
+        batch = newton_step(response, batch, learn)
+        states = [newton_step(response, state, learn[i : i + 1]) for i, state in enumerate(states)]
         for i, (state, k) in enumerate(zip(states, K, strict=True)):
             assert batch.F[i] == pytest.approx(state.F[0], abs=1e-9)
-            np.testing.assert_allclose(batch.facts[i, MU, :k], state.facts[0, MU], atol=1e-11)
+            np.testing.assert_allclose(
+                batch.components.mu[i, :k], state.components.mu[0], atol=1e-11
+            )
             np.testing.assert_allclose(batch.W[i, 0, :k], state.W[0, 0], atol=1e-10)
 
 
@@ -252,11 +247,13 @@ def test_a_response_with_coefficients_takes_the_same_steps() -> None:
     state = scene(0, GAPS)
     one, other = ExpectedResponse(line), ExpectedResponse(explicit)
     assert other.extent == pytest.approx(one.extent)
-    state2 = with_facts(other, state.Y, state.facts)
+    state2 = evaluation_of(other, state.Y, state.components)
     for _ in range(4):
-        state, state2 = ascend(one, state, NONE), ascend(other, state2, NONE)
-        np.testing.assert_allclose(state2.facts, state.facts, atol=1e-10)
-    np.testing.assert_allclose(Grid(other, 4, 0.0).slope2, Grid(one, 4, 0.0).slope2)
+        state, state2 = newton_step(one, state, NONE), newton_step(other, state2, NONE)
+        np.testing.assert_allclose(state2.components.packed, state.components.packed, atol=1e-10)
+    np.testing.assert_allclose(
+        CandidateGrid(other, 4, 0.0).slope2, CandidateGrid(one, 4, 0.0).slope2
+    )
 
 
 def test_extent_of_a_filled_line_is_its_number_of_sensors() -> None:
@@ -280,7 +277,8 @@ def test_snapshots_fitted_together_are_those_fitted_alone() -> None:
         age = np.arange(len(mu)) % 2
         known.append(ComponentPrior(mu, kappa, rho, 0.1, age, 15.0 + n) if n % 4 else None)
     Ys[5] = np.zeros((1, 15, 1), dtype=np.complex128)
-    engine, manifold = NewtonSolver(), MODEL.manifold()
+    engine = NewtonSolver(merge=MERGE_DISTANCE, snr_db=20.0)  # also without a prior
+    manifold = MODEL.manifold()
     together = engine.solve_batch(Ys, manifold, known)
     for Y, prediction, fit in zip(Ys, known, together, strict=True):
         alone = engine.solve(Y, manifold, prediction)

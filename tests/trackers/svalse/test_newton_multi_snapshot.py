@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from newton_states import MODEL, prior_of, with_facts
+from newton_states import MODEL, active_components, evaluation_of, prior_of
 from newton_states import scene as of_a_line
 
 from arrivals.measurement_models import ArraySnapshot, ElementResponse, SensorArray
@@ -18,29 +18,24 @@ from arrivals.trackers import SVALSE, VALSE
 from arrivals.trackers.svalse.components import MERGE_DISTANCE, ComponentPosterior, ComponentPrior
 from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver
 from arrivals.trackers.svalse.newton.candidates import (
-    Grid,
-    evidence,
-    nearest_later,
-    relearned,
+    CandidateGrid,
+    first_duplicate,
+    grid_evidence,
+    relearning_gains,
     removal_gains,
-    without,
 )
-from arrivals.trackers.svalse.newton.elbo import (
-    KL_CONSTANT,
-    MU,
-    N_FACTS,
-    ODDS,
-    PRIOR_KAPPA,
-    PRIOR_MU,
-    Evaluation,
-    S,
-    evaluate,
-)
+from arrivals.trackers.svalse.newton.elbo import Components, Evaluation, evaluate
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
-from arrivals.trackers.svalse.newton.solver import NewtonSolver, moves_on
-from arrivals.trackers.svalse.newton.state import Problem, log_odds
-from arrivals.trackers.svalse.newton.step import ascend, negative_hessian, slopes, weights
-from arrivals.trackers.svalse.noise_initialization import quiet_noise
+from arrivals.trackers.svalse.newton.solver import NewtonSolver, support_search
+from arrivals.trackers.svalse.newton.state import StepInput
+from arrivals.trackers.svalse.newton.step import (
+    negative_hessian,
+    newton_step,
+    slopes,
+    update_variances,
+    weights,
+)
+from arrivals.trackers.svalse.noise_initialization import noise_from_eigenvalues
 from arrivals.typing import Complex, Float
 
 CIRCLE = ArraySnapshot(SensorArray.uca(8, radius=0.65), wavelength=1.0)
@@ -66,34 +61,40 @@ def drawn(model: ArraySnapshot, seed: int, noise: float = 0.03) -> Complex:
 
 
 def scene(
-    model: ArraySnapshot, seed: int = 0, temper: float = 1.0
+    model: ArraySnapshot, seed: int = 0, tempering: float = 1.0
 ) -> tuple[ExpectedResponse, Evaluation]:
     """Components beside three sources, some of which have a prior."""
-    rng, response = np.random.default_rng(seed), ExpectedResponse(model.manifold(), temper)
-    facts = np.zeros((1, N_FACTS, 3))
-    facts[0, MU] = model.manifold().from_doa(DOA) + 0.02 * rng.standard_normal(3)
-    facts[0, S] = rng.uniform(5e-4, 3e-3, 3)
-    facts[0, PRIOR_MU] = facts[0, MU] + 0.1
-    facts[0, PRIOR_KAPPA] = 0.0, 120.0, 60.0
-    facts[0, KL_CONSTANT] = np.log(2 * np.pi) + log_i0(facts[0, PRIOR_KAPPA])
-    facts[0, ODDS] = -2.2, 1.1, 1.1
-    Y = Problem(drawn(model, seed), None, 3).Y[None]
+    rng, response = np.random.default_rng(seed), ExpectedResponse(model.manifold(), tempering)
+    components = Components.zeros(1, 3)
+    components.mu[0] = model.manifold().from_doa(DOA) + 0.02 * rng.standard_normal(3)
+    components.variance[0] = rng.uniform(5e-4, 3e-3, 3)
+    components.prior_mu[0] = components.mu[0] + 0.1
+    components.prior_kappa[0] = 0.0, 120.0, 60.0
+    components.kl_constant[0] = np.log(2 * np.pi) + log_i0(components.prior_kappa[0])
+    components.log_odds[0] = -2.2, 1.1, 1.1
+    Y = StepInput(drawn(model, seed), None, 3).Y[None]
     bins = np.ones((1, model.n_bins))
     nu, tau = 0.02 * bins * rng.uniform(0.5, 2, bins.shape), 0.3 * bins
-    return response, evaluate(response, Y, facts, np.array([3]), nu, tau, np.zeros(1))
+    return response, evaluate(response, Y, components, np.array([3]), nu, tau, np.zeros(1))
+
+
+def again(response: ExpectedResponse, state: Evaluation, components: Components) -> Evaluation:
+    """The evaluation with other components."""
+    e, K = state, np.array([components.mu.shape[1]])
+    return evaluate(response, e.Y, components, K, e.nu, e.tau, e.log_prior_inactive)
 
 
 def shifted(
-    response: ExpectedResponse, state: Evaluation, row: int, k: int, by: float
+    response: ExpectedResponse, state: Evaluation, name: str, k: int, by: float
 ) -> Evaluation:
-    facts = state.facts.copy()
-    facts[0, row, k] += by
-    return evaluate(response, state.Y, facts, state.K, state.nu, state.tau, state.rest)
+    components = state.components.copy()
+    getattr(components, name)[0, k] += by
+    return again(response, state, components)
 
 
-def slope_of(response: ExpectedResponse, state: Evaluation, row: int, k: int, h: float) -> float:
+def slope_of(response: ExpectedResponse, state: Evaluation, name: str, k: int, h: float) -> float:
     """∂F by differences of the fourth order."""
-    at = {n: shifted(response, state, row, k, n * h).F[0] for n in (-2, -1, 1, 2)}
+    at = {n: shifted(response, state, name, k, n * h).F[0] for n in (-2, -1, 1, 2)}
     return float((at[-2] - 8 * at[-1] + 8 * at[1] - at[2]) / (12 * h))
 
 
@@ -101,15 +102,15 @@ def slope_of(response: ExpectedResponse, state: Evaluation, row: int, k: int, h:
 
 
 @every_model
-@pytest.mark.parametrize("temper", [1.0, 3.0])
-def test_gradients_are_slopes(model: ArraySnapshot, temper: float) -> None:
-    response, state = scene(model, temper=temper)
+@pytest.mark.parametrize("tempering", [1.0, 3.0])
+def test_gradients_are_slopes(model: ArraySnapshot, tempering: float) -> None:
+    response, state = scene(model, tempering=tempering)
     g, curvature = slopes(response, state, *weights(state))
-    of_s = 0.5 / state.facts[0, S] - 0.5 * curvature[0]
+    of_s = 0.5 / state.components.variance[0] - 0.5 * curvature[0]
     for k in range(3):
-        s = float(state.facts[0, S, k])
-        along_mu = slope_of(response, state, MU, k, 5e-5)
-        along_s = slope_of(response, state, S, k, 0.01 * s)
+        s = float(state.components.variance[0, k])
+        along_mu = slope_of(response, state, "mu", k, 5e-5)
+        along_s = slope_of(response, state, "variance", k, 0.01 * s)
         assert g[0, k] == pytest.approx(along_mu, abs=1e-6 * np.abs(g).max())
         assert of_s[k] == pytest.approx(along_s, abs=1e-6 * np.abs(of_s).max())
 
@@ -118,12 +119,12 @@ def test_gradients_are_slopes(model: ArraySnapshot, temper: float) -> None:
 def test_hessian_is_the_slope_of_the_gradient_to_a_hundredth(model: ArraySnapshot) -> None:
     response, state = scene(model)
     for _ in range(8):
-        state = ascend(response, state, np.zeros(1, dtype=np.bool_))
+        state = newton_step(response, state, np.zeros(1, dtype=np.bool_))
     v, P = weights(state)
     N = negative_hessian(response, state, P, slopes(response, state, v, P)[1])
     np.testing.assert_allclose(N, N.swapaxes(1, 2), atol=1e-9 * np.abs(N).max())
     for k in range(3):
-        ends = [shifted(response, state, MU, k, h) for h in (1e-6, -1e-6)]
+        ends = [shifted(response, state, "mu", k, h) for h in (1e-6, -1e-6)]
         up, down = (slopes(response, end, *weights(end))[0][0] for end in ends)
         np.testing.assert_allclose(N[0, :, k], (down - up) / 2e-6, atol=0.01 * np.abs(N).max())
 
@@ -142,11 +143,11 @@ def test_mean_responses_and_their_norms_are_those_of_a_dense_sum() -> None:
 
 @every_model
 def test_a_removal_changes_the_criterion_by_exactly_its_gain(model: ArraySnapshot) -> None:
-    response, state = scene(model, temper=2.0)
+    response, state = scene(model, tempering=2.0)
     gains = removal_gains(response, state, 0.5)[0]
     for k in range(3):
-        facts = without(state.facts, np.array([k]))[:, :, :2]
-        rest = evaluate(response, state.Y, facts, np.array([2]), state.nu, state.tau, state.rest)
+        components = state.components.without(np.array([k])).first(2)
+        rest = again(response, state, components)
         change = rest.criterion(0.5) - state.criterion(0.5)
         assert change[0] == pytest.approx(gains[k], rel=1e-7, abs=1e-7)
 
@@ -154,13 +155,13 @@ def test_a_removal_changes_the_criterion_by_exactly_its_gain(model: ArraySnapsho
 @every_model
 def test_an_addition_changes_the_evidence_by_exactly_its_gain(model: ArraySnapshot) -> None:
     response, state = scene(model)
-    grid = Grid(response, 4, merge=0.0)
-    gain = evidence(grid, state)[0][0]
+    grid = CandidateGrid(response, 4, merge=0.0)
+    gain = grid_evidence(grid, state)[0][0]
     for g in (2, len(grid.theta) // 2 + 1):
-        new = np.zeros((1, N_FACTS, 1))
-        new[0, [MU, S], 0] = grid.theta[g], 1e-14  # a point
-        facts = np.concatenate([state.facts, new], axis=2)
-        more = evaluate(response, state.Y, facts, np.array([4]), state.nu, state.tau, state.rest)
+        new = Components.zeros(1, 1)
+        new.mu[0], new.variance[0] = grid.theta[g], 1e-14  # a point
+        both = np.concatenate([state.components.packed, new.packed], axis=2)
+        more = again(response, state, Components(both))
         change = more.criterion(0.0)[0] - state.criterion(0.0)[0]
         assert change == pytest.approx(gain[g], rel=1e-6, abs=1e-6)
 
@@ -168,7 +169,7 @@ def test_an_addition_changes_the_evidence_by_exactly_its_gain(model: ArraySnapsh
 def test_what_learning_the_noise_again_gives_back_is_never_negative() -> None:
     for seed in range(4):
         response, state = scene(LOOKS, seed)
-        assert (relearned(response, state) >= 0).all()
+        assert (relearning_gains(response, state) >= 0).all()
 
 
 @pytest.mark.parametrize(
@@ -184,10 +185,11 @@ def test_the_nearest_are_found_across_the_cut_and_in_the_mirror(
     model: ArraySnapshot, doa: list[float], nearest: int
 ) -> None:
     response, state = scene(model)
-    facts = state.facts.copy()
-    facts[0, MU] = doa
-    state = evaluate(response, state.Y, facts, state.K, state.nu, state.tau, state.rest)
-    assert nearest_later(Grid(response, 4, merge=np.deg2rad(1.5)), state).tolist() == [nearest]
+    components = state.components.copy()
+    components.mu[0] = doa
+    state = again(response, state, components)
+    grid = CandidateGrid(response, 4, merge=np.deg2rad(1.5))
+    assert first_duplicate(grid, state).tolist() == [nearest]
 
 
 # -- the objective ------------------------------------------------------------------------------
@@ -199,12 +201,12 @@ def test_the_objective_never_falls_in_a_newton_step(
     model: ArraySnapshot, seed: int, learn: bool
 ) -> None:
     response, state = scene(model, seed)
-    facts = state.facts.copy()
-    facts[0, MU] += 0.2 * np.random.default_rng(seed).standard_normal(3)  # far from the top
-    state = evaluate(response, state.Y, facts, state.K, state.nu, state.tau, state.rest)
+    components = state.components.copy()
+    components.mu[0] += 0.2 * np.random.default_rng(seed).standard_normal(3)  # far from the top
+    state = again(response, state, components)
     F = [state.F[0]]
     for _ in range(10):
-        state = ascend(response, state, np.array([learn]))
+        state = newton_step(response, state, np.array([learn]))
         F.append(state.F[0])
     assert np.diff(F).min() > -1e-6
     assert F[-1] > F[0]
@@ -214,41 +216,27 @@ def test_a_step_that_no_shorter_one_mends_takes_the_variances_along_gradually() 
     """Far from the top, the variances' fixed point alone made F fall: the step was refused."""
     rng, response = np.random.default_rng(70147), ExpectedResponse(MODEL.manifold())
     state = of_a_line(70147)
-    facts = state.facts.copy()
-    facts[0, MU] += 0.3 * rng.standard_normal(5)
-    state = with_facts(response, state.Y, facts, 0.003)
-    assert ascend(response, state, np.zeros(1, dtype=np.bool_)).F[0] > state.F[0] + 1
+    components = state.components.copy()
+    components.mu[0] += 0.3 * rng.standard_normal(5)
+    state = evaluation_of(response, state.Y, components, 0.003)
+    assert newton_step(response, state, np.zeros(1, dtype=np.bool_)).F[0] > state.F[0] + 1
 
 
 def wrapped_normal_bound(
-    manifold: Any, Y: Complex, known: ComponentPrior, fit: ComponentPosterior, kl: float
+    manifold: Any, Y: Complex, known: ComponentPrior, fit: ComponentPosterior, kl_weight: float
 ) -> float:
     """The criterion of a fit's angles as wrapped normals, amplitudes refreshed."""
     on = np.flatnonzero(fit.active)
-    facts = np.zeros((1, N_FACTS, max(len(on), 1)))
-    facts[:, KL_CONSTANT], facts[:, ODDS] = np.log(2 * np.pi), log_odds(np.array(known.birth))
-    facts[0, MU, : len(on)] = fit.theta[on]
-    facts[0, S, : len(on)] = -2 * np.log(fit.resultant[on])
-    for i, k in enumerate(on):
-        if k < len(known.mu):
-            facts[0, PRIOR_MU, i], facts[0, PRIOR_KAPPA, i] = known.mu[k], known.kappa[k]
-            facts[0, KL_CONSTANT, i] += log_i0(known.kappa[k])
-            facts[0, ODDS, i] = log_odds(known.existence[k])
-    problem = Problem(Y, None, 8)
+    components = active_components(known, fit)
+    problem = StepInput(Y, None, 8)
     assert fit.bin_noise is not None
-    response = moves_on(NewtonSolver(), manifold, Y.shape[2], MERGE_DISTANCE).response
+    response = support_search(NewtonSolver(), manifold, Y.shape[2], MERGE_DISTANCE).response
     nu, tau = fit.bin_noise / problem.power, np.full(len(Y), 0.3)
     K = np.array([len(on)])
-    state = evaluate(response, problem.Y[None], facts, K, nu[None], tau[None], np.zeros(1))
+    state = evaluate(response, problem.Y[None], components, K, nu[None], tau[None], np.zeros(1))
     for _ in range(30):  # the variances of the amplitudes and of the noise at their best
-        state = ascend_variances(response, state)
-    return float(state.criterion(kl)[0])
-
-
-def ascend_variances(response: ExpectedResponse, state: Evaluation) -> Evaluation:
-    from arrivals.trackers.svalse.newton.step import learned
-
-    return learned(response, state)
+        state = update_variances(response, state)
+    return float(state.criterion(kl_weight)[0])
 
 
 @pytest.mark.parametrize("numbers", [{"n_bins": 5}, {"n_snapshots": 5}], ids=["bins", "snapshots"])
@@ -293,7 +281,7 @@ def wrapped(angle: Float) -> Float:
 @pytest.mark.parametrize("model", [CIRCLE, LOOKS, ELEMENTS], ids=NAMES[:3])
 def test_a_circle_turned_by_some_of_its_births_turns_every_angle(model: ArraySnapshot) -> None:
     """By whole steps of the grid on which components are born; see the next for others."""
-    n = len(moves_on(NewtonSolver(), model.manifold(), 1, MERGE_DISTANCE).grid.theta)
+    n = len(support_search(NewtonSolver(), model.manifold(), 1, MERGE_DISTANCE).grid.theta)
     turn, doa = 2 * np.pi * 5 / n, np.array([[0.3, -2.0, 1.6]] * 4)
     other, z = turned(model, turn), heard(model, doa)
     a, b = SVALSE(model, SLOW).run(z), SVALSE(other, SLOW).run(z)
@@ -396,7 +384,7 @@ def test_noise_of_many_snapshots_is_that_of_the_small_eigenvalues() -> None:
     for noise in (0.01, 1.0):
         model = CIRCLE.replace(n_snapshots=400, noise=noise)
         Y = model.looks(model.simulate([0.3, -2.0], rng.standard_normal((400, 2)) + 0j, rng))
-        assert quiet_noise(Y)[0] == pytest.approx(noise, rel=0.3)
+        assert noise_from_eigenvalues(Y)[0] == pytest.approx(noise, rel=0.3)
 
 
 # -- figures, small versions of benchmarks/any_array.py -----------------------------------------
@@ -444,9 +432,9 @@ def test_what_is_made_of_an_array_is_made_once_for_each_set_of_sensors() -> None
         model = ArraySnapshot(array, 1.0, noise=0.01)
         z = model.simulate([0.3], np.ones((6, 1)), np.random.default_rng(0))
         z[:, 3] = np.nan
-        moves_on.cache_clear()
+        support_search.cache_clear()
         SVALSE(model).run(z)
-        assert moves_on.cache_info().misses == 1
+        assert support_search.cache_info().misses == 1
 
 
 @pytest.mark.parametrize("name", ["max_components", "power_floor", "max_snr_db"])

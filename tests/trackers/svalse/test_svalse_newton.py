@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from newton_states import prior_of
+from newton_states import active_components, prior_of
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models import ArraySnapshot, SensorArray
@@ -15,19 +15,9 @@ from arrivals.scenarios import Trial, create, mean_gospa
 from arrivals.trackers import SVALSE, VALSE, Run
 from arrivals.trackers.svalse.components import ComponentPosterior, ComponentPrior
 from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver
-from arrivals.trackers.svalse.newton.elbo import (
-    KL_CONSTANT,
-    MU,
-    N_FACTS,
-    ODDS,
-    PRIOR_KAPPA,
-    PRIOR_MU,
-    S,
-    evaluate,
-)
+from arrivals.trackers.svalse.newton.elbo import evaluate
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
 from arrivals.trackers.svalse.newton.solver import NewtonSolver
-from arrivals.trackers.svalse.newton.state import log_odds
 from arrivals.trackers.svalse.valse import detected
 from arrivals.typing import Complex, Float
 
@@ -167,25 +157,12 @@ def test_it_takes_a_tenth_of_coordinate_ascent_or_less() -> None:
 
 def bound(y: Complex, manifold: Any, known: ComponentPrior, fit: ComponentPosterior) -> float:
     """F of a fit's angles as wrapped normals, amplitudes refreshed."""
-    from arrivals.motion_models.bessel import log_i0
-
-    on = np.flatnonzero(fit.active)
-    old = on < len(known.mu)
-    facts = np.zeros((1, N_FACTS, len(on)))
-    facts[:, KL_CONSTANT], facts[:, ODDS] = np.log(2 * np.pi), log_odds(np.array(known.birth))
-    facts[0, MU], facts[0, S] = fit.theta[on], -2 * np.log(fit.resultant[on])
-    for row, values in (
-        (PRIOR_MU, known.mu),
-        (PRIOR_KAPPA, known.kappa),
-        (ODDS, log_odds(known.existence)),
-        (KL_CONSTANT, np.log(2 * np.pi) + log_i0(known.kappa)),
-    ):
-        facts[0, row, old] = values[on[old]]
+    components = active_components(known, fit)
     power = float(np.vdot(y, y).real) / len(y)
     nu, tau = np.array([[fit.noise]]) / power, np.array([[fit.power]]) / power
-    K = np.array([len(on)])
+    K = np.array([np.count_nonzero(fit.active)])
     z = y[None, None, :, None] / np.sqrt(power)
-    return float(evaluate(ExpectedResponse(manifold), z, facts, K, nu, tau, np.zeros(1)).F[0])
+    return float(evaluate(ExpectedResponse(manifold), z, components, K, nu, tau, np.zeros(1)).F[0])
 
 
 def test_the_bound_is_no_lower_than_that_of_coordinate_ascent() -> None:
@@ -305,17 +282,10 @@ def test_predicted_widths_are_those_of_a_step_in_direction() -> None:
 def test_share_of_the_divergence_trades_missed_for_false() -> None:
     draws = trials("svalse_scenario1", range(1, 4), 0.0, n_steps=30)
     data = [trial.measurements for trial in draws]
-    found = [
-        np.mean(
-            [
-                run.n_found.mean()
-                for run in SVALSE(LINE, ELECTRICAL, solver=NewtonSolver(kl_weight=kl)).run_batch(
-                    data
-                )
-            ]
-        )
-        for kl in (0.0, 0.5, 1.0)
-    ]
+    found = []
+    for kl_weight in (0.0, 0.5, 1.0):
+        tracker = SVALSE(LINE, ELECTRICAL, solver=NewtonSolver(kl_weight=kl_weight))
+        found.append(np.mean([run.n_found.mean() for run in tracker.run_batch(data)]))
     assert found[0] > found[1] > found[2]
 
 

@@ -32,7 +32,11 @@ from arrivals.trackers.svalse.coordinate.angle_posterior import (
 from arrivals.trackers.svalse.coordinate.multi_snapshot import MultiSnapshotAscent
 from arrivals.trackers.svalse.coordinate.single_snapshot import Amplitudes
 from arrivals.trackers.svalse.coordinate.support import InitialSupport
-from arrivals.trackers.svalse.noise_initialization import NOISE_FLOOR, autocorrelation, first_noise
+from arrivals.trackers.svalse.noise_initialization import (
+    NOISE_FLOOR,
+    autocorrelation,
+    initial_noise,
+)
 from arrivals.typing import Complex, Int
 from arrivals.validation import one_of
 
@@ -178,7 +182,7 @@ class SingleSnapshotAscent(Amplitudes):
         places = InitialSupport.of(prediction, L)
         known, n = places.known, places.n_carried
         power = float(np.vdot(y, y).real) / M
-        nu = first_noise(y, self.k, settings.initial_snr_db(prediction))
+        nu = initial_noise(y, self.k, settings.initial_snr_db(prediction))
         tau = max(power - nu, NOISE_FLOOR * power) / places.n_expected
         super().__init__(y, places.rho, nu, tau)
         self.begin(places)

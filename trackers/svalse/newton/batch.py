@@ -1,4 +1,4 @@
-"""Records of arrays with one leading axis in common: one row a problem, many solved at once."""
+"""Records of arrays with a common leading axis, one row a problem."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from numpy.typing import NDArray
 from arrivals.typing import Bool, Int
 
 
-def some(rows: Bool) -> bool:
-    """Tell whether any of some rows, (B,), is on: of few, a list is quicker than an array.
+def any_set(rows: Bool) -> bool:
+    """Return True if any of the rows, (B,), is set: for few, a list is faster than an array.
 
     Examples
     --------
-    >>> some(np.array([False, True])), every(np.array([False, True]))
+    >>> any_set(np.array([False, True])), all_set(np.array([False, True]))
     (True, False)
     """
     return True in rows.tolist()
 
 
-def every(rows: Bool) -> bool:
-    """Tell whether all rows, (B,), are on."""
+def all_set(rows: Bool) -> bool:
+    """Return True if all rows, (B,), are set."""
     return False not in rows.tolist()
 
 
@@ -31,46 +31,49 @@ def every(rows: Bool) -> bool:
 class BatchRecord:
     """A record whose fields are arrays, or such records, with the same leading axis.
 
-    Asked for all of its rows a record gives itself, not a copy, so that one problem alone costs
-    nothing: take rows, change them, put them back.
+    A selection of all rows is the record itself, not a copy, so that one problem alone has no
+    overhead: select rows, change them, replace them.
     """
 
     def __len__(self) -> int:
         return len(next(iter(vars(self).values())))
 
-    def take(self, rows: Bool) -> Self:
-        """Return some of the rows."""
-        if every(rows):
+    def select(self, rows: Bool) -> Self:
+        """Return the rows that are set."""
+        if all_set(rows):
             return self
-        return self._taken(np.flatnonzero(rows))
+        return self._at(np.flatnonzero(rows))
 
-    def _taken(self, of: Int) -> Self:
+    def _at(self, index: Int) -> Self:
         return type(self)(
             **{
-                name: part._taken(of) if isinstance(part, BatchRecord) else part.take(of, axis=0)
+                name: part._at(index) if isinstance(part, BatchRecord) else part.take(index, axis=0)
                 for name, part in vars(self).items()
             }
         )
 
-    def put(self, rows: Bool, other: Self) -> Self:
-        """Return the record with those rows replaced; what is too short is filled up with 0."""
-        return other if every(rows) else self._with(np.flatnonzero(rows), other)
+    def replace_rows(self, rows: Bool, other: Self) -> Self:
+        """Return the record with the set rows replaced; shorter arrays are filled up with 0."""
+        return other if all_set(rows) else self._replaced(np.flatnonzero(rows), other)
 
-    def _with(self, of: Int, other: Self) -> Self:
+    def _replaced(self, index: Int, other: Self) -> Self:
         return type(self)(
-            **{name: _put(part, of, getattr(other, name)) for name, part in vars(self).items()}
+            **{
+                name: _replaced(part, index, getattr(other, name))
+                for name, part in vars(self).items()
+            }
         )
 
 
-def _put(old: Any, of: Int, new: Any) -> Any:
+def _replaced(old: Any, index: Int, new: Any) -> Any:
     if isinstance(old, BatchRecord):
-        return old._with(of, new)
+        return old._replaced(index, new)
     if old.shape[1:] == new.shape[1:]:
         full = old.copy()
     else:
         shape = tuple(map(max, old.shape[1:], new.shape[1:]))
         full, new = enlarged(old, shape, copy=True), enlarged(new, shape)
-    full[of] = new
+    full[index] = new
     return full
 
 

@@ -1,14 +1,14 @@
-"""The ELBO of some looks as a smooth function of all their angles.
+"""The ELBO of the snapshots of a step as a smooth function of all their angles.
 
 The angles have wrapped normal densities; amplitudes and their covariance are eliminated in closed
 form. Arrays have a leading axis of independent problems, (B, ...), then, where it matters, one of
-F frequency bins, and places for L components of which the first K are in use. The looks of a bin
-are its N snapshots.
+F frequency bins, and slots for L components of which the first K are in use. A bin has N
+snapshots.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,14 +16,91 @@ from arrivals.trackers.svalse.newton.batch import BatchRecord
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse, diagonals
 from arrivals.typing import Bool, Complex, Float, Int
 
-# What is known of a component: rows of the arrays of components, (B, 7, L).
-MU, S = 0, 1  # mean and variance of its angle
-PRIOR_MU, PRIOR_KAPPA = 2, 3  # of the predicted von Mises density
-ODDS = 4  # prior log odds of being active
-KL_CONSTANT = 5  # ln 2π I₀(κ)
-PLACE = 6  # in the memory of the step; -1 while on trial
-N_FACTS = 7
+MU, VARIANCE, PRIOR_MU, PRIOR_KAPPA, LOG_ODDS, KL_CONSTANT, SLOT = range(7)
 LOG_2PIE = float(np.log(2 * np.pi * np.e))
+
+
+@dataclass(eq=False)
+class Components(BatchRecord):
+    """Components of each problem in one array; its properties are views of shape (B, L).
+
+    Attributes
+    ----------
+    packed : ndarray, shape (B, 7, L)
+        The quantities in the order of the properties.
+    """
+
+    packed: Float
+
+    @classmethod
+    def zeros(cls, n_problems: int, n_components: int) -> Components:
+        """Return components of which all is zero.
+
+        Examples
+        --------
+        >>> components = Components.zeros(1, 2)
+        >>> components.mu[0, 1] = 0.5
+        >>> components.mu
+        array([[0. , 0.5]])
+        """
+        return cls(np.zeros((n_problems, 7, n_components)))
+
+    @property
+    def mu(self) -> Float:
+        """Mean of the angle, rad."""
+        return self.packed[:, MU]
+
+    @property
+    def variance(self) -> Float:
+        """Variance of the angle, rad²."""
+        return self.packed[:, VARIANCE]
+
+    @property
+    def prior_mu(self) -> Float:
+        """Mean of the predicted von Mises density, rad."""
+        return self.packed[:, PRIOR_MU]
+
+    @property
+    def prior_kappa(self) -> Float:
+        """Concentration of the predicted von Mises density."""
+        return self.packed[:, PRIOR_KAPPA]
+
+    @property
+    def log_odds(self) -> Float:
+        """Prior log odds of being active."""
+        return self.packed[:, LOG_ODDS]
+
+    @property
+    def kl_constant(self) -> Float:
+        """Logarithm of 2π I₀(κ) of the predicted density."""
+        return self.packed[:, KL_CONSTANT]
+
+    @property
+    def slot(self) -> Int:
+        """Index in the memory of the step; -1 while on trial. A copy: see `with_slots`."""
+        return self.packed[:, SLOT].astype(np.int64)
+
+    def copy(self) -> Components:
+        """Return a copy that may be written into."""
+        return Components(self.packed.copy())
+
+    def with_slots(self, slot: Int) -> Components:
+        """Return the components with other indices in the memory, (B, L)."""
+        changed = self.copy()
+        changed.packed[:, SLOT] = slot
+        return changed
+
+    def first(self, n: int) -> Components:
+        """Return the first n components of each problem."""
+        return Components(self.packed[:, :, :n])
+
+    def without(self, k: Int) -> Components:
+        """Return the components without the k-th of each problem, the last slot unused."""
+        L = self.packed.shape[2]
+        order = np.arange(L) + (np.arange(L) >= k[:, None])
+        rows = np.arange(len(k))[:, None]
+        kept = self.packed[rows, :, np.minimum(order, L - 1)]
+        return Components(np.asarray(kept.swapaxes(1, 2)))
 
 
 @dataclass(eq=False)
@@ -33,34 +110,32 @@ class Evaluation(BatchRecord):
     Attributes
     ----------
     Y : ndarray, shape (B, F, n_sensors, N)
-        Looks, each bin of unit power: ‖Y‖² is n_sensors N.
-    facts : ndarray, shape (B, 7, L)
-        The components; see the names of the rows above.
+        Snapshots, each bin of unit power: ‖Y‖² is n_sensors N.
+    components : Components
     K : ndarray of int, shape (B,)
     used : ndarray of bool, shape (B, L)
-        Which places hold a component.
+        Slots that hold a component.
     nu, tau : ndarray, shape (B, F)
         Variances of noise and amplitudes.
-    rest : ndarray, shape (B,)
-        Σ ln(1-ρ) where ρ is not given, else 0.
+    log_prior_inactive : ndarray, shape (B,)
+        Σ ln(1-ρ) where ρ is estimated, else 0.
     A : ndarray, shape (B, F, L, n_sensors)
         Mean steering vectors â.
     X : ndarray, shape (B, F, 3 or 4, L, L)
         `ExpectedResponse.products`; the diagonals are ⟨‖a‖²⟩ in the first, and half its first and
-        second
-        derivatives in the second and third.
+        second derivatives in the second and third.
     h : ndarray, shape (B, F, 3, L, N)
         âᴴY, (∂â)ᴴY, (∂²â)ᴴY.
-    lost : ndarray, shape (B, F, L)
+    uncertainty_loss : ndarray, shape (B, F, L)
         ⟨‖a‖²⟩ - ‖â‖².
-    pull : ndarray, shape (B, L)
-        κ exp(-s/2 + j(μ-μₚ)): what the prior adds to gradient and curvature.
+    prior_gradient : ndarray, shape (B, L)
+        κ exp(-s/2 + j(μ-μₚ)): the prior's part of gradient and curvature.
     D : ndarray, shape (B, L)
         KL divergence of each angle's density from its prior.
-    prior : ndarray, shape (B,)
-        What odds and divergences give to the ELBO.
+    log_prior : ndarray, shape (B,)
+        Part of the odds and divergences in the ELBO.
     W, G : ndarray, shapes (B, F, L, N), (B, F, L, L)
-        Means of the amplitudes; their covariance, that of every look of a bin, is ν G.
+        Means of the amplitudes; their covariance, that of every snapshot of a bin, is ν G.
     explained : ndarray, shape (B, F)
         Re tr HᴴŴ.
     F : ndarray, shape (B,)
@@ -68,19 +143,19 @@ class Evaluation(BatchRecord):
     """
 
     Y: Complex
-    facts: Float
+    components: Components
     K: Int
     used: Bool
     nu: Float
     tau: Float
-    rest: Float
+    log_prior_inactive: Float
     A: Complex
     X: Complex
     h: Complex
-    lost: Float
-    pull: Complex
+    uncertainty_loss: Float
+    prior_gradient: Complex
     D: Float
-    prior: Float
+    log_prior: Float
     W: Complex
     G: Complex
     explained: Float
@@ -90,66 +165,81 @@ class Evaluation(BatchRecord):
         return len(self.K)
 
     @property
-    def TT(self) -> Complex:
+    def second_products(self) -> Complex:
         """(∂â)ᴴ∂â off the diagonal, (B, F, L, L)."""
         return self.X[:, :, 3] if self.X.shape[2] == 4 else -self.X[:, :, 2]
 
     def trimmed(self) -> Evaluation:
-        """Return the same without places that no problem uses."""
+        """Return the same without slots that no problem uses."""
         L = max(*self.K.tolist(), 1)
-        if self.facts.shape[2] == L:
+        if self.used.shape[1] == L:
             return self
-        return Evaluation(
-            self.Y, self.facts[:, :, :L], self.K, self.used[:, :L], self.nu, self.tau, self.rest,
-            self.A[:, :, :L], self.X[..., :L, :L], self.h[:, :, :, :L], self.lost[:, :, :L],
-            self.pull[:, :L], self.D[:, :L], self.prior, self.W[:, :, :L], self.G[:, :, :L, :L],
-            self.explained, self.F,
-        )  # fmt: skip
+        return replace(
+            self,
+            components=self.components.first(L),
+            used=self.used[:, :L],
+            A=self.A[:, :, :L],
+            X=self.X[..., :L, :L],
+            h=self.h[:, :, :, :L],
+            uncertainty_loss=self.uncertainty_loss[:, :, :L],
+            prior_gradient=self.prior_gradient[:, :L],
+            D=self.D[:, :L],
+            W=self.W[:, :, :L],
+            G=self.G[:, :, :L, :L],
+        )
 
-    def criterion(self, kl: float) -> Float:
-        """Return the support criterion F + (1 - kl) Σ D, (B,)."""
-        return np.asarray(self.F + (1 - kl) * self.D.sum(axis=1))
+    def criterion(self, kl_weight: float) -> Float:
+        """Return the support criterion F + (1 - kl_weight) Σ D, (B,)."""
+        return np.asarray(self.F + (1 - kl_weight) * self.D.sum(axis=1))
 
 
 def evaluate(
-    response: ExpectedResponse, Y: Complex, facts: Float, K: Int, nu: Float, tau: Float, rest: Float
+    response: ExpectedResponse,
+    Y: Complex,
+    components: Components,
+    K: Int,
+    nu: Float,
+    tau: Float,
+    log_prior_inactive: Float,
 ) -> Evaluation:
-    """Return the state of given components and variances."""
-    L = facts.shape[2]
+    """Return the evaluation of given components and variances."""
+    mu, s = components.mu, components.variance
+    L = mu.shape[1]
     used = np.arange(L) < K[:, None]
-    padded = min(K.tolist()) < L
-    mu, s = facts[:, MU], facts[:, S]
-    if padded:
+    partly_used = min(K.tolist()) < L
+    if partly_used:
         s = np.where(used, s, 1.0)
-    A, X, h, lost = response.products(Y, mu, s, used if padded else None)
-    pull = facts[:, PRIOR_KAPPA] * np.exp(1j * (mu - facts[:, PRIOR_MU]) - 0.5 * s)
-    D = facts[:, KL_CONSTANT] - 0.5 * (LOG_2PIE + np.log(s)) - pull.real
-    each = facts[:, ODDS] - D
-    if padded:
-        pull, D, each = pull * used, D * used, each * used
-    prior = rest + each.sum(axis=1)
+    A, X, h, uncertainty_loss = response.products(Y, mu, s, used if partly_used else None)
+    # KL(q ‖ p) = ln 2πI₀(κ) - ½ ln 2πes - κ exp(-s/2) cos(μ-μₚ)
+    prior_gradient = components.prior_kappa * np.exp(1j * (mu - components.prior_mu) - 0.5 * s)
+    D = components.kl_constant - 0.5 * (LOG_2PIE + np.log(s)) - prior_gradient.real
+    each = components.log_odds - D
+    if partly_used:
+        prior_gradient, D, each = prior_gradient * used, D * used, each * used
+    log_prior = log_prior_inactive + each.sum(axis=1)
     W, G, explained, F = amplitudes(response, X[:, :, 0], h[:, :, 0], used, K, nu, tau)
     return Evaluation(
-        Y, facts, K, used, nu, tau, rest, A, X, h, lost, pull, D, prior, W, G, explained, F + prior
-    )
+        Y=Y, components=components, K=K, used=used, nu=nu, tau=tau,
+        log_prior_inactive=log_prior_inactive, A=A, X=X, h=h, uncertainty_loss=uncertainty_loss,
+        prior_gradient=prior_gradient, D=D, log_prior=log_prior, W=W, G=G, explained=explained,
+        F=F + log_prior,
+    )  # fmt: skip
 
 
 def with_variances(
-    response: ExpectedResponse, state: Evaluation, nu: Float, tau: Float
+    response: ExpectedResponse, evaluation: Evaluation, nu: Float, tau: Float
 ) -> Evaluation:
-    """Return the state with other variances; the angles stay."""
-    s = state
-    W, G, explained, F = amplitudes(response, s.X[:, :, 0], s.h[:, :, 0], s.used, s.K, nu, tau)
-    return Evaluation(
-        s.Y, s.facts, s.K, s.used, nu, tau, s.rest, s.A, s.X, s.h, s.lost, s.pull, s.D, s.prior,
-        W, G, explained, F + s.prior,
-    )  # fmt: skip
+    """Return the evaluation with other variances; the angles stay."""
+    J, H = evaluation.X[:, :, 0], evaluation.h[:, :, 0]
+    W, G, explained, F = amplitudes(response, J, H, evaluation.used, evaluation.K, nu, tau)
+    F = F + evaluation.log_prior
+    return replace(evaluation, nu=nu, tau=tau, W=W, G=G, explained=explained, F=F)
 
 
 def amplitudes(
     response: ExpectedResponse, J: Complex, H: Complex, used: Bool, K: Int, nu: Float, tau: Float
 ) -> tuple[Complex, Complex, Float, Float]:
-    """Return Ŵ = G H, G = (J + ν/τ I)⁻¹, Re tr HᴴŴ, and what all this gives to the ELBO.
+    """Return Ŵ = G H, G = (J + ν/τ I)⁻¹, Re tr HᴴŴ, and their part of the ELBO.
 
     F = Σ [Re tr HᴴŴ/ν - M N/ν - M N ln πν + N K ln ν/τ - N ln det(J + ν/τ I)] over bins, over T.
     """

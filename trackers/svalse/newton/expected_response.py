@@ -48,11 +48,11 @@ class ExpectedResponse:
     def __init__(
         self,
         manifold: Manifold,
-        temper: float = 1.0,
+        tempering: float = 1.0,
         power_floor: float = 0.0,
         noise_floor: float = NOISE_FLOOR,
     ) -> None:
-        self.manifold, self.temper = manifold, temper
+        self.manifold, self.tempering = manifold, tempering
         self.power_floor, self.noise_floor = power_floor, noise_floor
         self.n_sensors, self.n_bins = manifold.n_sensors, manifold.n_bins
         k = manifold.harmonics.astype(np.float64)
@@ -139,7 +139,7 @@ class ExpectedResponse:
     def total(self, x: Float) -> Float:
         """Return the sum over bins (B, F, ...) of what each tells, tempered."""
         x = x[:, 0] if x.shape[1] == 1 else x.sum(axis=1)
-        return x if self.temper == 1 else x / self.temper
+        return x if self.tempering == 1 else x / self.tempering
 
 
 def diagonals(X: Array) -> Array:

@@ -1,7 +1,8 @@
-"""The fast engine of VALSE and SVALSE: joint Newton steps and single moves of the support.
+"""Solver of VALSE and SVALSE by joint Newton steps and single changes of the support.
 
-The support is changed by one move at a time from a warm one, each followed by a few Newton steps
-on all angles together; a move stays only if it raises the support criterion.
+The support is changed by one component at a time from that of the prediction, each change
+followed by a few Newton steps on all angles together; a change is kept only if it raises the
+support criterion.
 """
 
 from __future__ import annotations
@@ -19,11 +20,17 @@ from arrivals.trackers.svalse.components import (
     SolverSettings,
 )
 from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver
-from arrivals.trackers.svalse.newton.batch import every, some
-from arrivals.trackers.svalse.newton.candidates import Grid, removal_gains
+from arrivals.trackers.svalse.newton.batch import all_set, any_set
+from arrivals.trackers.svalse.newton.candidates import CandidateGrid, removal_gains
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
-from arrivals.trackers.svalse.newton.state import Problem, SolverState, nothing_found, result, start
-from arrivals.trackers.svalse.newton.step import ascend
+from arrivals.trackers.svalse.newton.state import (
+    SolverState,
+    StepInput,
+    inactive_posterior,
+    initial_state,
+    solved_posterior,
+)
+from arrivals.trackers.svalse.newton.step import newton_step
 from arrivals.trackers.svalse.newton.support_search import (
     DEFAULT_LIMITS,
     IterationLimits,
@@ -33,9 +40,7 @@ from arrivals.trackers.svalse.noise_initialization import noise_floor, power_flo
 from arrivals.typing import Complex
 from arrivals.validation import instance, probability
 
-MAX_AGE = 3  # steps that a component is remembered without being active
 FILL_SHARE = 0.5  # components added before the noise is learned: of the sensors of a filled line
-SNR_WEIGHT = 0.3  # of the newest signal-to-noise ratio in the start of the next step
 GRID_POINTS_PER_SENSOR = 4  # angles at which components may be added
 
 
@@ -95,7 +100,22 @@ class NewtonSolver(SolverSettings):
     def solve(
         self, snapshots: Complex, manifold: Manifold, prior: ComponentPrior | None
     ) -> ComponentPosterior:
-        """Fit snapshots (n_bins, n_sensors, n_snapshots); without a prior nothing is known."""
+        """Return the components in the snapshots of one step.
+
+        Parameters
+        ----------
+        snapshots : ndarray, shape (n_bins, n_sensors, n_snapshots)
+            Data without gaps.
+        manifold : Manifold
+            Response of these sensors in these bins.
+        prior : ComponentPrior or None
+            Prediction of the components; None if nothing is known.
+
+        Returns
+        -------
+        ComponentPosterior
+            Tracked components first.
+        """
         return self.solve_batch([snapshots], manifold, [prior])[0]
 
     def solve_batch(
@@ -104,66 +124,120 @@ class NewtonSolver(SolverSettings):
         manifold: Manifold,
         priors: Sequence[ComponentPrior | None],
     ) -> list[ComponentPosterior]:
-        """Fit independent snapshots of one array, as one array program."""
-        whole = any(prior is not None and prior.n_moments for prior in priors)
-        if whole or len(manifold.nuisance_weights) > 1:
+        """Return the components of independent steps of one array, in one array program.
+
+        Parameters
+        ----------
+        snapshots : sequence of ndarray, shape (n_bins, n_sensors, n_snapshots)
+            Data without gaps, all of one shape.
+        manifold : Manifold
+            Response of these sensors in these bins.
+        priors : sequence of ComponentPrior or None
+            Predictions of the components; all None if nothing is known.
+
+        Returns
+        -------
+        list of ComponentPosterior
+            In the order of the snapshots.
+        """
+        whole_densities = any(prior is not None and prior.n_moments for prior in priors)
+        if whole_densities or len(manifold.nuisance_weights) > 1:
             return self.converted(CoordinateSolver).solve_batch(snapshots, manifold, priors)
-        most = self.n_components(manifold.n_sensors)
-        problems = [Problem(Y, known, most) for Y, known in zip(snapshots, priors, strict=True)]
-        fits = [nothing_found(problem, MAX_AGE) for problem in problems]
-        heard = [i for i, problem in enumerate(problems) if not problem.silent]
-        if heard and manifold.n_sensors > 1:
-            merge = max(self.merge_distance(prior) for prior in priors)
-            solved = self._solved([problems[i] for i in heard], manifold, merge)
-            for i, fit in zip(heard, solved, strict=True):
-                fits[i] = fit
-        return fits
+        n = self.n_components(manifold.n_sensors)
+        steps = [StepInput(Y, prior, n) for Y, prior in zip(snapshots, priors, strict=True)]
+        posteriors = [inactive_posterior(step) for step in steps]
+        powered = [i for i, step in enumerate(steps) if not step.no_power]
+        if powered and manifold.n_sensors > 1:
+            search = support_search(
+                self, manifold, snapshots[0].shape[2], self.merge_distance(priors[0])
+            )
+            solved = self._solve([steps[i] for i in powered], search)
+            for i, posterior in zip(powered, solved, strict=True):
+                posteriors[i] = posterior
+        return posteriors
 
-    def _solved(
-        self, problems: list[Problem], manifold: Manifold, merge: float
-    ) -> list[ComponentPosterior]:
-        """Fit snapshots that have power: moves and Newton steps in turn until all rest."""
-        moves = moves_on(self, manifold, problems[0].Y.shape[2], merge)
-        work = start(problems, moves.response, self, len(moves.grid.theta), moves.places)
-        work.left[:] = np.where(work.free, 0, self.limits.inner)
-        work.tolerance[:] = self.limits.inner_tolerance
-        fits: dict[int, ComponentPosterior] = {}
-        while len(work):
-            over = work.left == 0
-            if some(over):
-                part = work.take(over)
-                moves.choose(part)
-                work = work.put(over, part)
-                if some(work.done):
-                    gains = removal_gains(moves.response, work.state, self.kl_weight)
-                    for i in map(int, np.flatnonzero(work.done)):
-                        n = int(work.row[i])
-                        fits[n] = result(work, i, problems[n], manifold, gains, SNR_WEIGHT, MAX_AGE)
-                    if every(work.done):
-                        break
-                    work = work.take(~work.done)
-                work.state, work.saved = work.state.trimmed(), work.saved.trimmed()
-            self.climb(moves.response, work)
-        return [fits[n] for n in range(len(problems))]
+    def _solve(self, steps: list[StepInput], search: SupportSearch) -> list[ComponentPosterior]:
+        """Alternate Newton steps and changes of the support until neither gains.
 
-    def climb(self, response: ExpectedResponse, work: SolverState) -> None:
-        """Take one Newton step in every problem; a burst goes on while its steps gain much."""
-        before = work.state.F
-        work.state = ascend(response, work.state, work.learn)
-        work.iterations = work.iterations + 1
-        gain = np.abs(work.state.F - before)
-        left = np.where(gain > self.limits.large_gain, np.maximum(work.left, 2), work.left)
-        work.left = np.where(gain < work.tolerance, 0, left - 1)
-        work.left = np.minimum(work.left, self.max_iterations - work.iterations)
+        The support search fills, learns, merges, removes, adds and finishes, in that order.
+        """
+        state = initial_state(
+            steps, search.response, self, len(search.grid.theta), search.n_components
+        )
+        state.steps_remaining[:] = np.where(state.estimate_rho, 0, self.limits.inner)
+        state.tolerance[:] = self.limits.inner_tolerance
+        posteriors: dict[int, ComponentPosterior] = {}
+        while True:
+            due = state.steps_remaining == 0
+            if any_set(due):
+                part = state.select(due)
+                search.next_change(part)
+                state = state.replace_rows(due, part)
+                posteriors |= solved_posteriors(state, steps, search)
+                if all_set(state.done):
+                    return [posteriors[n] for n in range(len(steps))]
+                state = unsolved(state)
+            self.advance(search, state)
+
+    def advance(self, search: SupportSearch, state: SolverState) -> None:
+        """Take one Newton step in every problem; those with a large gain take another."""
+        before = state.evaluation.F
+        state.evaluation = newton_step(search.response, state.evaluation, state.learn)
+        state.iterations = state.iterations + 1
+        gain = np.abs(state.evaluation.F - before)
+        steps = np.where(
+            gain > self.limits.large_gain, np.maximum(state.steps_remaining, 2),
+            state.steps_remaining,
+        )  # fmt: skip
+        steps = np.where(gain < state.tolerance, 0, steps - 1)
+        state.steps_remaining = np.minimum(steps, self.max_iterations - state.iterations)
 
 
-@lru_cache(maxsize=16)  # of a whole array, and of some sets of sensors: each holds a grid of waves
-def moves_on(
+def solved_posteriors(
+    state: SolverState, steps: Sequence[StepInput], search: SupportSearch
+) -> dict[int, ComponentPosterior]:
+    """Return the posteriors of the problems that are done, by their numbers."""
+    if not any_set(state.done):
+        return {}
+    gains = removal_gains(search.response, state.evaluation, search.kl_weight)
+    manifold, numbers = search.grid.manifold, state.problem.tolist()
+    return {
+        numbers[i]: solved_posterior(state, i, steps[numbers[i]], manifold, gains)
+        for i in map(int, np.flatnonzero(state.done))
+    }
+
+
+def unsolved(state: SolverState) -> SolverState:
+    """Return the problems that are not done, without slots that none of them uses."""
+    state = state.select(~state.done)
+    state.evaluation, state.saved = state.evaluation.trimmed(), state.saved.trimmed()
+    return state
+
+
+@lru_cache(maxsize=16)  # arrays, and some sets of their sensors: each holds a grid of responses
+def support_search(
     solver: NewtonSolver, manifold: Manifold, n_snapshots: int, merge: float
 ) -> SupportSearch:
-    """Return the moves between Newton steps, for an array and so many snapshots a step."""
+    """Return the support search of an array with so many snapshots a step.
+
+    Parameters
+    ----------
+    solver : NewtonSolver
+        Settings.
+    manifold : Manifold
+        Response of the array.
+    n_snapshots : int
+        Snapshots of a step.
+    merge : float
+        Distance, rad of direction, below which components are merged.
+
+    Returns
+    -------
+    SupportSearch
+        The same for equal arguments.
+    """
     M, n_looks = manifold.n_sensors, manifold.n_bins * n_snapshots
-    most = solver.n_components(M)
+    n = solver.n_components(M)
     response = ExpectedResponse(
         manifold,
         solver.tempering,
@@ -172,13 +246,13 @@ def moves_on(
     )
     return SupportSearch(
         response,
-        Grid(response, GRID_POINTS_PER_SENSOR, merge),
-        solver.limits,
-        solver.kl_weight,
-        places=most,
-        most=min(most, M - 1),
-        fill_to=min(int(np.ceil(round(FILL_SHARE * response.extent, 6))), most, M - 1),
-        max_iterations=solver.max_iterations,
+        CandidateGrid(response, GRID_POINTS_PER_SENSOR, merge),
+        limits=solver.limits,
         tolerance=solver.tolerance,
+        max_iterations=solver.max_iterations,
+        kl_weight=solver.kl_weight,
+        n_components=n,
+        max_active=min(n, M - 1),
+        fill_target=min(int(np.ceil(round(FILL_SHARE * response.extent, 6))), n, M - 1),
         relearn=n_looks > 1 or manifold.coefficients is not None,
     )

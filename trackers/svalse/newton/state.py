@@ -1,4 +1,4 @@
-"""What the fast engine of VALSE and SVALSE works on: its start, and what comes out."""
+"""Initial state and result of the Newton solver."""
 
 from __future__ import annotations
 
@@ -15,38 +15,33 @@ from arrivals.trackers.svalse.components import (
     SolverSettings,
 )
 from arrivals.trackers.svalse.newton.batch import BatchRecord
-from arrivals.trackers.svalse.newton.candidates import LOG_2PI
-from arrivals.trackers.svalse.newton.elbo import (
-    KL_CONSTANT,
-    MU,
-    N_FACTS,
-    ODDS,
-    PLACE,
-    PRIOR_KAPPA,
-    PRIOR_MU,
-    Evaluation,
-    S,
-    evaluate,
-)
+from arrivals.trackers.svalse.newton.candidates import LOG_2PI, RemovedComponents
+from arrivals.trackers.svalse.newton.elbo import Components, Evaluation, evaluate
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
-from arrivals.trackers.svalse.newton.step import LARGEST_VARIANCE
-from arrivals.trackers.svalse.noise_initialization import NOISE_FLOOR, first_noise, quiet_noise
+from arrivals.trackers.svalse.newton.step import MAX_ANGLE_VARIANCE
+from arrivals.trackers.svalse.noise_initialization import (
+    NOISE_FLOOR,
+    initial_noise,
+    noise_from_eigenvalues,
+)
 from arrivals.typing import Bool, Complex, Float, Int
 
-SURE = 500.0  # log odds that stand for certainty
+MAX_LOG_ODDS = 500.0  # stands for certainty
+MAX_AGE = 3  # steps that a component is tracked without being active
+SNR_WEIGHT = 0.3  # of the newest signal-to-noise ratio in the start of the next step
 DB = 10 / np.log(10)
-NOISIEST_DB, CLEANEST_DB = 0.7 * DB, 12 * DB  # signal-to-noise ratios from which to start
-NOTHING = ComponentPrior(np.zeros(0), np.zeros(0), np.zeros(0), 0.5)
+MIN_SNR_DB, MAX_SNR_DB = 0.7 * DB, 12 * DB  # at which the noise of the next step may start
+NO_PRIOR = ComponentPrior(np.zeros(0), np.zeros(0), np.zeros(0), 0.5)
 
 
-class Problem:
-    """The looks of a step, each bin scaled to unit power, and what is known of its components.
+class StepInput:
+    """Snapshots of a step, each bin scaled to unit power, and the prior of its components.
 
     Parameters
     ----------
     Y : ndarray, shape (n_bins, n_sensors, n_snapshots)
-    known : Prediction or None
-    most : int
+    prior : ComponentPrior or None
+    max_components : int
         Components that may be used at once.
 
     Attributes
@@ -55,23 +50,24 @@ class Problem:
         Of unit power in every bin that has power.
     power : ndarray, shape (n_bins,)
         Mean power of a sensor, before.
-    silent : bool
-        Whether no bin has power.
-    n : int
-        Components carried over.
-    age : ndarray of int, shape (n,)
+    no_power : bool
+        True if all data are zero.
+    n_tracked : int
+        Tracked components.
+    age : ndarray of int, shape (n_tracked,)
         Steps since each was last active.
     """
 
-    def __init__(self, Y: Complex, known: ComponentPrior | None, most: int) -> None:
-        self.known = NOTHING if known is None else known
+    def __init__(self, Y: Complex, prior: ComponentPrior | None, max_components: int) -> None:
+        self.has_prior = prior is not None
+        self.prior = NO_PRIOR if prior is None else prior
         self.power = (Y.real**2 + Y.imag**2).sum(axis=(1, 2)) / (Y.shape[1] * Y.shape[2])
-        self.silent = not self.power.any()
+        self.no_power = not self.power.any()
         scale = np.sqrt(np.where(self.power > 0, self.power, 1.0))
         self.Y = Y / scale[:, None, None]
-        self.n = min(len(self.known.mu), most)
-        age = self.known.age
-        self.age = np.zeros(self.n, dtype=np.int64) if age is None else age[: self.n]
+        self.n_tracked = n = min(len(self.prior.mu), max_components)
+        age = self.prior.age
+        self.age = np.zeros(n, dtype=np.int64) if age is None else age[:n]
 
     def snr_db(self, manifold: Manifold, settings: SolverSettings) -> float:
         """Return the signal-to-noise ratio at which the noise starts.
@@ -79,132 +75,134 @@ class Problem:
         That of the steps before, else that of the settings; if that is None, by the covariance of
         many snapshots or, without a prior, the lags of one snapshot of a line, else 20.
         """
-        if self.known.snr_db is not None:
-            return self.known.snr_db
+        if self.prior.snr_db is not None:
+            return self.prior.snr_db
         if settings.snr_db is not None:
             return settings.snr_db
         M, N = self.Y.shape[1:]
         if M * settings.tempering <= N:  # snapshots enough for a covariance
-            return -10 * float(np.log10(quiet_noise(self.Y)).mean())
-        if self.known is not NOTHING or manifold.coefficients is not None or N > 1:
+            return -10 * float(np.log10(noise_from_eigenvalues(self.Y)).mean())
+        if self.has_prior or manifold.coefficients is not None or N > 1:
             return 20.0
-        return -10 * float(np.log10(first_noise(self.Y[0, :, 0], manifold.harmonics, None)))
+        return -10 * float(np.log10(initial_noise(self.Y[0, :, 0], manifold.harmonics, None)))
 
 
 @dataclass(eq=False)
 class SolverState(BatchRecord):
-    """The working state of problems that are being solved, one a row.
+    """Working state of the problems that are being solved, one a row.
 
     Attributes
     ----------
-    row : ndarray of int, shape (B,)
+    problem : ndarray of int, shape (B,)
         Number of the problem.
-    state, saved : State
-        As it is, and as it was before the components on trial were added.
-    memory : ndarray, shape (B, 7, n_known)
-        All components of the step, as they were when they were removed.
+    evaluation, saved : Evaluation
+        The present one, and that before the components on trial were added.
+    removed : RemovedComponents
     n_known : ndarray of int, shape (B,)
-    revivable : ndarray of bool, shape (B, n_carried)
-        Carried components that were removed, not merged, and may come back.
-    barred : ndarray of bool, shape (B, n_angles)
-        Where a merged component was: nothing is born there.
-    birth : ndarray, shape (B,)
-        Prior log odds of a fresh component.
-    free : ndarray of bool, shape (B,)
-        Whether ρ is learned, since nothing is carried.
-    filling, finished, done, trial, learn : ndarray of bool, shape (B,)
-        In the fill stage; final steps taken; at the end; components on trial; variances learned.
-    left : ndarray of int, shape (B,)
-        Newton steps until the next move.
+        Components in the memory of the step.
+    log_odds_new : ndarray, shape (B,)
+        Prior log odds of a new component.
+    estimate_rho : ndarray of bool, shape (B,)
+        True if ρ is estimated, since no component is tracked.
+    filling, finished, done, on_trial, learn : ndarray of bool, shape (B,)
+        In the fill stage; final steps taken; solved; components on trial; variances updated.
+    steps_remaining : ndarray of int, shape (B,)
+        Newton steps until the next change of the support.
     tolerance : ndarray, shape (B,)
-        Change of F, nats, at which they stop before.
+        Change of F, nats, below which these steps end early.
     record, before, rejected : ndarray, shape (B,)
-        Of the criterion: the record to beat, its value before the trial; F at the last rejection.
+        Criterion to exceed; that before the trial; F at the last rejection.
     snr_db : ndarray, shape (B,)
-        Where the noise started.
-    iterations, moves : ndarray of int, shape (B,)
+        Signal-to-noise ratio at which the noise started.
+    iterations, n_changes : ndarray of int, shape (B,)
+        Newton steps, and changes of the support.
     """
 
-    row: Int
-    state: Evaluation
+    problem: Int
+    evaluation: Evaluation
     saved: Evaluation
-    memory: Float
+    removed: RemovedComponents
     n_known: Int
-    revivable: Bool
-    barred: Bool
-    birth: Float
-    free: Bool
+    log_odds_new: Float
+    estimate_rho: Bool
     filling: Bool
     finished: Bool
     done: Bool
-    trial: Bool
+    on_trial: Bool
     learn: Bool
-    left: Int
+    steps_remaining: Int
     tolerance: Float
     record: Float
     before: Float
     rejected: Float
     snr_db: Float
     iterations: Int
-    moves: Int
+    n_changes: Int
 
     def __len__(self) -> int:
-        return len(self.row)
+        return len(self.problem)
 
 
-def start(
-    problems: Sequence[Problem],
+def initial_state(
+    steps: Sequence[StepInput],
     response: ExpectedResponse,
     settings: SolverSettings,
     n_angles: int,
-    most: int,
+    n_components: int,
 ) -> SolverState:
-    """Return the state in which all carried components are active, the noise as it starts."""
-    B = len(problems)
-    facts = carried(problems, response.extent)
-    K = np.array([p.n for p in problems])
-    free = K == 0
-    snr = np.array([p.snr_db(response.manifold, settings) for p in problems])
+    """Return the state in which all tracked components are active, with the initial noise."""
+    B, half = len(steps), max(n_components // 2, 1)
+    components = tracked_components(steps, response.extent)
+    K = np.array([step.n_tracked for step in steps])
+    estimate_rho = K == 0
+    snr = np.array([step.snr_db(response.manifold, settings) for step in steps])
     nu = np.maximum(10 ** (-snr / 10), response.noise_floor)
-    K_active = np.array([np.count_nonzero(p.age == 0) for p in problems])
-    share = np.where(free, max(most // 2, 1), np.maximum(K_active, 1))
-    tau = np.maximum(1 - nu, NOISE_FLOOR) / share
-    rho = np.array([p.known.birth for p in problems])
-    rho[free] = max(most // 2, 1) / max(most, 2)
-    rest = np.where(free, most * np.log1p(-np.minimum(rho, 0.999)), 0.0)
-    Y = np.stack([p.Y for p in problems])
-    tau = np.outer(tau, response.n_sensors / response.norm2)
-    nu = np.outer(nu, np.ones(response.n_bins))
-    state = evaluate(response, Y, facts, K, nu, tau, rest)
+    n_active = np.array([np.count_nonzero(step.age == 0) for step in steps])
+    tau = np.maximum(1 - nu, NOISE_FLOOR) / np.where(estimate_rho, half, np.maximum(n_active, 1))
+    rho = np.array([step.prior.birth for step in steps])
+    rho[estimate_rho] = half / max(n_components, 2)
+    all_inactive = n_components * np.log1p(-np.minimum(rho, 0.999))
+    evaluation = evaluate(
+        response,
+        np.stack([step.Y for step in steps]),
+        components,
+        K,
+        nu=np.outer(nu, np.ones(response.n_bins)),
+        tau=np.outer(tau, response.n_sensors / response.norm2),
+        log_prior_inactive=np.where(estimate_rho, all_inactive, 0.0),
+    )
     off, zero, nan = np.zeros(B, dtype=np.bool_), np.zeros(B, dtype=np.int64), np.full(B, np.nan)
+    removed = RemovedComponents(
+        memory=components,
+        can_reactivate=np.zeros((B, components.packed.shape[2]), dtype=np.bool_),
+        excluded=np.zeros((B, n_angles), dtype=np.bool_),
+    )
     return SolverState(
-        row=np.arange(B), state=state, saved=state, memory=facts, n_known=K,
-        revivable=np.zeros((B, facts.shape[2]), dtype=np.bool_),
-        barred=np.zeros((B, n_angles), dtype=np.bool_),
-        birth=log_odds(rho), free=free, filling=~off, finished=off.copy(), done=off.copy(),
-        trial=off.copy(), learn=off.copy(), left=zero.copy(), tolerance=np.zeros(B),
-        record=np.full(B, -np.inf), before=nan.copy(), rejected=nan.copy(), snr_db=snr,
-        iterations=zero.copy(), moves=zero.copy(),
+        problem=np.arange(B), evaluation=evaluation, saved=evaluation, removed=removed, n_known=K,
+        log_odds_new=log_odds(rho), estimate_rho=estimate_rho, filling=~off, finished=off.copy(),
+        done=off.copy(), on_trial=off.copy(), learn=off.copy(), steps_remaining=zero.copy(),
+        tolerance=np.zeros(B), record=np.full(B, -np.inf), before=nan.copy(), rejected=nan.copy(),
+        snr_db=snr, iterations=zero.copy(), n_changes=zero.copy(),
     )  # fmt: skip
 
 
-def carried(problems: Sequence[Problem], extent: float) -> Float:
-    """Return the carried components, (B, 7, L), as they start."""
-    L = max(1, *(p.n for p in problems))
-    facts = np.zeros((len(problems), N_FACTS, L))
-    rho = np.full((len(problems), L), 0.5)
-    for i, p in enumerate(problems):
-        facts[i, MU, : p.n] = p.known.mu[: p.n]
-        facts[i, PRIOR_KAPPA, : p.n] = p.known.kappa[: p.n]
-        rho[i, : p.n] = p.known.existence[: p.n]
-    kappa = facts[:, PRIOR_KAPPA]
-    widest = min(3.6 / extent**2, LARGEST_VARIANCE)
-    facts[:, S] = 1 / np.maximum(kappa, 1 / widest)
-    facts[:, PRIOR_MU] = facts[:, MU]
-    facts[:, ODDS] = log_odds(rho)
-    facts[:, KL_CONSTANT] = LOG_2PI + log_i0(kappa)
-    facts[:, PLACE] = np.arange(L)
-    return facts
+def tracked_components(steps: Sequence[StepInput], extent: float) -> Components:
+    """Return the tracked components as they start."""
+    L = max(1, *(step.n_tracked for step in steps))
+    components = Components.zeros(len(steps), L).with_slots(np.arange(L))
+    rho = np.full((len(steps), L), 0.5)
+    for i, step in enumerate(steps):
+        n = step.n_tracked
+        components.mu[i, :n] = step.prior.mu[:n]
+        components.prior_kappa[i, :n] = step.prior.kappa[:n]
+        rho[i, :n] = step.prior.existence[:n]
+    kappa = components.prior_kappa
+    widest = min(3.6 / extent**2, MAX_ANGLE_VARIANCE)
+    components.variance[...] = 1 / np.maximum(kappa, 1 / widest)
+    components.prior_mu[...] = components.mu
+    components.log_odds[...] = log_odds(rho)
+    components.kl_constant[...] = LOG_2PI + log_i0(kappa)
+    return components
 
 
 def log_odds(rho: Float) -> Float:
@@ -216,85 +214,80 @@ def log_odds(rho: Float) -> Float:
     array([-500.,    0.,  500.])
     """
     with np.errstate(divide="ignore"):
-        return np.asarray(np.clip(np.log(rho) - np.log1p(-rho), -SURE, SURE))
+        return np.asarray(np.clip(np.log(rho) - np.log1p(-rho), -MAX_LOG_ODDS, MAX_LOG_ODDS))
 
 
-def result(
-    work: SolverState,
-    i: int,
-    problem: Problem,
-    manifold: Manifold,
-    gains: Float,
-    keep: float,
-    max_age: int,
+def solved_posterior(
+    state: SolverState, i: int, step: StepInput, manifold: Manifold, gains: Float
 ) -> ComponentPosterior:
-    """Return the fit of the i-th row, whose components would gain so much by removal."""
-    state, K, n = work.state, int(work.state.K[i]), int(work.n_known[i])
-    memory = work.memory[i, :, :n].copy()
-    place = state.facts[i, PLACE, :K].astype(np.int64)
-    memory[:, place] = state.facts[i, :, :K]
+    """Return the posterior of the i-th row; `gains` are those of removing each component."""
+    evaluation, K, n = state.evaluation, int(state.evaluation.K[i]), int(state.n_known[i])
+    slot = evaluation.components.slot[i, :K]
+    memory = Components(state.removed.memory.packed[i : i + 1, :, :n].copy())
+    memory.packed[0][:, slot] = evaluation.components.packed[i, :, :K]
+    mu, variance = memory.mu[0], memory.variance[0]
     amplitude, evidence = np.zeros(n, dtype=np.complex128), np.full(n, -np.inf)
-    amplitude[place] = amplitudes_of(state.W[i, :, :K], problem.power)
-    evidence[place] = -gains[i, :K]
+    amplitude[slot] = mean_amplitudes(evaluation.W[i, :, :K], step.power)
+    evidence[slot] = -gains[i, :K]
     age = np.ones(n, dtype=np.int64)
-    age[: problem.n] = problem.age + 1
-    age[age > max_age] = -1
-    age[place] = 0
-    newest = -10 * mean(np.log10(state.nu[i]))
-    noise, power = state.nu[i] * problem.power, state.tau[i] * problem.power
-    snr_db = (1 - keep) * work.snr_db[i] + keep * newest
+    age[: step.n_tracked] = step.age + 1
+    age[age > MAX_AGE] = -1
+    age[slot] = 0
+    newest = -10 * mean(np.log10(evaluation.nu[i]))
+    noise, power = evaluation.nu[i] * step.power, evaluation.tau[i] * step.power
+    snr_db = (1 - SNR_WEIGHT) * state.snr_db[i] + SNR_WEIGHT * newest
     return ComponentPosterior(
-        theta=front(manifold, memory[MU]),
-        resultant=np.exp(-memory[S] / 2),
-        kappa=1 / memory[S],
+        theta=front_angles(manifold, mu),
+        resultant=np.exp(-variance / 2),
+        kappa=1 / variance,
         active=age == 0,
         age=age,
         amplitude=amplitude,
         evidence=evidence,
         noise=mean(noise),
         power=mean(power),
-        iterations=int(work.iterations[i]),
-        converged=bool(work.finished[i]),
-        snr_db=min(max(float(snr_db), NOISIEST_DB), CLEANEST_DB),
+        iterations=int(state.iterations[i]),
+        converged=bool(state.finished[i]),
+        snr_db=min(max(float(snr_db), MIN_SNR_DB), MAX_SNR_DB),
         bin_noise=noise,
     )
 
 
 def mean(values: Float) -> float:
-    """Return the mean over bins: of one or a few, a list is quicker than an array."""
+    """Return the mean over bins: of one or a few, a list is faster than an array."""
     return float(sum(values.tolist()) / len(values))
 
 
-def amplitudes_of(W: Complex, power: Float) -> Complex:
-    """Return Ŵ (n_bins, L, n_snapshots) of one look, or of several the root of the mean power."""
+def mean_amplitudes(W: Complex, power: Float) -> Complex:
+    """Return Ŵ (n_bins, L, n_snapshots) of one snapshot, or of several the root mean power."""
     W = W * np.sqrt(power)[:, None, None]
     if W.shape[0] == W.shape[2] == 1:
         return np.asarray(W[0, :, 0])
     return np.asarray(np.sqrt((W.real**2 + W.imag**2).mean(axis=(0, 2))) + 0j)
 
 
-def front(manifold: Manifold, mu: Float) -> Float:
-    """Return the angles within ±π, where two stand for one direction that in front."""
+def front_angles(manifold: Manifold, mu: Float) -> Float:
+    """Return the angles within ±π, where two are of one direction that in front."""
     theta = np.angle(np.exp(1j * mu))
     return manifold.from_doa(manifold.to_doa(theta)) if manifold.mirror else theta
 
 
-def nothing_found(problem: Problem, max_age: int) -> ComponentPosterior:
-    """Return the fit of a step that holds no source: what is carried ages, all power is noise."""
-    known, n = problem.known, problem.n
-    age = problem.age + 1
+def inactive_posterior(step: StepInput) -> ComponentPosterior:
+    """Return the posterior of a step without a source: tracked components age, all is noise."""
+    prior, n = step.prior, step.n_tracked
+    age = step.age + 1
     return ComponentPosterior(
-        theta=known.mu[:n],
-        resultant=bessel_ratio(known.kappa[:n]),
-        kappa=known.kappa[:n],
+        theta=prior.mu[:n],
+        resultant=bessel_ratio(prior.kappa[:n]),
+        kappa=prior.kappa[:n],
         active=np.zeros(n, dtype=np.bool_),
-        age=np.where(age > max_age, -1, age),
+        age=np.where(age > MAX_AGE, -1, age),
         amplitude=np.zeros(n, dtype=np.complex128),
         evidence=np.full(n, -np.inf),
-        noise=float(problem.power.mean()),
+        noise=float(step.power.mean()),
         power=0.0,
         iterations=0,
         converged=True,
-        snr_db=known.snr_db,
-        bin_noise=None if problem.silent else problem.power,
+        snr_db=prior.snr_db,
+        bin_noise=None if step.no_power else step.power,
     )

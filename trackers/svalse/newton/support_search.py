@@ -1,4 +1,4 @@
-"""The moves of the fast engine between bursts of Newton steps: judge, merge, remove, add, rest."""
+"""Changes of the support between Newton steps: accept or reject, merge, remove, add, finish."""
 
 from __future__ import annotations
 
@@ -7,22 +7,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from arrivals.parameters import FrozenModel
-from arrivals.trackers.svalse.newton.batch import enlarged, some
+from arrivals.trackers.svalse.newton.batch import any_set, enlarged
 from arrivals.trackers.svalse.newton.candidates import (
-    Grid,
-    births,
-    joined,
-    nearest_later,
-    relearned,
+    CandidateGrid,
+    add_candidates,
+    first_duplicate,
+    relearning_gains,
     removal_gains,
-    without,
 )
-from arrivals.trackers.svalse.newton.elbo import MU, ODDS, PLACE, Evaluation, evaluate
+from arrivals.trackers.svalse.newton.elbo import Components, evaluate
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
 from arrivals.trackers.svalse.newton.state import SolverState, log_odds
 from arrivals.typing import Bool, Float, Int
 
-MARGIN = 1e-3  # nats by which an addition must raise the record
+MARGIN = 1e-3  # nats by which an addition must exceed the record
 
 
 @dataclass(frozen=True)
@@ -56,204 +54,213 @@ DEFAULT_LIMITS = IterationLimits()
 
 @dataclass(frozen=True, eq=False)
 class SupportSearch:
-    """What is done to the support, with all that bounds it.
+    """Changes of the support of an array's problems, and their limits.
 
     Parameters
     ----------
-    response : Response
-    grid : Grid
-    bursts : Bursts
-    kl : float
-        Share of the angles' KL divergences that is charged.
-    places : int
-        Components whose activity is in question.
-    most, fill_to : int
-        Active ones at most, and in the fill stage.
-    max_iterations : int
+    response : ExpectedResponse
+    grid : CandidateGrid
+    limits : IterationLimits
     tolerance : float
         Change of F, nats, at which the final Newton steps stop.
+    max_iterations : int
+        Largest number of Newton steps.
+    kl_weight : float
+        Share of the angles' KL divergences that is charged.
+    n_components : int
+        Components whose activity is estimated.
+    max_active, fill_target : int
+        Largest number of active components, and that of the fill stage.
     relearn : bool
-        Whether a removal counts what the noise gains by being learned again.
+        True if the gain of a removal includes that of updating the noise.
     """
 
     response: ExpectedResponse
-    grid: Grid
-    bursts: IterationLimits
-    kl: float
-    places: int
-    most: int
-    fill_to: int
-    max_iterations: int
+    grid: CandidateGrid
+    limits: IterationLimits
     tolerance: float
-    relearn: bool = False
+    max_iterations: int
+    kl_weight: float
+    n_components: int
+    max_active: int
+    fill_target: int
+    relearn: bool
 
-    def choose(self, work: SolverState) -> None:
-        """Judge what is on trial, and choose the next burst of each problem: one pass 1-4."""
-        exhausted = self.judge(work)
-        stop = (work.moves >= self.bursts.max_changes) | (work.iterations >= self.max_iterations)
-        open_ = ~(exhausted | stop)
-        if some(open_):
-            self.merge(work, open_)
-        removed = self.remove(work, open_ & ~work.filling)
-        added = self.add(work, open_ & ~removed)
-        self.rest(work, ~(removed | added), stop)
-        work.trial = added
-        np.minimum(work.left, self.max_iterations - work.iterations, out=work.left)
+    def next_change(self, state: SolverState) -> None:
+        """Accept or reject the trial components, then set the next change and Newton steps."""
+        rejected = self.accept_or_reject(state)
+        stop = state.n_changes >= self.limits.max_changes
+        stop = stop | (state.iterations >= self.max_iterations)
+        open_ = ~(rejected | stop)
+        if any_set(open_):
+            self.merge(state, open_)
+        removed = self.remove_weakest(state, open_ & ~state.filling)
+        added = self.add(state, open_ & ~removed)
+        self.finish(state, ~(removed | added), stop)
+        state.on_trial = added
+        steps_left = self.max_iterations - state.iterations
+        np.minimum(state.steps_remaining, steps_left, out=state.steps_remaining)
 
-    def judge(self, work: SolverState) -> Bool:
-        """Keep additions that raise the record, undo the others and tell which they are."""
-        if not some(work.trial):
-            return np.zeros(len(work), dtype=np.bool_)
-        now = work.state.criterion(self.kl)
-        better = work.trial & (now > np.maximum(work.before, work.record) + MARGIN)
-        worse = work.trial & ~better
-        if some(better):
-            work.record = np.where(better, now, work.record)
-            changed(work, better)
-            remember(work, better)
-        if some(worse):
-            work.state = work.state.put(worse, work.saved.take(worse))
-            work.rejected = np.where(worse, work.state.F, work.rejected)
+    def accept_or_reject(self, state: SolverState) -> Bool:
+        """Keep additions that exceed the record, undo the others and return their rows."""
+        if not any_set(state.on_trial):
+            return np.zeros(len(state), dtype=np.bool_)
+        now = state.evaluation.criterion(self.kl_weight)
+        better = state.on_trial & (now > np.maximum(state.before, state.record) + MARGIN)
+        worse = state.on_trial & ~better
+        if any_set(better):
+            state.record = np.where(better, now, state.record)
+            count_change(state, better)
+            remember(state, better)
+        if any_set(worse):
+            state.evaluation = state.evaluation.replace_rows(worse, state.saved.select(worse))
+            state.rejected = np.where(worse, state.evaluation.F, state.rejected)
         return worse
 
-    def merge(self, work: SolverState, rows: Bool) -> None:
-        """Switch off every component too near to an earlier one, and let none be born there."""
-        later = nearest_later(self.grid, work.state)
-        while some(rows & (later >= 0)):
-            near = rows & (later >= 0)
-            doa = self.grid.manifold.to_doa(work.state.facts[near, MU, later[near]])
-            barred = work.barred.copy()
-            barred[near] |= self.grid.near(doa)
-            work.barred = barred
-            self.drop(work, near, later, revivable=False)
-            later = nearest_later(self.grid, work.state)
+    def merge(self, state: SolverState, rows: Bool) -> None:
+        """Remove every component too near to an earlier one, and exclude the angles near it."""
+        k = first_duplicate(self.grid, state.evaluation)
+        while any_set(rows & (k >= 0)):
+            near = rows & (k >= 0)
+            doa = self.grid.manifold.to_doa(state.evaluation.components.mu[near, k[near]])
+            excluded = state.removed.excluded.copy()
+            excluded[near] |= self.grid.near(doa)
+            state.removed = replace(state.removed, excluded=excluded)
+            self.remove(state, near, k, can_reactivate=False)
+            k = first_duplicate(self.grid, state.evaluation)
 
-    def remove(self, work: SolverState, rows: Bool) -> Bool:
-        """Remove the component whose removal gains most, if it gains; tell where one was."""
-        if not some(rows):
+    def remove_weakest(self, state: SolverState, rows: Bool) -> Bool:
+        """Remove the component whose removal gains most, if it gains; return where one was."""
+        if not any_set(rows):
             return rows
-        gains = removal_gains(self.response, work.state, self.kl)
+        gains = removal_gains(self.response, state.evaluation, self.kl_weight)
         if self.relearn:
-            gains = gains + relearned(self.response, work.state)
+            gains = gains + relearning_gains(self.response, state.evaluation)
         k = gains.argmax(axis=1)
-        rows = rows & (gains[np.arange(len(work)), k] > 0)
-        if some(rows):
-            self.drop(work, rows, k, revivable=True)
-            self.burst(work, rows, self.bursts.removal, self.bursts.inner_tolerance)
+        rows = rows & (gains[np.arange(len(state)), k] > 0)
+        if any_set(rows):
+            self.remove(state, rows, k, can_reactivate=True)
+            self.set_steps(state, rows, self.limits.removal)
         return rows
 
-    def drop(self, work: SolverState, rows: Bool, k: Int, revivable: bool) -> None:
-        """Remove the k-th component of some rows, and remember it as it is."""
-        of, k = np.flatnonzero(rows), k[rows]
-        state = work.state
-        fact = state.facts[of, :, k]
-        place = fact[:, PLACE].astype(np.int64)
-        work.memory, work.revivable = work.memory.copy(), work.revivable.copy()
-        work.memory[of, :, place] = fact
-        known = place < work.revivable.shape[1]
-        work.revivable[of[known], place[known]] = revivable
-        changed(work, rows)
-        self.evaluated(work, rows, without(state.facts[rows], k), state.K[rows] - 1)
+    def remove(self, state: SolverState, rows: Bool, k: Int, can_reactivate: bool) -> None:
+        """Remove the k-th component of some rows, and keep it in the memory as it is."""
+        index, k, old = np.flatnonzero(rows), k[rows], state.evaluation
+        slot = old.components.slot[index, k]
+        memory, flags = state.removed.memory.copy(), state.removed.can_reactivate.copy()
+        memory.packed[index, :, slot] = old.components.packed[index, :, k]
+        tracked = slot < flags.shape[1]
+        flags[index[tracked], slot[tracked]] = can_reactivate
+        state.removed = replace(state.removed, memory=memory, can_reactivate=flags)
+        count_change(state, rows)
+        kept = old.components.select(rows).without(k)
+        self.set_components(state, rows, kept, old.K[rows] - 1)
 
-    def add(self, work: SolverState, rows: Bool) -> Bool:
-        """Add the best newcomers on trial; tell where there are some."""
-        state = work.state
-        room = np.where(work.filling, self.fill_to, self.most) - state.K
-        same = np.abs(state.F - work.rejected) < self.bursts.inner_tolerance
-        rows = rows & (room > 0) & ~same
-        if not some(rows):
+    def add(self, state: SolverState, rows: Bool) -> Bool:
+        """Add the best new components on trial; return where there are any."""
+        now = state.evaluation
+        room = np.where(state.filling, self.fill_target, self.max_active) - now.K
+        unchanged = np.abs(now.F - state.rejected) < self.limits.inner_tolerance
+        rows = rows & (room > 0) & ~unchanged
+        if not any_set(rows):
             return rows
-        part = work.take(rows)
-        odds = part.birth
-        if some(part.free):
-            odds = np.where(part.free & ~part.filling, self.learned(part.state.K + 1), odds)
-        new = births(
-            self.grid, part.state, odds, part.memory[:, :, : part.revivable.shape[1]],
-            part.revivable, part.barred, np.where(part.filling, room[rows], 1), self.kl,
-        )  # fmt: skip
-        found = rows.copy()
-        found[rows] = new.n > 0
-        if some(found):
-            work.saved = work.saved.put(found, state.take(found))
-            work.before = np.where(found, state.criterion(self.kl), work.before)
-            facts, K = joined(part.state.facts, part.state.K, new)
-            self.evaluated(work, found, facts[new.n > 0], K[new.n > 0])
-            n = np.where(work.filling, self.bursts.fill, self.bursts.inner)
-            self.burst(work, found, n, self.bursts.inner_tolerance)
-        return found
+        part = state.select(rows)
+        prior = part.log_odds_new
+        if any_set(part.estimate_rho):
+            estimated = self.estimated_log_odds(part.evaluation.K + 1)
+            prior = np.where(part.estimate_rho & ~part.filling, estimated, prior)
+        room = np.where(part.filling, room[rows], 1)
+        new = add_candidates(self.grid, part.evaluation, prior, part.removed, room, self.kl_weight)
+        gain = new.n > 0
+        added = rows.copy()
+        added[rows] = gain
+        if any_set(added):
+            state.saved = state.saved.replace_rows(added, now.select(added))
+            state.before = np.where(added, now.criterion(self.kl_weight), state.before)
+            components, K = new.appended_to(part.evaluation.components, part.evaluation.K)
+            self.set_components(state, added, components.select(gain), K[gain])
+            n = np.where(state.filling, self.limits.fill, self.limits.inner)
+            self.set_steps(state, added, n)
+        return added
 
-    def rest(self, work: SolverState, idle: Bool, stop: Bool) -> None:
-        """Where no move is left: end the fill stage, take the final steps, or be done."""
-        work.done = idle & ((work.finished & ~work.filling) | stop)
-        work.finished = work.finished & ~(stop & ~work.finished)
-        idle = idle & ~work.done
-        filled = idle & work.filling
-        if some(filled):
-            work.filling = work.filling & ~filled
-            work.learn = work.learn | filled
-            work.record = np.where(filled, -np.inf, work.record)
-            work.rejected = np.where(filled, np.nan, work.rejected)
-            free = filled & work.free
-            if some(free):
-                self.evaluated(work, free, work.state.facts[free], work.state.K[free])
-            self.burst(work, filled, self.bursts.inner, self.bursts.inner_tolerance)
+    def finish(self, state: SolverState, idle: Bool, stop: Bool) -> None:
+        """Where no change gains: end the fill stage, take the final steps, or be done."""
+        state.done = idle & ((state.finished & ~state.filling) | stop)
+        state.finished = state.finished & ~(stop & ~state.finished)
+        idle = idle & ~state.done
+        filled = idle & state.filling
+        if any_set(filled):
+            self.learn(state, filled)
         final = idle & ~filled
-        if some(final):
-            work.finished = work.finished | final
-            self.burst(work, final, self.bursts.final, self.tolerance)
+        if any_set(final):
+            state.finished = state.finished | final
+            self.set_steps(state, final, self.limits.final, self.tolerance)
 
-    def burst(self, work: SolverState, rows: Bool, n: Int | int, tolerance: float) -> None:
-        """Set the number of Newton steps that follow."""
-        work.left = np.where(rows, n, work.left)
-        work.tolerance = np.where(rows, tolerance, work.tolerance)
+    def learn(self, state: SolverState, rows: Bool) -> None:
+        """End the fill stage: from now on ν, τ and ρ are updated."""
+        state.filling = state.filling & ~rows
+        state.learn = state.learn | rows
+        state.record = np.where(rows, -np.inf, state.record)
+        state.rejected = np.where(rows, np.nan, state.rejected)
+        estimated = rows & state.estimate_rho
+        if any_set(estimated):
+            now = state.evaluation.select(estimated)
+            self.set_components(state, estimated, now.components, now.K)
+        self.set_steps(state, rows, self.limits.inner)
 
-    def evaluated(self, work: SolverState, rows: Bool, facts: Float, K: Int) -> None:
-        """Give some rows other components."""
-        old = work.state.take(rows)
-        rest = old.rest
-        learning = (work.free & ~work.filling)[rows]
-        if some(work.free):
-            facts = facts.copy()
-            odds = np.where(learning, self.learned(K), work.birth[rows])
-            free = work.free[rows]
-            facts[free, ODDS] = odds[free, None]
-            absent = -self.places * np.log1p(np.exp(odds))
-            rest = np.where(free, absent, rest)
-        L = max(int(K.max()), 1)
-        facts = facts[:, :, :L]
-        new = evaluate(self.response, old.Y, facts, K, old.nu, old.tau, rest)
-        work.state = work.state.put(rows, new)
+    def set_steps(
+        self, state: SolverState, rows: Bool, n: Int | int, tolerance: float | None = None
+    ) -> None:
+        """Set the number of Newton steps that follow, and the gain at which they end early."""
+        tolerance = self.limits.inner_tolerance if tolerance is None else tolerance
+        state.steps_remaining = np.where(rows, n, state.steps_remaining)
+        state.tolerance = np.where(rows, tolerance, state.tolerance)
 
-    def learned(self, K: Int) -> Float:
+    def set_components(
+        self, state: SolverState, rows: Bool, components: Components, K: Int
+    ) -> None:
+        """Replace the components of some rows, with the prior by the estimated ρ."""
+        old = state.evaluation.select(rows)
+        log_prior_inactive = old.log_prior_inactive
+        if any_set(state.estimate_rho):
+            estimated, filling = state.estimate_rho[rows], state.filling[rows]
+            odds = np.where(
+                estimated & ~filling, self.estimated_log_odds(K), state.log_odds_new[rows]
+            )
+            components = components.copy()
+            components.log_odds[estimated] = odds[estimated, None]
+            all_inactive = -self.n_components * np.log1p(np.exp(odds))
+            log_prior_inactive = np.where(estimated, all_inactive, log_prior_inactive)
+        components = components.first(max(int(K.max()), 1))
+        new = evaluate(self.response, old.Y, components, K, old.nu, old.tau, log_prior_inactive)
+        state.evaluation = state.evaluation.replace_rows(rows, new)
+
+    def estimated_log_odds(self, K: Int) -> Float:
         """Return the log odds of ρ = K/L, which lies between 1/L and (L-1)/L."""
-        L = max(self.places, 2)
+        L = max(self.n_components, 2)
         return log_odds(np.clip(K, 1, L - 1) / L)
 
 
-def changed(work: SolverState, rows: Bool) -> None:
-    """Count a move."""
-    work.moves = work.moves + rows
-    work.finished = work.finished & ~rows
-    work.rejected = np.where(rows, np.nan, work.rejected)
+def count_change(state: SolverState, rows: Bool) -> None:
+    """Count a change of the support."""
+    state.n_changes = state.n_changes + rows
+    state.finished = state.finished & ~rows
+    state.rejected = np.where(rows, np.nan, state.rejected)
 
 
-def remember(work: SolverState, rows: Bool) -> None:
-    """Give the components that passed their trial a place in the memory."""
-    state: Evaluation = work.state
-    place = state.facts[:, PLACE]
-    active = state.used & rows[:, None]
-    fresh = active & (place < 0)
-    number = np.where(fresh, work.n_known[:, None] + np.cumsum(fresh, axis=1) - 1, place)
-    facts = state.facts.copy()
-    facts[:, PLACE] = number
-    work.state = replace(state, facts=facts)
-    work.n_known = work.n_known + fresh.sum(axis=1)
-    work.memory = (
-        enlarged(work.memory, (facts.shape[1], int(work.n_known.max())), copy=False)
-        if work.n_known.max() > work.memory.shape[2]
-        else work.memory
-    )
-    known = active & (number < work.revivable.shape[1])
-    revivable = work.revivable.copy()
-    revivable[np.nonzero(known)[0], number[known].astype(np.int64)] = False
-    work.revivable = revivable
+def remember(state: SolverState, rows: Bool) -> None:
+    """Assign slots of the memory to the components that passed their trial."""
+    now, removed = state.evaluation, state.removed
+    slot = now.components.slot
+    active = now.used & rows[:, None]
+    new = active & (slot < 0)
+    slot = np.where(new, state.n_known[:, None] + np.cumsum(new, axis=1) - 1, slot)
+    state.evaluation = replace(now, components=now.components.with_slots(slot))
+    state.n_known = state.n_known + new.sum(axis=1)
+    packed, n_known = removed.memory.packed, int(state.n_known.max())
+    if n_known > packed.shape[2]:
+        packed = enlarged(packed, (packed.shape[1], n_known))
+    flags = removed.can_reactivate.copy()
+    tracked = active & (slot < flags.shape[1])
+    flags[np.nonzero(tracked)[0], slot[tracked]] = False
+    state.removed = replace(removed, memory=Components(packed), can_reactivate=flags)
