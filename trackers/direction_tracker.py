@@ -116,8 +116,9 @@ class DirectionTracker(Tracker):
             iterations=iterations,
             noise=noise,
         )
-        self.x = padded(estimate.doa, self.n_slots, np.nan)
-        variance = padded(estimate.std**2, self.n_slots, 0.0)
+        n_slots = self.n_slots
+        self.x = padded(estimate.doa, n_slots, np.nan)
+        variance = padded(estimate.std**2, n_slots, 0.0)
         self.P = np.diag(np.nan_to_num(variance, posinf=np.inf))
 
 

@@ -252,6 +252,7 @@ class SVALSE(VALSE):
         self.bin_noise = updated(self.bin_noise, observed.bins, posterior.bin_noise)
 
     def _keep(self, mu: Float, kappa: Float, existence: Float | Bool, label: Int, age: Int) -> None:
+        """Track components, as many as there are slots."""
         n = self.n_slots
         self.mu = padded(mu, n, np.nan)
         self.kappa = padded(kappa, n, 0.0)
@@ -262,11 +263,12 @@ class SVALSE(VALSE):
     def _keep_densities(self, posterior: ComponentPosterior | None, order: Int) -> None:
         """Keep the whole densities of the tracked components, and those of the second unknown."""
         weights = self.measurement.manifold(self.reference).nuisance_weights
-        self.nuisance = np.tile(weights, (self.n_slots, 1))
-        self.moments = np.zeros((self.n_slots, self.n_moments), dtype=np.complex128)
-        order = order[: self.n_slots]
+        n = len(self.mu)
+        self.nuisance = np.tile(weights, (n, 1))
+        self.moments = np.zeros((n, self.n_moments), dtype=np.complex128)
         if posterior is None or posterior.nuisance is None or posterior.moments is None:
             return
+        order = order[:n]
         self.nuisance[: len(order)] = posterior.nuisance[order]
         self.moments[: len(order)] = posterior.moments[order]
 
