@@ -42,9 +42,11 @@ VonMisesWalkOfSources = BernoulliVonMises(kappa=20.0)
 def test_set_params_replaces_nested_parts() -> None:
     tracker = SVALSE(SNAPSHOTS, VonMisesWalkOfSources)
     old = tracker.measurement
+    assert isinstance(old, ArraySnapshot)
     tracker.set_params(motion__kappa=30.0, measurement__array__speed=340.0, solver__merge=0.0)
     assert tracker.motion.kappa == 30.0
     assert tracker.solver == NewtonSolver(merge=0.0)
+    assert isinstance(tracker.measurement, ArraySnapshot)
     assert tracker.measurement.array.speed == 340.0
     assert old.array.speed is None
     assert VonMisesWalkOfSources.kappa == 20.0

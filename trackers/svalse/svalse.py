@@ -8,9 +8,9 @@ from typing import Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.measurement_models.array_snapshot import ArraySnapshot
+from arrivals.measurement_models.direction_measurement import DirectionMeasurement
 from arrivals.measurement_models.manifolds.manifold import Reference
-from arrivals.measurement_models.observed import updated
+from arrivals.measurement_models.observed import ObservedSnapshots, updated
 from arrivals.motion_models.bernoulli_von_mises import BernoulliVonMises
 from arrivals.motion_models.bessel import bessel_ratio, bessel_ratios
 from arrivals.trackers.direction_tracker import padded
@@ -20,7 +20,6 @@ from arrivals.trackers.svalse.valse import (
     DEFAULT_SOLVER,
     VALSE,
     Engine,
-    Observation,
     circular_std,
     detected,
 )
@@ -41,9 +40,9 @@ class SVALSE(VALSE):
 
     Parameters
     ----------
-    measurement : ArraySnapshot
-        Any array, with any number of frequencies and snapshots a step. Its noise is not used: the
-        method estimates it.
+    measurement : DirectionMeasurement
+        An `ArraySnapshot`, or a model with its methods: any array, with any number of frequencies
+        and snapshots a step. Its noise is not used: the method estimates it.
     motion : BernoulliVonMises
         Steps, births and deaths. The default has the paper's probabilities, and a step of 1.5°
         in direction; the paper's, `BernoulliVonMises()`, is one in the electrical angle,
@@ -96,7 +95,7 @@ class SVALSE(VALSE):
 
     Examples
     --------
-    >>> from arrivals.measurement_models import SensorArray
+    >>> from arrivals.measurement_models import ArraySnapshot, SensorArray
     >>> model = ArraySnapshot(SensorArray.ula(15, spacing=0.5), wavelength=1.0, noise=1e-3)
     >>> z = model.simulate([[0.50], [0.51], [0.52]], 1.0, np.random.default_rng(0))
     >>> run = SVALSE(model).run(z)
@@ -114,7 +113,7 @@ class SVALSE(VALSE):
 
     def __init__(
         self,
-        measurement: ArraySnapshot,
+        measurement: DirectionMeasurement,
         motion: BernoulliVonMises = DEFAULT_MOTION,
         *,
         solver: Solver = DEFAULT_SOLVER,
@@ -206,13 +205,14 @@ class SVALSE(VALSE):
             label=self.label[likely],
         )
 
-    def observe(self, z: ArrayLike | None) -> Observation | None:
+    def observe(self, z: ArrayLike | None) -> ObservedSnapshots | None:
         """Return the valid data; None also if there are too few sensors for the components."""
         observed = super().observe(z)
         expected = np.count_nonzero(self.tracked & (self.age == 0) & (self.existence >= 0.5))
-        return None if observed is None or observed.manifold.n_sensors <= expected else observed
+        enough = observed is not None and np.count_nonzero(observed.sensors) > expected
+        return observed if enough else None
 
-    def component_prior(self, observed: Observation) -> ComponentPrior:
+    def component_prior(self, observed: ObservedSnapshots) -> ComponentPrior:
         """Return the predicted densities and probabilities of the tracked components, (65)."""
         on = self.tracked
         return ComponentPrior(
@@ -228,16 +228,17 @@ class SVALSE(VALSE):
             n_moments=self.moments.shape[1],
         )
 
-    def store(self, posterior: ComponentPosterior, observed: Observation) -> None:
+    def store(self, posterior: ComponentPosterior, observed: ObservedSnapshots) -> None:
         """Report and label the active components, and track them and recent ones."""
         label = np.full(len(posterior.theta), -1)
         label[: self.tracked.sum()] = self.label[self.tracked][: len(label)]
-        active = detected(observed.manifold, posterior)
+        manifold = observed.manifold
+        active = detected(manifold, posterior)
         unlabelled = active & (label < 0)
         n_new = int(np.count_nonzero(unlabelled))
         label[unlabelled] = self.n_labels + np.arange(n_new)
         self.n_labels += n_new
-        self.report_posterior(posterior, observed.manifold, active, label[active])
+        self.report_posterior(posterior, manifold, active, label[active])
         age = posterior.age
         order = np.concatenate([np.flatnonzero(age == 0), np.flatnonzero(age > 0)])
         self._keep(

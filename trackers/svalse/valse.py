@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.measurement_models.array_snapshot import ArraySnapshot
+from arrivals.measurement_models.direction_measurement import DirectionMeasurement
 from arrivals.measurement_models.manifolds.manifold import Manifold, Reference
 from arrivals.measurement_models.observed import ObservedSnapshots, updated
-from arrivals.trackers.base import is_missing
 from arrivals.trackers.direction_tracker import BatchDirectionTracker
 from arrivals.trackers.registry import register
 from arrivals.trackers.svalse.components import (
@@ -24,30 +22,11 @@ from arrivals.trackers.svalse.components import (
 )
 from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver
 from arrivals.trackers.svalse.newton.solver import NewtonSolver
-from arrivals.typing import Bool, Complex, Float, Int
+from arrivals.typing import Bool, Float, Int
 from arrivals.validation import instance, not_negative, one_of
 
 Engine = Literal["newton", "fast", "coordinate"]
 DEFAULT_SOLVER = NewtonSolver()
-
-
-@dataclass(frozen=True, eq=False)
-class Observation:
-    """Valid data of one step: snapshots without gaps, and the manifold of their sensors and bins.
-
-    Attributes
-    ----------
-    snapshots : ndarray, shape (n_bins, n_sensors, n_snapshots)
-    manifold : Manifold
-    bins : ndarray of bool, shape (n_bins of the measurement,)
-    key : bytes
-        Equal for steps whose valid bins, sensors and snapshots are the same.
-    """
-
-    snapshots: Complex
-    manifold: Manifold
-    bins: Bool
-    key: bytes
 
 
 @register("valse")
@@ -56,9 +35,9 @@ class VALSE(BatchDirectionTracker):
 
     Parameters
     ----------
-    measurement : ArraySnapshot
-        Any array, with any number of frequencies and snapshots a step. Its noise is not used: the
-        method estimates it.
+    measurement : DirectionMeasurement
+        An `ArraySnapshot`, or a model with its methods: any array, with any number of frequencies
+        and snapshots a step. Its noise is not used: the method estimates it.
     solver : NewtonSolver or CoordinateSolver
         Maximization of the bound, with its settings: joint Newton steps on all angles, or the
         paper's coordinate ascent, which takes three to thirty times as long and integrates the
@@ -96,7 +75,7 @@ class VALSE(BatchDirectionTracker):
 
     Examples
     --------
-    >>> from arrivals.measurement_models import SensorArray
+    >>> from arrivals.measurement_models import ArraySnapshot, SensorArray
     >>> model = ArraySnapshot(SensorArray.ula(15, spacing=0.5), wavelength=1.0, noise=1e-3)
     >>> z = model.simulate([-0.2, 0.5], [1.0, 1.0j], np.random.default_rng(0))
     >>> tracker = VALSE(model)
@@ -107,17 +86,14 @@ class VALSE(BatchDirectionTracker):
 
     def __init__(
         self,
-        measurement: ArraySnapshot,
+        measurement: DirectionMeasurement,
         *,
         solver: Solver = DEFAULT_SOLVER,
         engine: Engine | None = None,
         reference: Reference = "middle",
     ) -> None:
-        if not hasattr(measurement, "manifold"):
-            raise TypeError(
-                f"measurement must be an ArraySnapshot or have its `manifold`; got {measurement!r}"
-            )
-        self.measurement = measurement
+        protocol: type[Any] = DirectionMeasurement
+        self.measurement: DirectionMeasurement = instance("measurement", measurement, protocol)
         self.solver, self.engine = selected_solver(solver, engine), None
         self.reference = one_of("reference", reference, ("middle", "first"))
         manifold = measurement.manifold(self.reference)
@@ -155,7 +131,7 @@ class VALSE(BatchDirectionTracker):
     def step_batch(self, trackers: Sequence[Self], step: Sequence[Any], dt: float) -> None:
         """Predict and update copies of this tracker, those with the same sensors in one call."""
         self.predict_batch(trackers, dt)
-        groups: dict[bytes, list[tuple[Self, Observation]]] = {}
+        groups: dict[bytes, list[tuple[Self, ObservedSnapshots]]] = {}
         for tracker, z in zip(trackers, step, strict=True):
             observed = tracker.observe(z)
             if observed is None:
@@ -179,25 +155,19 @@ class VALSE(BatchDirectionTracker):
         """Report what is expected before a measurement: nothing."""
         self.report([])
 
-    def observe(self, z: ArrayLike | None) -> Observation | None:
+    def observe(self, z: ArrayLike | None) -> ObservedSnapshots | None:
         """Return the valid data of a measurement; None if it is missing."""
-        if is_missing(z):
-            return None
-        Y = self.measurement.looks(np.asarray(z))
-        valid = ObservedSnapshots.of(Y)
-        manifold = self.measurement.manifold(self.reference).only(np.flatnonzero(valid.bins))
-        manifold = manifold.without(np.flatnonzero(~valid.sensors))
-        return Observation(valid.block(Y), manifold, valid.bins, valid.key)
+        return self.measurement.observe(z, self.reference)
 
-    def component_prior(self, observed: Observation) -> ComponentPrior | None:
+    def component_prior(self, observed: ObservedSnapshots) -> ComponentPrior | None:
         """Return the prior of the components: None, as nothing is known."""
         return None
 
-    def store(self, posterior: ComponentPosterior, observed: Observation) -> None:
+    def store(self, posterior: ComponentPosterior, observed: ObservedSnapshots) -> None:
         """Report the active components, and keep the noise of each bin."""
         self.bin_noise = updated(self.bin_noise, observed.bins, posterior.bin_noise)
-        active = detected(observed.manifold, posterior)
-        self.report_posterior(posterior, observed.manifold, active)
+        manifold = observed.manifold
+        self.report_posterior(posterior, manifold, detected(manifold, posterior))
 
     def report_posterior(
         self,
@@ -239,10 +209,9 @@ def selected_solver(solver: Solver, engine: Engine | None) -> Solver:
     return settings.converted(NewtonSolver)
 
 
-def warn_of_ambiguity(measurement: ArraySnapshot) -> None:
+def warn_of_ambiguity(measurement: DirectionMeasurement) -> None:
     """Warn if two directions have the same response at every frequency."""
-    pair = measurement.ambiguity() if hasattr(measurement, "ambiguity") else None
-    if pair is not None:
+    if (pair := measurement.ambiguity()) is not None:
         one, other = np.rad2deg(pair)
         warnings.warn(
             f"directions {one:.1f} and {other:.1f} degrees are ambiguous: they have the same "

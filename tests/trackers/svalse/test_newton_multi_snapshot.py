@@ -250,6 +250,7 @@ def test_the_bound_is_no_lower_than_that_of_coordinate_ascent(numbers: dict[str,
         tracker = trial.tracker("svalse")
         assert isinstance(tracker, SVALSE)
         model = tracker.measurement
+        assert isinstance(model, ArraySnapshot)
         manifold = model.manifold()
         for t, z in enumerate(trial.measurements):
             tracker.predict()
@@ -300,6 +301,7 @@ def test_a_circle_turned_by_anything_turns_what_is_found() -> None:
     trial = create("circle", n_bins=3, n_steps=25).sample(np.random.default_rng(0))
     tracker = trial.tracker("svalse")
     assert isinstance(tracker, SVALSE)
+    assert isinstance(tracker.measurement, ArraySnapshot)
     other = SVALSE(turned(tracker.measurement, 1.234), tracker.motion)
     a, b = tracker.run(trial.measurements), other.run(trial.measurements)
     same = a.n_found == b.n_found

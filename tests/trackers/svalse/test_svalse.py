@@ -409,7 +409,10 @@ def test_a_grid_wider_than_half_a_wavelength_warns_of_the_first_two_directions_a
     ("params", "message"),
     [
         ({"motion": VonMisesWalk(100.0)}, "motion must be a BernoulliVonMises"),
-        ({"measurement": LINE.array}, "measurement must be an ArraySnapshot or have"),
+        (
+            {"measurement": LINE.array},
+            "measurement must be a DirectionMeasurement; got SensorArray",
+        ),
         ({"reference": "last"}, "reference must be one of 'middle', 'first'"),
         ({"engine": "slow"}, "engine must be one of 'newton', 'fast', 'coordinate'"),
         ({"solver": "fast"}, "solver must be a NewtonSolver or a CoordinateSolver; got 'fast'"),
