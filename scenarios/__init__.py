@@ -8,8 +8,7 @@ from arrivals.recordings.network_calibration import calibrate
 from arrivals.recordings.networks import Network, read_network
 from arrivals.recordings.readers import read
 from arrivals.recordings.recording import Recording
-from arrivals.scenarios.base import Scenario, Trial, available, create, register
-from arrivals.scenarios.base import find_scenario as find
+from arrivals.scenarios.base import Scenario, Trial
 from arrivals.scenarios.bounds.detection import exact_detection, network_detection
 from arrivals.scenarios.bounds.signal_strength import rss_bound
 from arrivals.scenarios.experiments.methods import Method, grid
@@ -18,6 +17,7 @@ from arrivals.scenarios.experiments.study import Study
 from arrivals.scenarios.metrics.gospa import Gospa, gospa, mean_gospa, mean_rmse, ospa, rmse
 from arrivals.scenarios.metrics.separation import nmse, sdr
 from arrivals.scenarios.metrics.unlabelled_rmse import best_assignment_rmse
+from arrivals.scenarios.registry import available, create, find, register
 from arrivals.scenarios.simulations import ar_signals  # registers the scenes
 
 __all__ = [

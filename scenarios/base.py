@@ -1,4 +1,4 @@
-"""Base classes of scenarios and trials, and the registry of scenarios."""
+"""Base classes of scenarios and trials."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ import numpy as np
 from arrivals.measurement_models import ArraySamples, ArraySnapshot, LogNormalRSS
 from arrivals.motion_models import MotionModel
 from arrivals.parameters import FrozenModel
-from arrivals.registry import Registry
 from arrivals.trackers import Tracker, find
 from arrivals.typing import Complex, Float
 
@@ -113,12 +112,3 @@ class Scenario(FrozenModel, ABC):
         Trial
             Measurements, truth and models.
         """
-
-
-_scenarios: Registry[Scenario] = Registry(Scenario, "arrivals.scenarios", "scenario")  # type: ignore[type-abstract]  # only its subclasses are made
-available, create, find_scenario, register = (
-    _scenarios.available,
-    _scenarios.create,
-    _scenarios.find,
-    _scenarios.register,
-)

@@ -10,13 +10,14 @@ from typing import Any
 
 import arrivals
 from arrivals.parameters import to_plain
-from arrivals.scenarios.base import Scenario, create
+from arrivals.scenarios.base import Scenario
 from arrivals.scenarios.experiments.batch import ERROR, Row, RunBatch
 from arrivals.scenarios.experiments.methods import Method, methods
 from arrivals.scenarios.experiments.results_file import Results, code_mark
 from arrivals.scenarios.experiments.study import Study
 from arrivals.scenarios.experiments.workers import report_worker_failure
 from arrivals.scenarios.metrics.registry import CPU, METRICS, Metric
+from arrivals.scenarios.registry import create
 from arrivals.validation import count, one_of
 
 Metrics = Sequence[str] | Mapping[str, Metric]

@@ -5,31 +5,19 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from arrivals.files import atomic_write
 from arrivals.scenarios.experiments.batch import ERROR, Row
 from arrivals.scenarios.experiments.results_file import Results, read_config
+from arrivals.scenarios.experiments.statistics import (
+    Difference,
+    bootstrap_interval,
+    paired_difference,
+)
 from arrivals.typing import Float
-
-
-class Difference(NamedTuple):
-    """Paired difference of two methods over runs.
-
-    Parameters
-    ----------
-    mean, error : float
-        Mean of the difference and its standard error.
-    n_below, n_runs : int
-        Number of runs with a difference below 0, and of all runs.
-    """
-
-    mean: float
-    error: float
-    n_below: int
-    n_runs: int
 
 
 class Study:
@@ -240,18 +228,7 @@ class Study:
         ----------
         Efron and Tibshirani, *An Introduction to the Bootstrap*, 1993, ch. 14.
         """
-        from scipy.stats import bootstrap
-
-        values = self.array(metric, method, case)
-        if values.size < 2:
-            return np.nan, np.nan
-        if np.ptp(values) == 0:
-            return float(values[0]), float(values[0])
-        interval = bootstrap(
-            (values,), np.mean, n_resamples=2000, confidence_level=level,
-            rng=np.random.default_rng(0),
-        ).confidence_interval  # fmt: skip
-        return float(interval.low), float(interval.high)
+        return bootstrap_interval(self.array(metric, method, case), level)
 
     def paired(self, metric: str, first: str, second: str, case: str | None = None) -> Difference:
         """Return first minus second on the same draws, over the runs that both have.
@@ -268,11 +245,9 @@ class Study:
         Difference
             Mean, standard error and numbers of runs.
         """
-        a, b = self.values(metric, first, case), self.values(metric, second, case)
-        d = np.array([a[run] - b[run] for run in a if run in b], dtype=np.float64)
-        n = len(d)
-        error = float(d.std(ddof=1) / np.sqrt(n)) if n > 1 else np.nan
-        return Difference(float(d.mean()) if n else np.nan, error, int((d < 0).sum()), n)
+        return paired_difference(
+            self.values(metric, first, case), self.values(metric, second, case)
+        )
 
     def summary(self) -> list[dict[str, Any]]:
         """Return a row for each case, method and metric.

@@ -7,7 +7,7 @@ statement on each figure is listed beside our numbers.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from arrivals.scenarios.base import Trial
 from arrivals.scenarios.experiments.workers import parallel_map
 from arrivals.scenarios.metrics.separation import nmse
 from arrivals.scenarios.metrics.unlabelled_rmse import best_assignment_rmse
+from arrivals.scenarios.reproduce.ar_kalman_plots import draw_figure
 from arrivals.scenarios.reproduce.claims import verdict
 from arrivals.scenarios.reproduce.studies import Report
 from arrivals.scenarios.simulations.autoregressive_sources import (
@@ -30,10 +31,6 @@ from arrivals.scenarios.simulations.speech import SpeechField, SpeechOfOrderTwo
 from arrivals.trackers import create
 from arrivals.trackers.run import Run
 from arrivals.typing import Float
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 SPEECH = {"regression__forgetting": 0.98, "regression__ar_forgetting": 0.99,
           "regression__ridge": 5.0, "gate": 0.3, "noise__adapt_process_noise": False}  # fmt: skip
@@ -96,7 +93,7 @@ def ar_kf(runs: int, seed: int) -> Report:
     rows = [row for row, _ in results]
     paths = [path for _, path in results]
     figures = {
-        f"fig{number}": _draw(
+        f"fig{number}": draw_figure(
             number, [(c, p) for c, p in zip(all_cases, paths, strict=True) if c.figure == number]
         )
         for number in sorted({case.figure for case in all_cases})
@@ -256,48 +253,3 @@ def hold_last(doa: Float) -> Float:
     """
     last = np.maximum.accumulate(np.where(np.isnan(doa), 0, np.arange(len(doa))[:, None]), axis=0)
     return np.nan_to_num(np.take_along_axis(doa, last, axis=0))
-
-
-# -- figures -----------------------------------------------------------------------------------
-
-COLOURS = ("#1f77b4", "#d62728", "#2ca02c")
-
-
-def _draw(number: int, parts: list[tuple[Experiment, Float]]) -> Figure:
-    """Draw a figure of the report: directions over intervals, and AR coefficients below."""
-    from matplotlib.figure import Figure
-
-    n_rows = 1 if number in (2, 3, 4) else 2
-    figure = Figure(figsize=(4.2 * len(parts) + 1, 3.2 * n_rows), layout="constrained")
-    axes = figure.subplots(n_rows, len(parts), squeeze=False, sharey="row")
-    for (case, lines), column in zip(parts, axes.T, strict=True):
-        _draw_directions(column[0], lines)
-        column[0].set_title(f"Fig. {number}: {case.name}")
-        if n_rows == 2:
-            _draw_coefficients(column[1], lines, case)
-        column[-1].set_xlabel("interval")
-    axes[0, 0].set_ylabel("direction, degrees")
-    if n_rows == 2:
-        axes[1, 0].set_ylabel("AR coefficients")
-    return figure
-
-
-def _draw_directions(ax: Axes, lines: Float) -> None:
-    truth, estimates, plain = lines[:3]
-    ax.plot(truth, color="black", linewidth=0.8, linestyle="--")
-    for k, colour in zip(range(truth.shape[1]), COLOURS, strict=False):
-        ax.plot(plain[:, k], color=colour, linewidth=0.8, alpha=0.4)
-        ax.plot(estimates[:, k], color=colour, linewidth=1.2)
-    labels = ("truth", "plain regression, as reported", "with the covariance rows")
-    n = truth.shape[1]
-    ax.legend([ax.lines[0], ax.lines[n], ax.lines[n + 1]], labels, fontsize=7)
-    ax.set_ylim(truth.min() - 25, truth.max() + 25)
-
-
-def _draw_coefficients(ax: Axes, lines: Float, case: Experiment) -> None:
-    for k, colour in zip(range(lines.shape[2]), COLOURS, strict=False):
-        for a in lines[3:]:
-            ax.plot(a[:, k], color=colour, linewidth=1.0)
-        if isinstance(case.scene, AutoregressiveField):
-            for known in case.scene.coefficients[k]:
-                ax.axhline(known, color="black", linewidth=0.8, linestyle="--")

@@ -9,7 +9,8 @@ import numpy as np
 
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.motion_models import AutoregressiveSources
-from arrivals.scenarios.base import Scenario, Trial, register
+from arrivals.scenarios.base import Scenario, Trial
+from arrivals.scenarios.registry import register
 from arrivals.scenarios.simulations.ar_signals import ar_signals
 from arrivals.typing import Complex, Float
 from arrivals.validation import count, number

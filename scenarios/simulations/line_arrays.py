@@ -13,7 +13,8 @@ import numpy as np
 
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.motion_models import BernoulliVonMises
-from arrivals.scenarios.base import Scenario, Trial, register
+from arrivals.scenarios.base import Scenario, Trial
+from arrivals.scenarios.registry import register
 from arrivals.typing import Bool, Complex, Float
 from arrivals.validation import count, number
 

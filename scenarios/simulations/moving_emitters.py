@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from arrivals.motion_models import ConstantVelocity, MotionModel
-from arrivals.scenarios.base import register
+from arrivals.scenarios.registry import register
 from arrivals.scenarios.simulations.signal_strength import RSSScenario, lattice
 from arrivals.typing import Float
 from arrivals.validation import count

@@ -9,7 +9,8 @@ import numpy as np
 
 from arrivals.measurement_models import ArraySnapshot, ElementResponse, SensorArray
 from arrivals.motion_models import BernoulliVonMises
-from arrivals.scenarios.base import Scenario, Trial, register
+from arrivals.scenarios.base import Scenario, Trial
+from arrivals.scenarios.registry import register
 from arrivals.scenarios.simulations.line_arrays import complex_normal
 from arrivals.typing import Complex, Float
 from arrivals.validation import count, number, one_of, positive

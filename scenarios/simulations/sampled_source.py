@@ -15,7 +15,8 @@ from arrivals.measurement_models import ArraySamples, FlatBand, SensorArray, Ton
 from arrivals.measurement_models.arrays.sensor_array import direction
 from arrivals.measurement_models.delays.source_correlation import SourceCorrelation
 from arrivals.motion_models import DelayWalk
-from arrivals.scenarios.base import Scenario, Trial, register
+from arrivals.scenarios.base import Scenario, Trial
+from arrivals.scenarios.registry import register
 from arrivals.typing import Complex, Float
 from arrivals.validation import count, number, one_of
 

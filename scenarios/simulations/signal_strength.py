@@ -15,7 +15,8 @@ import numpy as np
 
 from arrivals.measurement_models import LogNormalRSS, db_to_neper
 from arrivals.motion_models import MotionModel, RandomWalk
-from arrivals.scenarios.base import Scenario, Trial, register
+from arrivals.scenarios.base import Scenario, Trial
+from arrivals.scenarios.registry import register
 from arrivals.typing import Bool, Float
 from arrivals.validation import count, number, one_of, positive
 

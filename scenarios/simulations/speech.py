@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from arrivals.motion_models import AutoregressiveSources, yule_walker
-from arrivals.scenarios.base import Trial, register
+from arrivals.scenarios.base import Trial
+from arrivals.scenarios.registry import register
 from arrivals.scenarios.simulations.autoregressive_sources import SourceField
 from arrivals.typing import Float
 from arrivals.validation import count

@@ -15,10 +15,11 @@ import numpy as np
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.measurement_models.arrays.files import from_description
 from arrivals.motion_models import BernoulliVonMises
-from arrivals.scenarios.base import Scenario, Trial, register
+from arrivals.scenarios.base import Scenario, Trial
 from arrivals.scenarios.ocean_acoustics.eigenrays import eigenrays
 from arrivals.scenarios.ocean_acoustics.normal_modes import mode_field, modes
 from arrivals.scenarios.ocean_acoustics.waveguide import BottomLayer, Waveguide
+from arrivals.scenarios.registry import register
 from arrivals.scenarios.simulations.line_arrays import complex_normal
 from arrivals.typing import Complex, Float, Int
 from arrivals.validation import count, number, one_of, positive

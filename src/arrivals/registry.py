@@ -58,6 +58,12 @@ class Registry(Generic[Base]):
             If the name is registered for another class.
         TypeError
             If the class does not derive from the base.
+
+        Examples
+        --------
+        >>> registry = Registry(dict, "example.group", "mapping")
+        >>> registry.register("plain")(dict)
+        <class 'dict'>
         """
 
         def enter(kind: Kind) -> Kind:
@@ -91,6 +97,11 @@ class Registry(Generic[Base]):
         -------
         list of str
             Names.
+
+        Examples
+        --------
+        >>> Registry(dict, "example.group", "mapping").available()
+        []
         """
         return sorted({*self._classes, *self._entry_points()})
 
@@ -111,6 +122,14 @@ class Registry(Generic[Base]):
         ------
         ValueError
             If the name is unknown, with similar names; or if two packages claim it.
+
+        Examples
+        --------
+        >>> registry = Registry(dict, "example.group", "mapping")
+        >>> _ = registry.register("tidy")(dict)
+        >>> registry.find("plain")
+        Traceback (most recent call last):
+        ValueError: there is no mapping 'plain'; known: tidy
         """
         if not isinstance(name, str):
             raise TypeError(f"name of {with_article(self.noun)} must be a string; got {name!r}")
@@ -159,6 +178,13 @@ class Registry(Generic[Base]):
         -------
         object
             The new object.
+
+        Examples
+        --------
+        >>> registry = Registry(dict, "example.group", "mapping")
+        >>> _ = registry.register("plain")(dict)
+        >>> registry.create("plain", a=1)
+        {'a': 1}
         """
         return self.find(name)(**params)
 

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from arrivals.scenarios.base import Trial, create
+from arrivals.scenarios.base import Trial
 from arrivals.scenarios.experiments.workers import parallel_map
 from arrivals.scenarios.metrics.gospa import Gospa, mean_gospa
+from arrivals.scenarios.registry import create
 from arrivals.scenarios.reproduce.claims import negative, verdict
 from arrivals.scenarios.reproduce.studies import Report
 from arrivals.scenarios.simulations.planar_arrays import Circle

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 
 from arrivals.motion_models import BernoulliVonMises
-from arrivals.scenarios.base import Scenario, create
+from arrivals.scenarios.base import Scenario
 from arrivals.scenarios.bounds.snapshot import line_bound
 from arrivals.scenarios.experiments.methods import Method, methods, tracker_name
 from arrivals.scenarios.experiments.monte_carlo import StudySettings, compute_study
 from arrivals.scenarios.experiments.study import Study
+from arrivals.scenarios.registry import create
 from arrivals.scenarios.reproduce.claims import negative, verdict
 from arrivals.scenarios.reproduce.studies import Report
 from arrivals.scenarios.reproduce.svalse.plots import draw_parts, draw_runs

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from arrivals.plots.study import METHOD_COLOURS, plot_metric
-from arrivals.scenarios.base import create
 from arrivals.scenarios.bounds.snapshot import LineBound, line_bound
 from arrivals.scenarios.experiments.methods import tracker_name
 from arrivals.scenarios.experiments.monte_carlo import StudySettings, compute_study
 from arrivals.scenarios.experiments.study import Study
+from arrivals.scenarios.registry import create
 from arrivals.scenarios.reproduce.claims import negative, verdict
 from arrivals.scenarios.reproduce.studies import Report
 from arrivals.scenarios.reproduce.svalse.figures_4_to_7 import NAN, batch_of, table_methods

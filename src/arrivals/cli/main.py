@@ -11,10 +11,10 @@ from functools import partial
 from typing import Any, NoReturn
 
 import arrivals
+from arrivals import scenarios
 from arrivals.cli.locate import add_locate
 from arrivals.cli.track import track
 from arrivals.recordings.stream import DTYPES
-from arrivals.scenarios import base as scenarios
 from arrivals.scenarios.demos.infrasound import infrasound
 from arrivals.scenarios.demos.swellex96 import demo
 from arrivals.scenarios.reproduce.studies import add_reproduce
@@ -155,7 +155,7 @@ def _is_quiet(arguments: argparse.Namespace) -> bool:
 def _list(arguments: argparse.Namespace) -> None:
     kinds: list[tuple[str, list[str], Callable[[str], type]]] = [
         ("trackers", available(), find),
-        ("scenarios", scenarios.available(), scenarios.find_scenario),
+        ("scenarios", scenarios.available(), scenarios.find),
     ]
     for noun, names, find_kind in kinds:
         if names:

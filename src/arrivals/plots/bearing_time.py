@@ -202,6 +202,7 @@ def plot_array(array: SensorArray, *, ax: Axes | None = None) -> Axes:
     Parameters
     ----------
     array : SensorArray
+        Array whose sensors are drawn.
     ax : matplotlib Axes, optional
         A new figure's if None. Sensors in space want one of projection "3d".
 

@@ -86,7 +86,7 @@ def test_travel_times_satisfy_the_eikonal_equation() -> None:
         assert (t[1, 2] - t[1, 0]) / 0.2 == pytest.approx(np.sin(doa) / c, rel=3e-2)
 
 
-def test_ray_basedrays_stay_between_their_turning_points() -> None:
+def test_traced_rays_stay_between_their_turning_points() -> None:
     guide = environment()
     fan = trace_rays(guide, np.deg2rad([1.0, 2.0, 10.0]), 9.0, [150.0])
     speed = np.interp(fan.depth, guide.depths, guide.speeds)

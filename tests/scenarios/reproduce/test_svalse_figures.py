@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from arrivals.scenarios import Study, base
+from arrivals import scenarios
+from arrivals.scenarios import Scenario, Study
 from arrivals.scenarios.reproduce import studies as reproduce
 from arrivals.scenarios.reproduce.studies import RUNS, STUDIES, Report
 from arrivals.scenarios.reproduce.svalse import any_array as reproduce_any_array
@@ -21,8 +22,8 @@ from arrivals.scenarios.reproduce.swellex96 import figures_11_12 as reproduce_sw
 def short(monkeypatch: pytest.MonkeyPatch) -> None:
     """Make the studies' scenarios one step long."""
 
-    def create(name: str, **params: Any) -> base.Scenario:
-        return base.create(name, **{"n_steps": 1} | params)
+    def create(name: str, **params: Any) -> Scenario:
+        return scenarios.create(name, **{"n_steps": 1} | params)
 
     for module in (reproduce_svalse, reproduce_svalse_snr):
         monkeypatch.setattr(module, "create", create)
