@@ -83,7 +83,7 @@ def plot_bearing_time(
     """
     if "doa" not in run.fields:
         raise TypeError(f"the run must hold directions; it holds {run.kind.__name__}")
-    ax = _axes((9.0, 4.5)) if ax is None else ax
+    ax = new_axes((9.0, 4.5)) if ax is None else ax
     at = np.arange(len(run), dtype=np.float64) if time is None else shaped("time", time, len(run))
     if snapshots is not None:
         if measurement is None:
@@ -216,7 +216,7 @@ def plot_array(array: SensorArray, *, ax: Axes | None = None) -> Axes:
     >>> plot_array(SensorArray.ula(8, spacing=0.5)).get_xlabel()
     'position, m'
     """
-    ax = _axes((7.0, 1.6) if array.dim == 1 else (4.5, 4.5), array.dim) if ax is None else ax
+    ax = new_axes((7.0, 1.6) if array.dim == 1 else (4.5, 4.5), array.dim) if ax is None else ax
     places = array.positions
     if array.dim == 1:
         places = np.column_stack([places, np.zeros(len(places))])
@@ -246,7 +246,7 @@ def _finish_array(ax: Axes, dim: int) -> None:
         ax.set_axisbelow(True)
 
 
-def _axes(size: tuple[float, float], dim: int = 2) -> Axes:
+def new_axes(size: tuple[float, float], dim: int = 2) -> Axes:
     """Return the axes of a new figure that no window shows."""
     from matplotlib.figure import Figure
 

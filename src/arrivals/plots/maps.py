@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.plots.bearing_time import NEUTRAL, PALETTE, _axes
+from arrivals.plots.bearing_time import NEUTRAL, PALETTE, new_axes
 from arrivals.trackers.run import Run
 from arrivals.typing import Float
 from arrivals.validation import count, real
@@ -62,7 +62,7 @@ def plot_map(
     if "position" not in run.fields:
         raise TypeError(f"the run must hold positions; it holds {run.kind.__name__}")
     count("n_ellipses", n_ellipses)
-    ax = _axes((7.0, 6.4)) if ax is None else ax
+    ax = new_axes((7.0, 6.4)) if ax is None else ax
     if sensors is not None:
         x, y = real("sensors", sensors).T
         ax.scatter(x, y, s=16, color="0.6", marker="^", label="sensors")

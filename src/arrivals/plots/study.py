@@ -63,9 +63,9 @@ def plot_metric(
     >>> ax.get_xlabel(), ax.get_ylabel()
     ('snr_db', 'gospa')
     """
-    from arrivals.plots.bearing_time import _axes
+    from arrivals.plots.bearing_time import new_axes
 
-    ax = _axes((6.4, 4.4)) if ax is None else ax
+    ax = new_axes((6.4, 4.4)) if ax is None else ax
     places = _places(study, x)
     shown = study.methods if methods is None else list(methods)
     for n, label in enumerate(shown):
