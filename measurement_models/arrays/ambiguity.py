@@ -110,3 +110,26 @@ def in_a_line(waves: PlaneWaves) -> float | None:
     if size[-1] > 1e-3 * size[0]:
         return None
     return float(np.arctan2(axes[0, 1], axes[0, 0]) % np.pi)
+
+
+def check_directions(waves: PlaneWaves) -> None:
+    """Raise a ValueError if an array cannot give directions.
+
+    Examples
+    --------
+    >>> from arrivals.measurement_models.arrays.sensor_array import SensorArray
+    >>> check_directions(PlaneWaves(SensorArray.uca(2, 0.5), [1.0]))
+    Traceback (most recent call last):
+    ValueError: array must have at least 3 sensors for azimuths; got 2
+    """
+    n, minimum = waves.array.n_sensors, 2 if waves.is_line else 3
+    if n < minimum:
+        what = "directions" if waves.is_line else "azimuths"
+        raise ValueError(f"array must have at least {minimum} sensors for {what}; got {n}")
+    if not waves.is_line and (azimuth := in_a_line(waves)) is not None:
+        along = np.rad2deg(azimuth)
+        one, other = (f"{(along + side) % 360:.0f}" for side in (30, -30))
+        raise ValueError(
+            f"array is collinear ({n} sensors): azimuths {one} and {other} degrees are ambiguous. "
+            "Pass 1-D positions to estimate directions from broadside"
+        )

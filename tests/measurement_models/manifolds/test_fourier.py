@@ -276,16 +276,16 @@ def test_the_first_image_of_a_sparse_line_is_that_of_endfire() -> None:
     [
         (
             SensorArray(np.array([[0.0, 1.0], [2.0, 3.0]])),
-            "azimuths want at least 3 sensors; .* has 2",
+            "at least 3 sensors for azimuths; got 2",
         ),
-        (SensorArray(np.array([1.0])), "directions want at least 2 sensors; this array has 1"),
+        (SensorArray(np.array([1.0])), "at least 2 sensors for directions; got 1"),
         (
             SensorArray(np.array([[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]])),
-            "stand in a line, which cannot tell front from back: azimuths 30 and 330 degrees look",
+            r"collinear \(3 sensors\): azimuths 30 and 330 degrees are ambiguous",
         ),
         (
             SensorArray(np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 5.0], [3.0, 3.0, 2.0]])),
-            "front from back",
+            "array is collinear",
         ),
     ],
 )
@@ -345,9 +345,9 @@ def test_bad_gains_are_refused(gains: Any, message: str) -> None:
 
 def test_measurements_of_the_wrong_shape_are_refused() -> None:
     model = ArraySnapshot(CIRCLE, [1.0, 1.2], n_snapshots=3)
-    with pytest.raises(ValueError, match=r"shape \(2, 3, 8\), one number a sensor in every look"):
+    with pytest.raises(ValueError, match=r"shape \(2, 3, 8\), one number a sensor in every bin"):
         model.snapshot(np.ones((3, 2, 8)))
-    with pytest.raises(ValueError, match="Gaussian face is that of one snapshot at one wavelength"):
+    with pytest.raises(ValueError, match="must have one snapshot a step at one wavelength"):
         model.h([0.1, 1.0, 0.0])
     with pytest.raises(ValueError, match="a second unknown"):
         MODELS["elevation"].H([0.1, 1.0, 0.0])
