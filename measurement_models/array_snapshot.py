@@ -156,7 +156,7 @@ class ArraySnapshot(SingleSourceSnapshot):
         return a if self.n_bins > 1 else np.asarray(a[..., 0, :])
 
     def snapshot(self, z: ArrayLike) -> Complex:
-        """Return a measurement as complex numbers of `shape`, NaN where missing; ValueError if all."""
+        """Return a measurement as complex numbers of `shape`, NaN where it is missing."""
         return complex_snapshot(z, self.shape)
 
     def observe(

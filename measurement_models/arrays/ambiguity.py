@@ -1,4 +1,4 @@
-"""Directions that an array cannot tell apart, found before anything is tracked."""
+"""Pairs of directions with equal response, found before tracking."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ FINEST = 1024  # directions of a search at most
 
 @lru_cache(maxsize=256)
 def ambiguous_pair(waves: PlaneWaves) -> tuple[float, float] | None:
-    """Return the first two directions, rad, whose responses are alike at every frequency, or None.
+    """Return the first two directions, rad, of equal response at every frequency, or None.
 
-    Alike is a mean of |aᴴb|² / ‖a‖²‖b‖² over the bins above 0.99. The two endfire directions of a
+    Equal is a mean of |aᴴb|² / ‖a‖²‖b‖² over the bins above 0.99. The two endfire directions of a
     line at half a wavelength do not count.
 
     Examples

@@ -17,11 +17,12 @@ from arrivals.validation import positive, real
 
 @dataclass(frozen=True)
 class PlaneWaves(FrozenModel):
-    """How an array answers to plane waves.
+    """Response of an array to plane waves.
 
     Parameters
     ----------
     array : SensorArray
+        Positions of the sensors.
     wavelengths : sequence of float
         Of the frequency bins, m.
     response : ElementResponse, optional
@@ -56,13 +57,13 @@ class PlaneWaves(FrozenModel):
             if self.slowness is not None:
                 raise ValueError("either slowness or elevation may be unknown, not both")
             if self.array.dim == 1:
-                raise ValueError("a line hears no elevation apart: its directions lie on cones")
+                raise ValueError("elevation must be None for a line: its directions are cones")
             if not all(abs(angle) <= np.pi / 2 for angle in self.elevation):
                 raise ValueError(f"elevation must lie within ±π/2; got {self.elevation}")
 
     @property
     def is_line(self) -> bool:
-        """Whether directions are counted from broadside: two angles of a circle look alike."""
+        """Whether directions are counted from broadside: two angles have one response."""
         return self.array.dim == 1
 
     @property
@@ -106,7 +107,7 @@ class PlaneWaves(FrozenModel):
         return np.asarray(a)
 
     def without(self, sensors: Sequence[int] | Int) -> PlaneWaves:
-        """Return the waves on the array less some sensors."""
+        """Return the waves on the array without some sensors."""
         if len(sensors) == 0:
             return self
         response = self.response and self.response.without(sensors)

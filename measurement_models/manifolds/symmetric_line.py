@@ -16,7 +16,7 @@ from arrivals.validation import instance, positive
 
 @dataclass(frozen=True)
 class ArrayManifold(SingleSourceSnapshot):
-    """What a symmetric array with a centre sensor hears, turned so that its response is real.
+    """Snapshots of a symmetric array with a centre sensor, transformed to a real response.
 
     Sums and differences of the two sensors of a pair turn a(β) into
     [√2 cos φ_1 ... √2 cos φ_M, 1, √2 sin φ_1 ... √2 sin φ_M], φ_m = 2π d_m/λ sin β, the inner pair
@@ -39,7 +39,7 @@ class ArrayManifold(SingleSourceSnapshot):
     Notes
     -----
     Shapes: snapshots (..., n_sensors), complex; directions (..., n_sources), rad. The Gaussian
-    face is that of one source with a state [β, Re w, Im w], and its measurements are real,
+    interface is that of one source with a state [β, Re w, Im w], and its measurements are real,
     `composite(transform(snapshot))`.
 
     References

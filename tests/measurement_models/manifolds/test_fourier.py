@@ -1,4 +1,4 @@
-"""Any array as a Fourier series: it is the array's response, and what no array can tell."""
+"""Any array as a Fourier series: equal to the array's response; ambiguous directions."""
 
 import json
 import pickle
@@ -92,8 +92,8 @@ def test_amplitudes_are_those_at_the_origin(model: ArraySnapshot) -> None:
     manifold, doa = model.manifold(), np.array([0.4])
     w = manifold.to_amplitude([2j], doa)
     if model.n_bins == 1 and not model.slowness and not model.elevation:
-        seen = 2j * manifold.steering(doa)[0, 0, :, 0]
-        np.testing.assert_allclose(w * model.steering_vector(0.4), seen, atol=1e-7)
+        response = 2j * manifold.steering(doa)[0, 0, :, 0]
+        np.testing.assert_allclose(w * model.steering_vector(0.4), response, atol=1e-7)
     else:
         np.testing.assert_allclose(w, [2.0])
 
@@ -172,14 +172,14 @@ def test_model_survives_pickle_json_and_configuration(model: ArraySnapshot) -> N
     assert fourier_manifold(again.waves) is fourier_manifold(model.waves)
 
 
-def test_responses_are_parts_of_the_gaussian_face() -> None:
+def test_responses_are_parts_of_the_gaussian_interface() -> None:
     model = MODELS["cardioids"]
     x, steps = np.array([0.4, 1.2, -0.7]), 1e-6 * np.eye(3)
     slope = (model.h(x + steps) - model.h(x - steps)).T / 2e-6
     np.testing.assert_allclose(model.H(x), slope, atol=1e-7)
 
 
-# several looks
+# several snapshots
 
 
 @every_model
@@ -311,7 +311,7 @@ def test_directional_elements_tell_front_from_back() -> None:
         ({"slowness": [-1.0]}, "slowness must be finite and positive"),
         ({"elevation": [2.0]}, "elevation must lie within ±π/2"),
         ({"elevation": [0.1], "slowness": [1.0]}, "not both"),
-        ({"array": SPARSE, "elevation": [0.1]}, "a line hears no elevation"),
+        ({"array": SPARSE, "elevation": [0.1]}, "elevation must be None for a line"),
         ({"response": 3.0}, "response must be an ElementResponse"),
         ({"response": ElementResponse.first_order([0.0])}, r"\(8 sensors\); got \(4, 1\)"),
         (
