@@ -1,4 +1,4 @@
-"""Directions in which a position is seen from known places."""
+"""Bearings of a position from known stations."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from arrivals.validation import constant, count, covariance, positive, real
 
 @dataclass(frozen=True, eq=False, init=False)
 class Bearing(MeasurementModel):
-    """Azimuths at which known places see a position in the plane.
+    """Azimuths of a position in the plane from known sensors.
 
     Parameters
     ----------
     sensor_positions : array_like, shape (n_sensors, 2)
-        m.
+        Positions of the sensors, m.
     noise : float or array_like, shape (n_sensors, n_sensors)
         Variance of each bearing, or their covariance, rad².
     position : tuple of two int, optional
@@ -31,12 +31,13 @@ class Bearing(MeasurementModel):
     Raises
     ------
     ValueError
-        If a shape is wrong, the noise is no covariance or `position` names no two entries.
+        If a shape is wrong, the noise is not a covariance or `position` does not name two entries.
 
     Notes
     -----
     Shapes: states (..., n), measurements (..., n_sensors). Units: rad, anticlockwise from the x
-    axis, in [-π, π]; residuals are wrapped. At a sensor's own place a bearing has no slope: zero.
+    axis, in [-π, π]; residuals are wrapped. At a sensor's own position
+    the slope is zero.
 
     References
     ----------
@@ -45,10 +46,10 @@ class Bearing(MeasurementModel):
 
     Examples
     --------
-    >>> seen = Bearing([[0.0, 0.0], [10.0, 0.0]], noise=0.01, position=(0, 1))
-    >>> np.rad2deg(seen.h([10.0, 10.0])).round(6)
+    >>> bearings = Bearing([[0.0, 0.0], [10.0, 0.0]], noise=0.01, position=(0, 1))
+    >>> np.rad2deg(bearings.h([10.0, 10.0])).round(6)
     array([45., 90.])
-    >>> seen.residual([3.1, 0.0], [-3.1, 0.0]).round(4)
+    >>> bearings.residual([3.1, 0.0], [-3.1, 0.0]).round(4)
     array([-0.0832,  0.    ])
     """
 
@@ -127,7 +128,7 @@ class Bearing(MeasurementModel):
         return H
 
     def residual(self, z: ArrayLike, z_pred: ArrayLike) -> Float:
-        """Return z - z_pred, the shorter way round."""
+        """Return z - z_pred, wrapped into [-π, π)."""
         return np.asarray((np.subtract(z, z_pred) + np.pi) % (2 * np.pi) - np.pi)
 
     def _state(self, x: ArrayLike) -> tuple[Float, tuple[int, int]]:

@@ -42,7 +42,7 @@ class DirectionMeasurement(Protocol):
 def check_directions(
     measurement: DirectionMeasurement, reference: Reference, *, mixture: bool
 ) -> None:
-    """Refuse arrays that give no directions, and warn of those that give several for one.
+    """Reject arrays without identifiable directions; warn of ambiguous ones.
 
     Raises
     ------
@@ -52,15 +52,15 @@ def check_directions(
     manifold = measurement.manifold(reference)
     if manifold.coefficients is None:
         if mixture and not measurement.is_single:
-            raise ValueError('posterior "mixture" takes one look a step')
+            raise ValueError('posterior="mixture" requires one snapshot a step at one frequency')
         return
     if mixture:
-        raise ValueError('posterior "mixture" wants a line on a uniform grid, at one wavelength')
+        raise ValueError('posterior="mixture" requires a line on a uniform grid, at one wavelength')
     if (pair := measurement.ambiguity()) is not None:
         one, other = np.rad2deg(pair)
         warnings.warn(
-            f"directions {one:.1f} and {other:.1f} degrees look alike to this array at every "
+            f"directions {one:.1f} and {other:.1f} degrees have equal responses at every "
             "frequency: sources may be reported at either. Several frequencies, or sensors "
-            "nearer to each other, would tell them apart",
+            "nearer to each other, resolve the ambiguity",
             stacklevel=4,
         )

@@ -1,4 +1,4 @@
-"""Measurements that are a matrix times the state."""
+"""Linear measurements."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ from arrivals.validation import constant, covariance, state
 
 @dataclass(frozen=True, eq=False, init=False)
 class LinearMeasurement(MeasurementModel):
-    """A state seen through a matrix of one's own: z = H x + v, v ~ (0, R).
+    """Measurement by a matrix of the state: z = H x + v, v ~ (0, R).
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ class LinearMeasurement(MeasurementModel):
     Raises
     ------
     ValueError
-        If a matrix has the wrong shape or is not finite, or `noise` is no covariance.
+        If a matrix has the wrong shape or is not finite, or `noise` is not a covariance.
     TypeError
         If a matrix holds complex numbers; `composite` makes two real ones of each.
 

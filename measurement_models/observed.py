@@ -5,9 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.manifolds.manifold import Manifold
 from arrivals.typing import Bool, Complex, Float
+
+LARGEST, SMALLEST = 1e140, 1e-140  # magnitudes whose squares are finite and not zero
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +97,35 @@ class ObservedSnapshots:
     def block(self, Y: Complex) -> Complex:
         """Return the snapshots without gaps."""
         return self.snapshots
+
+
+def complex_snapshot(z: ArrayLike, shape: tuple[int, ...]) -> Complex:
+    """Return a measurement as complex numbers of a shape, NaN where a sensor gave none.
+
+    Numbers whose squares would overflow count as missing, those that would vanish as zero.
+
+    Examples
+    --------
+    >>> complex_snapshot([1.0, np.inf, 1e-200], (3,))
+    array([ 1. +0.j, nan+nanj,  0. +0.j])
+    """
+    array = np.asarray(z)
+    if array.dtype.kind not in "biufc":
+        raise TypeError(
+            f"a snapshot must hold complex numbers, NaN for a missing one; got {array.dtype}"
+        )
+    if array.shape != shape:
+        axes = "" if len(shape) == 1 else " in every bin and snapshot"
+        raise ValueError(
+            f"a snapshot must have shape {shape}, one number a sensor{axes}; got {array.shape}"
+        )
+    array = array.astype(np.complex128)
+    size = np.abs(array)
+    array[~(size < LARGEST)] = complex(np.nan, np.nan)
+    array[size < SMALLEST] = 0
+    if np.isnan(array).all():
+        raise ValueError("no sensor of the snapshot gave a finite number")
+    return array
 
 
 def updated(known: Float, bins: Bool, values: Float | None) -> Float:

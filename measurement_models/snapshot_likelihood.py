@@ -54,7 +54,39 @@ def log_known(z: Complex, expected: Complex, noise: float) -> Float:
     return np.asarray(-there.sum() * np.log(np.pi * noise) - energy / noise)
 
 
-def log_marginal(Y: Complex, A: Complex, noise: float, power: float) -> Float:
+def log_marginal(Y: Complex, a: Complex, noise: float, power: float) -> Float:
+    """Return ln p(Y) of sources of unknown amplitudes w ~ CN(0, power), averaged over responses.
+
+    y ~ CN(0, power Σ a aᴴ + noise I) for every bin and snapshot, entries that are NaN left out.
+
+    Parameters
+    ----------
+    Y : ndarray of complex, shape (n_bins, n_sensors, n_snapshots)
+        One measurement.
+    a : ndarray of complex, shape (n_nuisance, n_bins, n_sensors, ..., n_sources)
+        Responses to the directions, for each equally probable value of a second parameter.
+    noise, power : float
+        Variances of the noise of one sensor and of the amplitudes.
+
+    Returns
+    -------
+    ndarray, shape (...)
+
+    Examples
+    --------
+    >>> log_marginal(np.ones((1, 2, 1)), np.ones((1, 1, 2, 3, 1)), noise=0.5, power=2.0).round(4)
+    array([-3.5448, -3.5448, -3.5448])
+    """
+    n_dims = a.ndim - 4  # of the leading axes of the directions
+    A = np.moveaxis(a, 2, -1)[:, :, None]  # (n_nuisance, n_bins, 1, ..., n_sources, n_sensors)
+    y = np.moveaxis(Y, 1, 2).reshape(Y.shape[0], Y.shape[2], *[1] * n_dims, Y.shape[1])
+    each = _log_gaussian(y, A, noise, power)
+    total = each.sum(axis=(1, 2))  # over bins and snapshots
+    top = total.max(axis=0)
+    return np.asarray(top + np.log(np.exp(total - top).mean(axis=0)))
+
+
+def _log_gaussian(Y: Complex, A: Complex, noise: float, power: float) -> Float:
     """Return ln CN(y; 0, power Σ a aᴴ + noise I), y (..., M), A (..., K, M); NaN left out."""
     there = ~np.isnan(Y)
     n, y = there.sum(axis=-1), np.where(there, Y, 0)

@@ -10,7 +10,7 @@ from arrivals.validation import count
 
 
 def autocovariance(signal: ArrayLike, n_lags: int) -> Float:
-    """Return the biased autocovariances c_0 ... c_n of signals less their means.
+    """Return the biased autocovariances c_0 ... c_n of signals without their means.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def select_order(signal: ArrayLike, highest: int) -> int:
     ----------
     signal : array_like, shape (n_samples,)
     highest : int
-        Largest order to look at.
+        Largest order to consider.
 
     Notes
     -----

@@ -40,7 +40,7 @@ class AutoregressiveSources(LinearMotionModel):
     Raises
     ------
     ValueError
-        If there is no source or no coefficient, a model is unstable, or a variance not positive.
+        If a source or a coefficient is missing, a model is unstable, or a variance not positive.
 
     Notes
     -----

@@ -1,4 +1,4 @@
-"""A direction that walks on the circle, of a source that comes and goes."""
+"""A direction that walks on the circle, with birth and death of its source."""
 
 from dataclasses import dataclass
 
@@ -15,7 +15,7 @@ PAPER_KAPPA = 148.0  # 1.5° at broadside of a half-wavelength line
 
 @dataclass(frozen=True)
 class BernoulliVonMises(MotionModel):
-    """A von Mises walk of the angle, beside birth and death of its source.
+    """A von Mises walk of the angle, with birth and death of its source.
 
     Parameters
     ----------
@@ -23,7 +23,7 @@ class BernoulliVonMises(MotionModel):
         Concentration of the angle's step per unit of time; 148, the paper's, if neither it nor
         `sigma_doa` is given.
     p_activate, p_deactivate : float
-        Probabilities that a silent source starts, and that an active one stops, per unit of time.
+        Probabilities, per unit of time, that an inactive source starts and an active one stops.
     sigma_doa : float, optional
         Instead of `kappa`, the standard deviation of the step in direction, rad; see
         `VonMisesWalk`.
@@ -36,7 +36,7 @@ class BernoulliVonMises(MotionModel):
 
     Notes
     -----
-    Shapes: states (..., 1), the angle alone. Units: rad. The Gaussian face is that of `walk`.
+    Shapes: states (..., 1), the angle alone. Units: rad. The Gaussian interface is that of `walk`.
 
     References
     ----------
@@ -57,13 +57,13 @@ class BernoulliVonMises(MotionModel):
     sigma_doa: float | None = None
 
     def __post_init__(self) -> None:
-        self.walk  # noqa: B018  (refuses what is no walk)
+        self.walk  # noqa: B018  (rejects invalid steps)
         probability("p_activate", self.p_activate)
         probability("p_deactivate", self.p_deactivate)
 
     @property
     def walk(self) -> VonMisesWalk:
-        """How the angle moves."""
+        """Motion of the angle."""
         if self.kappa is None and self.sigma_doa is None:
             return VonMisesWalk(PAPER_KAPPA)
         return VonMisesWalk(self.kappa, self.sigma_doa)
@@ -140,7 +140,7 @@ class BernoulliVonMises(MotionModel):
         active : array_like of bool, shape (...)
             Which are active now.
         rng : numpy.random.Generator
-            Source of chance.
+            Source of random numbers.
         dt : float
             As in `predict_existence`.
 

@@ -1,4 +1,4 @@
-"""Motion along circles of unknown curvature."""
+"""Motion on circles of unknown curvature."""
 
 from dataclasses import dataclass
 
@@ -82,7 +82,7 @@ class CoordinatedTurn(MotionModel):
         """Return the Jacobian of `f` at one state, (5, 5)."""
         x = state(x, 5)
         if x.ndim != 1:
-            raise ValueError(f"F wants one state, shape (5,); got {x.shape}")
+            raise ValueError(f"x must have shape (5,); got {x.shape}")
         _, vx, _, vy, omega = x
         c, s = np.cos(omega * dt), np.sin(omega * dt)
         along, across = _chord(omega, dt)

@@ -1,4 +1,4 @@
-"""How the delay between neighbouring sensors moves, as the source does."""
+"""Motion of the delay between neighbouring sensors."""
 
 from dataclasses import dataclass, field
 
@@ -12,7 +12,7 @@ class DelayWalk(RandomWalk):
     Parameters
     ----------
     q : float
-        Variance gained per unit of time; 0 for a source that stands still.
+        Variance gained per unit of time; 0 for a source at rest.
 
     Notes
     -----
@@ -45,7 +45,7 @@ class DelayDrift(ConstantVelocity):
     Notes
     -----
     Units: delays in samples, rates in samples per snapshot. `q` of 1e-9 to 1e-8 suits a source
-    that takes some hundreds of snapshots for its way.
+    that crosses the array's field of view in some hundreds of snapshots.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""States that move by a matrix."""
+"""Linear motions."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -122,13 +122,13 @@ class ConstantVelocity(LinearMotionModel):
         return _drift(self.n_dims, dt).copy()
 
     def Q(self, dt: float = 1.0) -> Float:
-        """Return the covariance that white acceleration leaves behind after `dt`."""
+        """Return the covariance of white acceleration over `dt`."""
         return self.q * _unit_noise(self.n_dims, dt)
 
 
 @dataclass(frozen=True, eq=False, init=False)
 class LinearMotion(LinearMotionModel):
-    """A state that moves by matrices of one's own: x' = F x + B u + w, w ~ (0, Q).
+    """Motion by given matrices: x' = F x + B u + w, w ~ (0, Q).
 
     Parameters
     ----------
@@ -137,15 +137,15 @@ class LinearMotion(LinearMotionModel):
     noise : array_like, shape (dim_x, dim_x)
         Q, symmetric and without negative eigenvalues.
     control : array_like, shape (dim_x, dim_u), optional
-        B, for trackers that are given a control input.
+        B, for trackers with a control input.
     names : sequence of str, optional
         Names of the entries of a state; a measurement model then reads them by name.
 
     Raises
     ------
     ValueError
-        If a matrix has the wrong shape, is not finite, or `noise` is no covariance; later, if a
-        step of any other length than 1 is asked for.
+        If a matrix has the wrong shape, is not finite, or `noise` is not a covariance; later, if a
+        step has any other length than 1.
 
     Notes
     -----

@@ -1,4 +1,4 @@
-"""Von Mises densities on the circle, and the random walk whose steps they are.
+"""Von Mises densities on the circle, and a random walk with von Mises steps.
 
 The kernels take arrays with any leading axes. Concentrations run from 0 (uniform) to inf (a point).
 """
@@ -189,12 +189,12 @@ class VonMisesWalk(MotionModel):
     sigma_doa : float, optional
         Instead, the standard deviation of the step in direction, rad. An angle that turns
         `slope` times as fast as the direction takes steps of the concentration
-        (sigma_doa · slope)⁻²; where nothing is said of a slope the angle is the direction.
+        (sigma_doa · slope)⁻²; without a slope the angle is the direction.
 
     Raises
     ------
     ValueError
-        If neither or both are given, or what is given is not finite and positive.
+        If neither or both are given, or the one given is not finite and positive.
 
     Notes
     -----
@@ -222,8 +222,8 @@ class VonMisesWalk(MotionModel):
                 positive(name, getattr(self, name))
         if (self.kappa is None) == (self.sigma_doa is None):
             raise ValueError(
-                "a walk has a width of its own or one in direction: give one of kappa and "
-                f"sigma_doa, and None for the other; got {self.kappa} and {self.sigma_doa}"
+                "exactly one of kappa and sigma_doa must be given; "
+                f"got kappa={self.kappa}, sigma_doa={self.sigma_doa}"
             )
 
     def step(self, slope: ArrayLike = 1.0) -> Float:

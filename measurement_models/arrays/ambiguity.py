@@ -1,4 +1,4 @@
-"""Directions that an array cannot tell apart, found before anything is tracked."""
+"""Pairs of directions with equal response, found before tracking."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ FINEST = 1024  # directions of a search at most
 
 @lru_cache(maxsize=256)
 def ambiguous_pair(waves: PlaneWaves) -> tuple[float, float] | None:
-    """Return the first two directions, rad, whose responses are alike at every frequency, or None.
+    """Return the first two directions, rad, of equal response at every frequency, or None.
 
-    Alike is a mean of |aᴴb|² / ‖a‖²‖b‖² over the bins above 0.99. The two endfire directions of a
+    Equal is a mean of |aᴴb|² / ‖a‖²‖b‖² over the bins above 0.99. The two endfire directions of a
     line at half a wavelength do not count.
 
     Examples
@@ -110,3 +110,26 @@ def in_a_line(waves: PlaneWaves) -> float | None:
     if size[-1] > 1e-3 * size[0]:
         return None
     return float(np.arctan2(axes[0, 1], axes[0, 0]) % np.pi)
+
+
+def check_directions(waves: PlaneWaves) -> None:
+    """Raise a ValueError if an array cannot give directions.
+
+    Examples
+    --------
+    >>> from arrivals.measurement_models.arrays.sensor_array import SensorArray
+    >>> check_directions(PlaneWaves(SensorArray.uca(2, 0.5), [1.0]))
+    Traceback (most recent call last):
+    ValueError: array must have at least 3 sensors for azimuths; got 2
+    """
+    n, minimum = waves.array.n_sensors, 2 if waves.is_line else 3
+    if n < minimum:
+        what = "directions" if waves.is_line else "azimuths"
+        raise ValueError(f"array must have at least {minimum} sensors for {what}; got {n}")
+    if not waves.is_line and (azimuth := in_a_line(waves)) is not None:
+        along = np.rad2deg(azimuth)
+        one, other = (f"{(along + side) % 360:.0f}" for side in (30, -30))
+        raise ValueError(
+            f"array is collinear ({n} sensors): azimuths {one} and {other} degrees are ambiguous. "
+            "Pass 1-D positions to estimate directions from broadside"
+        )

@@ -77,7 +77,7 @@ class ElementResponse(FrozenModel):
 
     @property
     def n_bins(self) -> int | None:
-        """Number of frequencies the table tells apart; None if it is one for all."""
+        """Number of frequencies in the table; None if one holds for all."""
         return int(self.gains.shape[0]) if self.gains.ndim == 3 else None
 
     def __call__(self, azimuth: ArrayLike, *, slope: bool = False) -> Complex:
@@ -94,7 +94,7 @@ class ElementResponse(FrozenModel):
         return np.asarray(np.einsum("...k,fkm->f...m", d * 1j * k if slope else d, series))
 
     def without(self, sensors: ArrayLike) -> ElementResponse:
-        """Return the elements less some, named by index."""
+        """Return the elements without some, named by index."""
         return ElementResponse(np.delete(self.gains, np.asarray(sensors, dtype=int), axis=-1))
 
     def to_dict(self) -> dict[str, object]:

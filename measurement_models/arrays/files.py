@@ -43,7 +43,7 @@ def from_toml(path: str | Path) -> SensorArray:
     Raises
     ------
     ValueError
-        If the file is not TOML, lacks a key or has one that its kind does not know, or if its
+        If the file is not TOML, lacks a key or has one that its kind does not have, or if its
         numbers make no array; the message starts with the file's name.
     """
     try:
@@ -95,7 +95,7 @@ def _positions(rows: Any) -> SensorArray:
 
 
 def _wired(array: SensorArray, missing: Any, channels: Any) -> SensorArray:
-    """Return the array less its missing elements, its channels renumbered from 0."""
+    """Return the array without its missing elements, its channels renumbered from 0."""
     for name, value in (("missing", missing), ("channels", channels)):
         if value is not None and not isinstance(value, list):
             raise ValueError(f"{name} must be a list of numbers; got {value!r}")

@@ -12,16 +12,17 @@ from arrivals.measurement_models.arrays.element_response import ElementResponse
 from arrivals.measurement_models.arrays.sensor_array import SensorArray
 from arrivals.parameters import FrozenModel
 from arrivals.typing import Complex, Float, Int
-from arrivals.validation import positive
+from arrivals.validation import positive, real
 
 
 @dataclass(frozen=True)
 class PlaneWaves(FrozenModel):
-    """How an array answers to plane waves.
+    """Response of an array to plane waves.
 
     Parameters
     ----------
     array : SensorArray
+        Positions of the sensors.
     wavelengths : sequence of float
         Of the frequency bins, m.
     response : ElementResponse, optional
@@ -56,13 +57,13 @@ class PlaneWaves(FrozenModel):
             if self.slowness is not None:
                 raise ValueError("either slowness or elevation may be unknown, not both")
             if self.array.dim == 1:
-                raise ValueError("a line hears no elevation apart: its directions lie on cones")
+                raise ValueError("elevation must be None for a line: its directions are cones")
             if not all(abs(angle) <= np.pi / 2 for angle in self.elevation):
                 raise ValueError(f"elevation must lie within ±π/2; got {self.elevation}")
 
     @property
     def is_line(self) -> bool:
-        """Whether directions are counted from broadside: two angles of a circle look alike."""
+        """Whether directions are counted from broadside: two angles have one response."""
         return self.array.dim == 1
 
     @property
@@ -106,7 +107,7 @@ class PlaneWaves(FrozenModel):
         return np.asarray(a)
 
     def without(self, sensors: Sequence[int] | Int) -> PlaneWaves:
-        """Return the waves on the array less some sensors."""
+        """Return the waves on the array without some sensors."""
         if len(sensors) == 0:
             return self
         response = self.response and self.response.without(sensors)
@@ -120,6 +121,39 @@ class PlaneWaves(FrozenModel):
         if response is not None and response.n_bins is not None:
             response = ElementResponse(response.gains[np.asarray(bins)])
         return self.replace(wavelengths=[self.wavelengths[f] for f in bins], response=response)
+
+
+def frequency_bins(wavelength: float | Sequence[float]) -> float | tuple[float, ...]:
+    """Return the wavelength of one bin, or those of several.
+
+    Examples
+    --------
+    >>> frequency_bins([2.0]), frequency_bins([2.0, 1.0])
+    (2.0, (2.0, 1.0))
+    """
+    if not isinstance(wavelength, Sequence | np.ndarray) or isinstance(wavelength, str):
+        positive("wavelength", wavelength)
+        return wavelength
+    bins = tuple(positive("wavelength", each) for each in wavelength)
+    if not bins:
+        raise ValueError("wavelength must name at least one bin; got none")
+    return bins if len(bins) > 1 else bins[0]
+
+
+def grid_of(name: str, values: Sequence[float] | None) -> tuple[float, ...] | None:
+    """Return the grid of an unknown parameter, None where it is known.
+
+    Examples
+    --------
+    >>> grid_of("slowness", [0.9, 1])
+    (0.9, 1.0)
+    """
+    if values is None:
+        return None
+    grid = real(name, values)
+    if grid.ndim != 1 or len(grid) == 0 or not np.isfinite(grid).all():
+        raise ValueError(f"{name} must be a list of finite numbers; got {grid}")
+    return tuple(grid.tolist())
 
 
 def _check_response(response: ElementResponse, array: SensorArray, n_bins: int) -> None:

@@ -1,4 +1,4 @@
-"""Where the sensors are, and how a plane wave reaches them."""
+"""Positions of sensors and their response to plane waves."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def direction(doa: ArrayLike, dim: int) -> Float:
 def steering_vector(positions: ArrayLike, doa: ArrayLike, wavelength: ArrayLike) -> Complex:
     """Return the response of sensors at `positions` to plane waves of unit amplitude.
 
-    This is the one place where the sign is fixed: a sensor nearer to the source hears the wave
+    This is the one place where the sign is fixed: a sensor nearer to the source receives the wave
     earlier, and for signals that turn as exp(+jωt), as the spectra of numpy and scipy do, its
     phase is ahead: a = exp(+j 2π/λ p·u), u pointing to the source. Papers that write
     exp(-j m d 2π/λ sin β) count their sensors, or their angles, the other way round.
@@ -70,7 +70,7 @@ def grid_spacing(coordinates: ArrayLike, tolerance: float = 1e-3) -> float | Non
 
     A coordinate may lie off the grid by `tolerance` of its spacing, or the nth part of that if
     the smallest gap has n spacings: a fine enough grid fits anything. Grids of more than 4096
-    points are not looked for.
+    points are not searched.
 
     Examples
     --------
@@ -95,14 +95,14 @@ def grid_spacing(coordinates: ArrayLike, tolerance: float = 1e-3) -> float | Non
 
 @dataclass(frozen=True, eq=False)
 class SensorArray(FrozenModel):
-    """Sensors at known places.
+    """Sensors at known positions.
 
     Parameters
     ----------
     positions : array_like, shape (n_sensors, dim) or (n_sensors,)
         Metres; dim is 1 for a line, 2 for a plane, 3 in space.
     speed : float, optional
-        Speed of the waves, m/s; wanted where a frequency is to be turned into a wavelength.
+        Speed of the waves, m/s; needed to convert a frequency into a wavelength.
     channels : sequence of int, optional
         The recording's channel of each sensor, counted from 0; in order of the sensors if None.
     n_channels : int, optional
@@ -111,7 +111,7 @@ class SensorArray(FrozenModel):
     Raises
     ------
     ValueError
-        If two sensors share a place, or a number is not finite.
+        If two sensors share a position, or a number is not finite.
 
     Examples
     --------
@@ -132,7 +132,7 @@ class SensorArray(FrozenModel):
     def __post_init__(self) -> None:
         positions = real("positions", self.positions)
         positions = positions[:, None] if positions.ndim == 1 else positions
-        positions = positions + 0.0  # a copy, without the sign of -0.0, which a hash would see
+        positions = positions + 0.0  # a copy, without the sign of -0.0, which would change the hash
         if positions.ndim != 2 or not 1 <= positions.shape[1] <= 3 or len(positions) == 0:
             raise ValueError(
                 "positions must have shape (n_sensors, dim), dim 1, 2 or 3; "
@@ -236,27 +236,27 @@ class SensorArray(FrozenModel):
 
     @classmethod
     def from_csv(cls, path: str | Path, *, speed: float | None = None) -> SensorArray:
-        """Read positions, one sensor a row, columns x, y, z in metres; see `array_files`."""
+        """Read positions, one sensor a row, columns x, y, z in metres; see `arrays.files`."""
         from arrivals.measurement_models.arrays.files import from_csv
 
         return from_csv(path, speed=speed)
 
     @classmethod
     def from_toml(cls, path: str | Path) -> SensorArray:
-        """Read an array file; see `array_files` for its keys."""
+        """Read an array file; see `arrays.files` for its keys."""
         from arrivals.measurement_models.arrays.files import from_toml
 
         return from_toml(path)
 
     def without(self, sensors: Iterable[int]) -> SensorArray:
-        """Return the array less some sensors, named by index; the others keep their channels."""
+        """Return the array without some sensors, named by index; the others keep their channels."""
         gone = sorted({count("sensor", sensor, least=0) for sensor in sensors})
         if not gone:
             return self
         if gone[-1] >= self.n_sensors:
             raise ValueError(f"sensor {gone[-1]} is not there: the array has {self.n_sensors}")
         if len(gone) == self.n_sensors:
-            raise ValueError("no sensor would be left")
+            raise ValueError("sensors must leave at least one sensor")
         kept = np.setdiff1d(np.arange(self.n_sensors), gone)
         if self.channels is None:
             return SensorArray(self.positions[kept], self.speed, kept, self.n_sensors)
@@ -300,12 +300,12 @@ class SensorArray(FrozenModel):
         other = f"at least {max(channels) + 1}" if wanted is None else str(wanted)
         others = "" if wanted == self.n_sensors else f" or {other}"
         raise ValueError(
-            f"the array wants {self.n_sensors}{others} channels; the recording has {n_channels}"
+            f"the recording must have {self.n_sensors}{others} channels; got {n_channels}"
         )
 
 
 def _distinct(positions: Float) -> None:
-    """Raise a ValueError if two sensors share a place."""
+    """Raise a ValueError if two sensors share a position."""
     order = np.lexsort(positions.T)
     same = (np.diff(positions[order], axis=0) == 0).all(axis=1)
     if same.any():

@@ -1,4 +1,4 @@
-"""Real samples of a line array that hears one source: where angles become delays."""
+"""Real samples of one source on a line array; directions as delays between sensors."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class ArraySamples(FrozenModel):
 
     This is the door between angles and delays. The method's papers count the sensors j in the
     order in which a wave from a positive angle passes them. Here a sensor at a larger coordinate
-    is nearer to a source at a positive `doa` and hears it earlier, so that j counts from the
+    is nearer to a source at a positive `doa` and receives it earlier, so that j counts from the
     largest coordinate downwards, and Δ = κ sin β, κ = rate · spacing / speed.
 
     Parameters
@@ -34,7 +34,7 @@ class ArraySamples(FrozenModel):
     snr_db : float
         Power of the source over that of the noise, at one sensor.
     power : float, optional
-        Power of the source at one sensor; if None, a tracker learns it from what it hears.
+        Power of the source at one sensor; if None, a tracker estimates it from the data.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class ArraySamples(FrozenModel):
     Raises
     ------
     ValueError
-        If the array is no such line, or its grid is wider than half the shortest wavelength, so
+        If the array is not such a line, or its grid is wider than half the shortest wavelength, so
         that directions would be ambiguous.
 
     Notes

@@ -1,4 +1,4 @@
-"""All sensors of a line at once, as one source at the array's centre explains them."""
+"""Measurement of all sensors of a line by the waveform of one source at the array's centre."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from arrivals.validation import count, instance, number, positive, real
 
 @dataclass(frozen=True)
 class SourceAtCentre(MeasurementModel):
-    """What two models share that carry the source's waveform at the array's centre in the state.
+    """Base of two models with the source's waveform at the array's centre in the state.
 
     The delay Δ is element 0 of the state, the source's elements are the last `dim_source`;
     between them may stand what else the motion of the delay carries. A sensor lags the centre by
@@ -45,12 +45,12 @@ class SourceAtCentre(MeasurementModel):
     @property
     @abstractmethod
     def innovation(self) -> Float:
-        """Covariance of what is new in them after one snapshot, (dim_source, dim_source)."""
+        """Covariance of their innovation in one snapshot, (dim_source, dim_source)."""
 
     @property
     @abstractmethod
     def covariance(self) -> Float:
-        """Their covariance before anything is heard, (dim_source, dim_source)."""
+        """Their covariance before the first measurement, (dim_source, dim_source)."""
 
     @abstractmethod
     def linearise(self, x: Float) -> tuple[Float, Float, Float]:
@@ -116,9 +116,11 @@ class DelayLine(SourceAtCentre):
     Parameters
     ----------
     n_sensors : int
+        Number of sensors.
     noise_ratio : float
         ε, noise power over source power.
     correlation : SourceCorrelation
+        Correlation of the source over time.
     kappa : float
         Largest delay between neighbours, samples: a band needs taps as far as ±κ(N-1)/2 and two
         more; tones need two taps each.
@@ -189,8 +191,8 @@ class DelayLine(SourceAtCentre):
         tones = self.correlation.order is not None
         drive = (1e-2 if tones else 1e-3) if self.drive is None else self.drive
         Q = np.zeros((n, n))
-        foretold = float(self.transition[0] @ self.correlation.rho(np.arange(1, n + 1)))
-        Q[0, 0] = max(1 - foretold, 0.0) + drive
+        predicted = float(self.transition[0] @ self.correlation.rho(np.arange(1, n + 1)))
+        Q[0, 0] = max(1 - predicted, 0.0) + drive
         return Q
 
     @property
@@ -219,7 +221,7 @@ def _line_interpolator(
 
 @dataclass(frozen=True)
 class Phasor(SourceAtCentre):
-    """A line of sensors that hears one tone: its two quadratures at the centre are in the state.
+    """A line of sensors that receives one tone; its quadratures at the centre are in the state.
 
     s(k - t) = u cos Ωt + v sin Ωt, and (u, v) turn by Ω per snapshot: what `DelayLine` is for one
     tone, in closed form.
@@ -227,6 +229,7 @@ class Phasor(SourceAtCentre):
     Parameters
     ----------
     n_sensors : int
+        Number of sensors.
     noise_ratio : float
         ε, noise power over source power.
     frequency : float

@@ -34,6 +34,7 @@ class DelayInterpolator(FrozenModel):
     Parameters
     ----------
     correlation : SourceCorrelation
+        Correlation of the source over time.
     offsets : sequence of int
         o, samples; negative ones are later samples. (0, 1) are the paper's two.
     loading : float
@@ -57,7 +58,7 @@ class DelayInterpolator(FrozenModel):
 
     Examples
     --------
-    A quarter of a period late, a tone is what it was one sample before:
+    A tone delayed by a quarter of a period equals its previous sample:
 
     >>> from arrivals.measurement_models import Tones
     >>> DelayInterpolator(Tones(0.25)).coefficients(1.0).round(6) + 0.0
@@ -130,21 +131,22 @@ class DelayInterpolator(FrozenModel):
 
 @dataclass(frozen=True, eq=False)
 class InterpolationDelay(MeasurementModel):
-    """Sensors of a line as their neighbours foretell them: z = X c(mΔ), of variance R(mΔ).
+    """Samples of a line's sensors predicted from their neighbours: z = X c(mΔ), of variance R(mΔ).
 
     The samples X of the neighbours are known inputs: bind them by `replace(regressors=X)`, or
-    hand them to `h` and `H`, as filterpy's filters do. The delay Δ is element 0 of the state,
+    pass them to `h` and `H`, as filterpy's filters do. The delay Δ is element 0 of the state,
     whatever follows it.
 
     Parameters
     ----------
     interpolator : DelayInterpolator
+        Interpolator of the source's waveform.
     n_sensors : int
         Sensors j = 0, 1, ... in the order of growing delay.
     noise_ratio : float
         ε, noise power over source power; the data are scaled to a source of power 1.
     baseline : int
-        m: sensor j is foretold from j - m; a negative one runs backwards along the array.
+        m: sensor j is predicted from j - m; a negative one runs backwards along the array.
     inflation : float
         Factor on R, for residuals that share samples with those of other baselines.
     regressors : ndarray, shape (..., n_sensors - abs(m), n_taps), optional
@@ -189,7 +191,7 @@ class InterpolationDelay(MeasurementModel):
 
     @property
     def dim_z(self) -> int:
-        """Number of sensors that have a neighbour to be foretold from."""
+        """Number of sensors that have a neighbour to be predicted from."""
         return self.n_sensors - abs(self.baseline)
 
     @property
@@ -237,7 +239,7 @@ class InterpolationDelay(MeasurementModel):
         return self if tuple(names[:1]) == self.needs else super().for_state(names)
 
     def h(self, x: ArrayLike, regressors: ArrayLike | None = None) -> Float:
-        """Return the samples foretold for states: X c(mΔ), (..., dim_x) -> (..., dim_z)."""
+        """Return the samples predicted for states: X c(mΔ), (..., dim_x) -> (..., dim_z)."""
         c = self.interpolator.coefficients(self.baseline * _delay(x))
         return np.asarray((self._inputs(regressors) @ c[..., None])[..., 0])
 

@@ -1,4 +1,4 @@
-"""What is known of a source before it is heard: the correlation of its waveform over time."""
+"""Correlation of a source's waveform over time, known in advance."""
 
 from __future__ import annotations
 
@@ -134,8 +134,8 @@ class Tones(SourceCorrelation):
     Raises
     ------
     ValueError
-        If a frequency is out of range (at half the sampling rate the samples of a tone do not tell
-        its phase), or the powers do not fit.
+        If a frequency is out of range (at half the sampling rate the samples of a tone do not
+        determine its phase), or the powers do not fit.
 
     Examples
     --------

@@ -51,8 +51,8 @@ class FourierManifold:
     """A response a(θ) = G d(θ), d_k = exp(jkθ), k = -K..K, in the direction itself.
 
     θ is the azimuth, or, of a line, the direction from broadside continued to the whole circle,
-    where β and π - β look alike (`mirror`). Phases are counted at the centroid of the sensors, or
-    at the first of them.
+    where β and π - β have one response (`mirror`). Phases are counted at the centroid of the
+    sensors, or at the first of them.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ class FourierManifold:
         return np.array(doa, dtype=np.float64)
 
     def to_amplitude(self, w: ArrayLike, theta: ArrayLike) -> Complex:
-        """Return amplitudes at the origin of coordinates; of several looks their size alone.
+        """Return amplitudes at the origin of coordinates; of several snapshots their size alone.
 
         An unknown slowness or elevation leaves the phase at the origin unknown, too.
         """
@@ -142,7 +142,7 @@ class FourierManifold:
         return np.asarray(w * np.exp(-1j * self.waves.wavenumber[0] * path))
 
     def without(self, sensors: Sequence[int] | Int) -> FourierManifold:
-        """Return the manifold of the array less some sensors."""
+        """Return the manifold of the array without some sensors."""
         return fourier_manifold(self.waves.without(sensors), self.reference)
 
     def only(self, bins: Sequence[int] | Int) -> FourierManifold:

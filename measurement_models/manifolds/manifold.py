@@ -16,9 +16,9 @@ class Manifold(Protocol):
     """A response a(θ) = G d(θ), d_k = exp(jkθ), periodic in an angle θ.
 
     The axes of data are (n_bins, n_sensors, n_snapshots); those of `coefficients` are
-    (n_nuisance, n_bins, n_sensors, n_harmonics). A tracker that works on this protocol sees no
+    (n_nuisance, n_bins, n_sensors, n_harmonics). A tracker that uses this protocol needs no
     positions, wavelengths or signs. Manifolds never change, so that what follows from one may be
-    remembered.
+    cached.
     """
 
     def __hash__(self) -> int:
@@ -70,7 +70,7 @@ class Manifold(Protocol):
         """Return amplitudes at the origin of the array's coordinates."""
 
     def without(self, sensors: Sequence[int] | Int) -> Manifold:
-        """Return the manifold of the array less some sensors."""
+        """Return the manifold of the array without some sensors."""
 
     def only(self, bins: Sequence[int] | Int) -> Manifold:
         """Return the manifold of some of the bins."""

@@ -9,15 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.arrays.sensor_array import SensorArray
-from arrivals.measurement_models.base import MeasurementModel
-from arrivals.measurement_models.snapshot_likelihood import composite
+from arrivals.measurement_models.single_source import SingleSourceSnapshot
 from arrivals.typing import Complex, Float, Int
-from arrivals.validation import instance, positive, shaped, state
+from arrivals.validation import instance, positive
 
 
 @dataclass(frozen=True)
-class ArrayManifold(MeasurementModel):
-    """What a symmetric array with a centre sensor hears, turned so that its response is real.
+class ArrayManifold(SingleSourceSnapshot):
+    """Snapshots of a symmetric array with a centre sensor, transformed to a real response.
 
     Sums and differences of the two sensors of a pair turn a(β) into
     [√2 cos φ_1 ... √2 cos φ_M, 1, √2 sin φ_1 ... √2 sin φ_M], φ_m = 2π d_m/λ sin β, the inner pair
@@ -40,7 +39,7 @@ class ArrayManifold(MeasurementModel):
     Notes
     -----
     Shapes: snapshots (..., n_sensors), complex; directions (..., n_sources), rad. The Gaussian
-    face is that of one source with a state [β, Re w, Im w], and its measurements are real,
+    interface is that of one source with a state [β, Re w, Im w], and its measurements are real,
     `composite(transform(snapshot))`.
 
     References
@@ -146,33 +145,18 @@ class ArrayManifold(MeasurementModel):
             num, den = num + d_m * (phi_m + 2 * np.pi * turns), den + d_m**2
         return np.asarray(np.arcsin(np.clip(num / den, -1.0, 1.0)))
 
-    # The Gaussian face
-
     @property
     def dim_z(self) -> int:
         """Twice the number of sensors: real and imaginary parts."""
         return 2 * self.array.n_sensors
 
-    @property
-    def R(self) -> Float:
-        """Covariance of the composite noise: half the variance for each part."""
-        return self.noise / 2 * np.eye(self.dim_z)
+    def response_to(self, doa: ArrayLike) -> Float:
+        """Return `real_steering`."""
+        return self.real_steering(doa)
 
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """doa, amplitude_re, amplitude_im."""
-        return "doa", "amplitude_re", "amplitude_im"
-
-    def h(self, x: ArrayLike) -> Float:
-        """Return the transformed snapshot of states [β, Re w, Im w]: (..., 3) -> (..., dim_z)."""
-        doa, re, im = np.moveaxis(state(x, 3), -1, 0)
-        return composite((re + 1j * im)[..., None] * self.real_steering(doa))
-
-    def H(self, x: ArrayLike) -> Float:
-        """Return the Jacobian of `h` at one state, (dim_z, 3)."""
-        doa, re, im = shaped("x", x, 3)
-        a, slope = self.real_steering(doa), self.slope(doa)
-        return np.stack([composite((re + 1j * im) * slope), composite(a), composite(1j * a)]).T
+    def response_slope(self, doa: float) -> Float:
+        """Return the derivative of `real_steering` at one direction, rad: (n_sensors,)."""
+        return self.slope(doa)
 
     def slope(self, doa: ArrayLike) -> Float:
         """Return the derivative of `real_steering`, √2 φ'_m (-sin φ_m, cos φ_m); same shape."""

@@ -129,7 +129,7 @@ class UniformLineManifold:
         return np.asarray(np.asarray(w) * np.exp(1j * shift * np.asarray(theta)))
 
     def without(self, sensors: Sequence[int] | Int) -> UniformLineManifold:
-        """Return the manifold of the line less some sensors."""
+        """Return the manifold of the line without some sensors."""
         if len(sensors) == 0:
             return self
         return _line_without(self, tuple(map(int, sensors)))
@@ -141,7 +141,7 @@ class UniformLineManifold:
 
 @lru_cache(maxsize=256)
 def _line_without(line: UniformLineManifold, sensors: tuple[int, ...]) -> UniformLineManifold:
-    """Return a line less some sensors: the same one when asked again, as what is made of it."""
+    """Return a line without some sensors; cached, as are the results derived from it."""
     places = np.delete(line.places, sensors)
     return UniformLineManifold(places, line.step, line.origin, line.reference)
 

@@ -1,4 +1,4 @@
-"""What a model of signal strength is given: checked, and in one form."""
+"""Argument checks of LogNormalRSS."""
 
 from __future__ import annotations
 

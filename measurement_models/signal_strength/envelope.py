@@ -1,4 +1,4 @@
-"""What N snapshots of a Gaussian envelope tell of its level: the Chi statistic and its logarithm.
+"""Averaged envelope of N Gaussian snapshots: the Chi statistic and its logarithm.
 
 The reading is e = (Σ|y|²/N)^½ = σ Z/√(2N) with Z ~ χ of 2N degrees of freedom; ξ = log e.
 """

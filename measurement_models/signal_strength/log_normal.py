@@ -22,7 +22,7 @@ from arrivals.measurement_models.signal_strength.path_loss import Levels, Propag
 from arrivals.typing import Float
 from arrivals.validation import constant, count, number, positive, real
 
-FARTHEST = 40.0  # Np, 347 dB: what lies beyond is in another unit
+FARTHEST = 40.0  # Np, 347 dB: values beyond are in another unit
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -32,9 +32,9 @@ class LogNormalRSS(MeasurementModel):
     Parameters
     ----------
     sensors : array_like, shape (n_sensors, 2)
-        m.
+        Positions of the sensors, m.
     sigma : float or array_like, shape (n_sensors,), optional
-        Standard deviation of the readings, Np: measured data want their shadowing here. If None,
+        Standard deviation of the readings, Np: the shadowing of measured data. If None,
         readings average snapshots, and it is 1/(2√N).
     n_snapshots : int
         N, snapshots of the envelope in one reading.
@@ -71,8 +71,8 @@ class LogNormalRSS(MeasurementModel):
     -----
     Shapes: states (..., n_sources · n), measurements (..., n_sensors). Units: m and Np,
     1 dB = ln(10)/20 Np; `db_to_neper` and `dbm_to_neper` convert. Below `r_min` the level has no
-    slope. A missing reading is NaN. What holds the positions and log amplitudes apart, as
-    `rss_vb` does, calls `levels`.
+    slope. A missing reading is NaN. A method with positions and log amplitudes apart, such
+    as `rss_vb`, calls `levels`.
 
     References
     ----------
@@ -81,10 +81,10 @@ class LogNormalRSS(MeasurementModel):
 
     Examples
     --------
-    >>> heard = LogNormalRSS([[0.0, 0.0], [60.0, 0.0]], position=(0, 1), amplitude=2)
-    >>> heard.h([30.0, 40.0, 9.0]).round(3)
+    >>> readings = LogNormalRSS([[0.0, 0.0], [60.0, 0.0]], position=(0, 1), amplitude=2)
+    >>> readings.h([30.0, 40.0, 9.0]).round(3)
     array([5.088, 5.088])
-    >>> heard.H([30.0, 40.0, 9.0]).round(3)
+    >>> readings.H([30.0, 40.0, 9.0]).round(3)
     array([[-0.012, -0.016,  1.   ],
            [ 0.012, -0.016,  1.   ]])
     """
@@ -239,7 +239,7 @@ class LogNormalRSS(MeasurementModel):
         return np.asarray(level + self.sigma * rng.standard_normal(level.shape))
 
     def readings(self, z: ArrayLike) -> Float:
-        """Return readings as log σ_y plus noise: checked, less the offsets and the bias.
+        """Return readings as log σ_y plus noise: checked, without the offsets and the bias.
 
         Parameters
         ----------

@@ -11,7 +11,7 @@ from arrivals.typing import Float
 
 
 class Offsets(NamedTuple):
-    """Where sources lie, seen from the sensors; all (..., n_sources, n_sensors).
+    """Offsets of the sources from the sensors; all (..., n_sources, n_sensors).
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ class Offsets(NamedTuple):
 
 
 def offsets(theta: Float, sensors: Float, r_min: float) -> Offsets:
-    """Return what positions look like from sensors.
+    """Return the offsets of positions from sensors.
 
     Parameters
     ----------
@@ -53,8 +53,8 @@ def offsets(theta: Float, sensors: Float, r_min: float) -> Offsets:
 
     Examples
     --------
-    >>> seen = offsets(np.array([[3.0, 4.0]]), np.array([[0.0, 0.0], [3.0, 4.0]]), 1.0)
-    >>> seen.square, seen.inverse
+    >>> geometry = offsets(np.array([[3.0, 4.0]]), np.array([[0.0, 0.0], [3.0, 4.0]]), 1.0)
+    >>> geometry.square, geometry.inverse
     (array([[25.,  1.]]), array([[0.04, 0.  ]]))
     """
     dx = theta[..., 0, None] - sensors[..., None, :, 0]
@@ -128,8 +128,8 @@ def levels(
     >>> two.shares.round(6).ravel(), float((two.log_sigma[0] + np.log(2)) / np.log(2))
     (array([0.5, 0.5]), 0.5)
     """
-    seen = offsets(theta, sensors, r_min)
-    power = 2 * (u[..., None] + log_gain) - 0.5 * alpha * np.log(seen.square)
+    geometry = offsets(theta, sensors, r_min)
+    power = 2 * (u[..., None] + log_gain) - 0.5 * alpha * np.log(geometry.square)
     noise: Float = 2.0 * np.asarray(log_noise)
     top = np.maximum(power.max(axis=-2, initial=-np.inf), noise)
     top = np.where(np.isneginf(top), 0.0, top)
@@ -138,7 +138,7 @@ def levels(
     shares /= np.maximum(total, np.finfo(np.float64).tiny)[..., None, :]
     with np.errstate(divide="ignore"):
         log_sigma = 0.5 * (top + np.log(total))
-    return Levels(log_sigma, shares, seen)
+    return Levels(log_sigma, shares, geometry)
 
 
 class PropagationModel(NamedTuple):
@@ -165,7 +165,7 @@ class PropagationModel(NamedTuple):
         return levels(u, theta, self.sensors, self.alpha, self.log_noise, self.r_min, self.log_gain)
 
     def offsets(self, theta: Float) -> Offsets:
-        """Return what positions (..., n_sources, 2) look like from the sensors."""
+        """Return the offsets of positions (..., n_sources, 2) from the sensors."""
         return offsets(theta, self.sensors, self.r_min)
 
     def take(self, rows: Any) -> PropagationModel:
@@ -195,13 +195,13 @@ def slopes(found: Levels, alpha: float) -> Float:
     >>> slopes(one, alpha=3.0)
     array([[ 1.  , -0.75, -0.  ]])
     """
-    lam, seen = found.shares, found.offsets
+    lam, geometry = found.shares, found.offsets
     *lead, K, M = lam.shape
-    slope = -0.5 * alpha * lam * seen.inverse
+    slope = -0.5 * alpha * lam * geometry.inverse
     G = np.empty((*lead, 3 * K, M))
     G[..., :K, :] = lam
-    G[..., K::2, :] = slope * seen.dx
-    G[..., K + 1 :: 2, :] = slope * seen.dy
+    G[..., K::2, :] = slope * geometry.dx
+    G[..., K + 1 :: 2, :] = slope * geometry.dy
     return np.swapaxes(G, -1, -2)
 
 

@@ -170,7 +170,7 @@ def test_silence_streams_and_arrays_that_do_not_fit_are_refused(
     four = track(scene, "--frequency", "1000")
     four[four.index("--array") + 1] = str(scene / "four.toml")
     assert main(four) == 2
-    assert "the array wants 4 channels" in capsys.readouterr().err
+    assert "the recording must have 4 channels" in capsys.readouterr().err
 
 
 def test_a_failure_leaves_what_was_there_before(tmp_path: Path, scene: Path) -> None:

@@ -1,4 +1,4 @@
-"""Snapshots: their likelihood, their slope, and the manifold that gridless methods see."""
+"""Snapshots: their likelihood, their slope, and the manifold of gridless methods."""
 
 import pickle
 from typing import Any
@@ -38,10 +38,10 @@ def covariance(model: ArraySnapshot, doa: ArrayLike) -> Complex:
 
 def dense_log_likelihood(model: ArraySnapshot, z: Complex, doa: ArrayLike) -> float:
     """scipy's real Gaussian of [Re z; Im z], of the sensors that gave a number."""
-    heard = ~np.isnan(z)
-    S = covariance(model, doa)[np.ix_(heard, heard)] / 2
+    valid = ~np.isnan(z)
+    S = covariance(model, doa)[np.ix_(valid, valid)] / 2
     stacked = np.block([[S.real, -S.imag], [S.imag, S.real]])
-    return float(multivariate_normal(np.zeros(len(stacked)), stacked).logpdf(composite(z[heard])))
+    return float(multivariate_normal(np.zeros(len(stacked)), stacked).logpdf(composite(z[valid])))
 
 
 @every_model
@@ -84,7 +84,7 @@ def test_log_likelihood_of_a_strong_prior_keeps_its_digits() -> None:
     assert model.log_likelihood(snapshot(model), [0.3]) == pytest.approx(expected, rel=1e-7)
 
 
-# the Gaussian face
+# the Gaussian interface
 
 
 @every_model
@@ -193,10 +193,10 @@ def test_manifold_is_the_steering_vector_up_to_the_phase_of_the_amplitude(
     manifold = ArraySnapshot(array, wavelength=1.3).manifold(reference)
     doa, w = np.array([-1.2, -0.1, 0.4, 1.5]), np.array([1.0, 2j, -1.0, 0.5 + 0.1j])
     theta = manifold.from_doa(doa)
-    seen = manifold.steering(theta)[0, 0] * w
+    response = manifold.steering(theta)[0, 0] * w
     amplitude = manifold.to_amplitude(w, theta)
     np.testing.assert_allclose(
-        seen, (amplitude[:, None] * array.steering_vector(doa, 1.3)).T, atol=1e-10
+        response, (amplitude[:, None] * array.steering_vector(doa, 1.3)).T, atol=1e-10
     )
     np.testing.assert_allclose(np.abs(amplitude), np.abs(w), rtol=1e-12)
 
@@ -287,7 +287,7 @@ def test_manifold_has_room_for_more_axes() -> None:
 
 @pytest.mark.parametrize("spacing", [0.5, 0.3])
 def test_slope_is_the_derivative_of_the_angle(spacing: float) -> None:
-    """Down to a tenth of the broadside's, where the direction is not to be told any more."""
+    """Down to a tenth of the broadside's, where the direction is no longer identifiable."""
     line = ArraySnapshot(SensorArray.ula(7, spacing), wavelength=1.0).manifold()
     doa = np.deg2rad([-80.0, -30.0, 0.0, 12.0, 75.0])
     slope = (line.from_doa(doa + 1e-6) - line.from_doa(doa - 1e-6)) / 2e-6

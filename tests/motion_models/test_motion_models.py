@@ -47,7 +47,7 @@ def slope(model: MotionModel, x: Float, dt: float, h: float = 1e-5) -> Float:
     return (model.f(x + steps, dt) - model.f(x - steps, dt)).T / (2 * h)
 
 
-# what all of them promise
+# what holds for all of them
 
 
 @every_model
@@ -274,7 +274,7 @@ def test_straight_on_is_constant_velocity() -> None:
 
 
 def test_turning_is_linearised_at_one_state() -> None:
-    with pytest.raises(ValueError, match=r"F wants one state, shape \(5,\); got \(2, 5\)"):
+    with pytest.raises(ValueError, match=r"x must have shape \(5,\); got \(2, 5\)"):
         CoordinatedTurn(0.1, 0.1).F(np.zeros((2, 5)))
     with pytest.raises(ValueError, match="q_turn must be finite and not negative; got -1"):
         CoordinatedTurn(0.1, -1)

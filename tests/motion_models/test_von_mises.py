@@ -332,7 +332,7 @@ def test_a_walk_of_its_own_width_asks_for_no_slope() -> None:
 
 @pytest.mark.parametrize("params", [{}, {"kappa": 3.0, "sigma_doa": 0.1}])
 def test_a_walk_has_one_width(params: dict[str, float]) -> None:
-    with pytest.raises(ValueError, match="give one of kappa and sigma_doa, and None for the other"):
+    with pytest.raises(ValueError, match="exactly one of kappa and sigma_doa must be given"):
         VonMisesWalk(**params)
 
 

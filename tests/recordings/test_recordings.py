@@ -522,7 +522,7 @@ def test_an_array_takes_its_channels_and_goes_with_the_recording(tmp_path: Path)
     recording = read(tmp_path / "a.npy", rate=10.0, array=array)
     assert recording.samples.tolist() == [[0, 2, 3], [4, 6, 7]]
     assert recording.array == array
-    with pytest.raises(ValueError, match="the array wants 5 channels; the recording has 4"):
+    with pytest.raises(ValueError, match="the recording must have 5 channels; got 4"):
         read(tmp_path / "a.npy", rate=10.0, array=SensorArray.ula(5, 0.5))
     with pytest.raises(ValueError, match="the array has 3 sensors, the recording 4 channels"):
         Recording(np.ones((2, 4)), array=array)

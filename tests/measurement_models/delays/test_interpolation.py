@@ -200,7 +200,7 @@ def test_delays_move_as_the_linear_models_they_are() -> None:
 
 
 def test_an_asymmetric_scene_keeps_the_packages_sign() -> None:
-    """Three sensors, one on the left missing, a source on the right: the right hears it first."""
+    """Three sensors, one on the left missing, a source on the right: it arrives there first."""
     array = SensorArray.ula(5, spacing=0.4, missing=[1], speed=1.0)
     model = ArraySamples(array, 1.0, BAND)
     doa = np.deg2rad(35.0)

@@ -1,4 +1,4 @@
-"""Any array as a Fourier series: it is the array's response, and what no array can tell."""
+"""Any array as a Fourier series: equal to the array's response; ambiguous directions."""
 
 import json
 import pickle
@@ -92,8 +92,8 @@ def test_amplitudes_are_those_at_the_origin(model: ArraySnapshot) -> None:
     manifold, doa = model.manifold(), np.array([0.4])
     w = manifold.to_amplitude([2j], doa)
     if model.n_bins == 1 and not model.slowness and not model.elevation:
-        seen = 2j * manifold.steering(doa)[0, 0, :, 0]
-        np.testing.assert_allclose(w * model.steering_vector(0.4), seen, atol=1e-7)
+        response = 2j * manifold.steering(doa)[0, 0, :, 0]
+        np.testing.assert_allclose(w * model.steering_vector(0.4), response, atol=1e-7)
     else:
         np.testing.assert_allclose(w, [2.0])
 
@@ -172,14 +172,14 @@ def test_model_survives_pickle_json_and_configuration(model: ArraySnapshot) -> N
     assert fourier_manifold(again.waves) is fourier_manifold(model.waves)
 
 
-def test_responses_are_parts_of_the_gaussian_face() -> None:
+def test_responses_are_parts_of_the_gaussian_interface() -> None:
     model = MODELS["cardioids"]
     x, steps = np.array([0.4, 1.2, -0.7]), 1e-6 * np.eye(3)
     slope = (model.h(x + steps) - model.h(x - steps)).T / 2e-6
     np.testing.assert_allclose(model.H(x), slope, atol=1e-7)
 
 
-# several looks
+# several snapshots
 
 
 @every_model
@@ -276,16 +276,16 @@ def test_the_first_image_of_a_sparse_line_is_that_of_endfire() -> None:
     [
         (
             SensorArray(np.array([[0.0, 1.0], [2.0, 3.0]])),
-            "azimuths want at least 3 sensors; .* has 2",
+            "at least 3 sensors for azimuths; got 2",
         ),
-        (SensorArray(np.array([1.0])), "directions want at least 2 sensors; this array has 1"),
+        (SensorArray(np.array([1.0])), "at least 2 sensors for directions; got 1"),
         (
             SensorArray(np.array([[0.0, 0.0], [1.0, 0.0], [3.0, 0.0]])),
-            "stand in a line, which cannot tell front from back: azimuths 30 and 330 degrees look",
+            r"collinear \(3 sensors\): azimuths 30 and 330 degrees are ambiguous",
         ),
         (
             SensorArray(np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 5.0], [3.0, 3.0, 2.0]])),
-            "front from back",
+            "array is collinear",
         ),
     ],
 )
@@ -311,7 +311,7 @@ def test_directional_elements_tell_front_from_back() -> None:
         ({"slowness": [-1.0]}, "slowness must be finite and positive"),
         ({"elevation": [2.0]}, "elevation must lie within ±π/2"),
         ({"elevation": [0.1], "slowness": [1.0]}, "not both"),
-        ({"array": SPARSE, "elevation": [0.1]}, "a line hears no elevation"),
+        ({"array": SPARSE, "elevation": [0.1]}, "elevation must be None for a line"),
         ({"response": 3.0}, "response must be an ElementResponse"),
         ({"response": ElementResponse.first_order([0.0])}, r"\(8 sensors\); got \(4, 1\)"),
         (
@@ -345,9 +345,9 @@ def test_bad_gains_are_refused(gains: Any, message: str) -> None:
 
 def test_measurements_of_the_wrong_shape_are_refused() -> None:
     model = ArraySnapshot(CIRCLE, [1.0, 1.2], n_snapshots=3)
-    with pytest.raises(ValueError, match=r"shape \(2, 3, 8\), one number a sensor in every look"):
+    with pytest.raises(ValueError, match=r"shape \(2, 3, 8\), one number a sensor in every bin"):
         model.snapshot(np.ones((3, 2, 8)))
-    with pytest.raises(ValueError, match="Gaussian face is that of one snapshot at one wavelength"):
+    with pytest.raises(ValueError, match="must have one snapshot a step at one wavelength"):
         model.h([0.1, 1.0, 0.0])
     with pytest.raises(ValueError, match="a second unknown"):
         MODELS["elevation"].H([0.1, 1.0, 0.0])

@@ -150,7 +150,7 @@ def test_drawn_readings_have_the_exact_moments() -> None:
     assert drawn.var() == pytest.approx(float(variance), rel=0.02)
 
 
-def test_exact_moments_are_in_the_gaussian_face() -> None:
+def test_exact_moments_are_in_the_gaussian_interface() -> None:
     exact = TWO.replace(exact_moments=True, n_snapshots=4)
     bias, variance = log_envelope_moments(4)
     np.testing.assert_allclose(exact.h(STATE) - TWO.h(STATE), bias)
