@@ -26,6 +26,13 @@ from arrivals.trackers.multi_target.peaks_gnn import PeaksGNN
 from arrivals.trackers.registry import available, create, find, register
 from arrivals.trackers.rss.rss_ml import RSSML
 from arrivals.trackers.rss.rss_vb import RSSVB
+from arrivals.trackers.rss.settings import (
+    AmplitudePrior,
+    BirthDeath,
+    GridSearch,
+    MAPSolver,
+    VariationalSolver,
+)
 from arrivals.trackers.run import Run
 from arrivals.trackers.sparse_bayes.fixed_point import FixedPointSolver
 from arrivals.trackers.sparse_bayes.sbl import SBL
@@ -41,6 +48,8 @@ from arrivals.trackers.svalse.valse import VALSE
 
 __all__ = [
     "ARKalmanQRDRLS",
+    "AmplitudePrior",
+    "BirthDeath",
     "CBF",
     "CoordinateSolver",
     "DirectionEstimate",
@@ -54,6 +63,8 @@ __all__ = [
     "InterpolationEKF",
     "Kalman",
     "GaussianFilter",
+    "GridSearch",
+    "MAPSolver",
     "MUSIC",
     "MVDR",
     "NewtonSolver",
@@ -74,6 +85,7 @@ __all__ = [
     "Tracker",
     "UKF",
     "VALSE",
+    "VariationalSolver",
     "as_filterpy",
     "available",
     "create",

@@ -196,14 +196,14 @@ class LogNormalRSS(MeasurementModel):
         return np.diag(self._variance)
 
     @property
-    def field(self) -> PropagationModel:
+    def propagation(self) -> PropagationModel:
         """Sensors, exponent, noise, floor and gains, for kernels."""
         gain = 0.0 if self.log_gain is None else self.log_gain
         return PropagationModel(self.sensors, self.alpha, self._noise, self.r_min, gain)
 
     def levels(self, u: ArrayLike, theta: ArrayLike) -> Levels:
-        """Return log σ_y and shares of sources (..., n_sources), (..., n_sources, 2)."""
-        return self.field.levels(
+        """Return log σ_y and responsibilities of sources (..., n_sources), (..., n_sources, 2)."""
+        return self.propagation.levels(
             np.asarray(u, dtype=np.float64), np.asarray(theta, dtype=np.float64)
         )
 

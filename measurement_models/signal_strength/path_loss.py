@@ -73,13 +73,13 @@ class Levels(NamedTuple):
     ----------
     log_sigma : ndarray, shape (..., n_sensors)
         log σ_y, Np.
-    shares : ndarray, shape (..., n_sources, n_sensors)
+    responsibilities : ndarray, shape (..., n_sources, n_sensors)
         λ: the part of each source in the power at each sensor.
     offsets : Offsets
     """
 
     log_sigma: Float
-    shares: Float
+    responsibilities: Float
     offsets: Offsets
 
 
@@ -92,7 +92,7 @@ def levels(
     r_min: float,
     log_gain: float | Float = 0.0,
 ) -> Levels:
-    """Return log σ_y = ½ log(Σ e^{2u} R^-α + σ_n²) and the shares λ, by softmax.
+    """Return log σ_y = ½ log(Σ e^{2u} R^-α + σ_n²) and the responsibilities λ, by softmax.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def levels(
     Two equal sources at 2 m, without noise: half each, and 3 dB more than one.
 
     >>> two = levels(np.zeros(2), np.array([[2.0, 0], [0, 2]]), np.zeros((1, 2)), 2.0, -np.inf, 1.0)
-    >>> two.shares.round(6).ravel(), float((two.log_sigma[0] + np.log(2)) / np.log(2))
+    >>> two.responsibilities.round(6).ravel(), float((two.log_sigma[0] + np.log(2)) / np.log(2))
     (array([0.5, 0.5]), 0.5)
     """
     geometry = offsets(theta, sensors, r_min)
@@ -133,12 +133,13 @@ def levels(
     noise: Float = 2.0 * np.asarray(log_noise)
     top = np.maximum(power.max(axis=-2, initial=-np.inf), noise)
     top = np.where(np.isneginf(top), 0.0, top)
-    shares = np.exp(power - top[..., None, :])  # the logarithms are never exponentiated first
-    total = shares.sum(axis=-2) + np.exp(noise - top)
-    shares /= np.maximum(total, np.finfo(np.float64).tiny)[..., None, :]
+    # differences first: the logarithms themselves may overflow
+    responsibilities = np.exp(power - top[..., None, :])
+    total = responsibilities.sum(axis=-2) + np.exp(noise - top)
+    responsibilities /= np.maximum(total, np.finfo(np.float64).tiny)[..., None, :]
     with np.errstate(divide="ignore"):
         log_sigma = 0.5 * (top + np.log(total))
-    return Levels(log_sigma, shares, geometry)
+    return Levels(log_sigma, responsibilities, geometry)
 
 
 class PropagationModel(NamedTuple):
@@ -161,7 +162,7 @@ class PropagationModel(NamedTuple):
     log_gain: float | Float = 0.0
 
     def levels(self, u: Float, theta: Float) -> Levels:
-        """Return log σ_y and shares of sources (..., n_sources), (..., n_sources, 2)."""
+        """Return log σ_y and responsibilities of sources (..., n_sources), (..., n_sources, 2)."""
         return levels(u, theta, self.sensors, self.alpha, self.log_noise, self.r_min, self.log_gain)
 
     def offsets(self, theta: Float) -> Offsets:
@@ -169,7 +170,7 @@ class PropagationModel(NamedTuple):
         return offsets(theta, self.sensors, self.r_min)
 
     def take(self, rows: Any) -> PropagationModel:
-        """Return the field of some of a batch."""
+        """Return the model at some rows of a batch."""
         noise = np.asarray(self.log_noise)
         return self._replace(
             sensors=self.sensors[rows] if self.sensors.ndim > 2 else self.sensors,
@@ -195,7 +196,7 @@ def slopes(found: Levels, alpha: float) -> Float:
     >>> slopes(one, alpha=3.0)
     array([[ 1.  , -0.75, -0.  ]])
     """
-    lam, geometry = found.shares, found.offsets
+    lam, geometry = found.responsibilities, found.offsets
     *lead, K, M = lam.shape
     slope = -0.5 * alpha * lam * geometry.inverse
     G = np.empty((*lead, 3 * K, M))

@@ -90,7 +90,7 @@ def rss_bound(
     P = np.zeros((2, 2)) if P0 is None else np.linalg.inv(real("P0", P0))
     prior = Prior(u, w, theta, np.broadcast_to(P, (*u.shape, 2, 2)))
     W = np.broadcast_to(1 / measurement.variance, (*u.shape[:-1], measurement.dim_z))
-    problem = JointPosterior(measurement.field, W, W, prior)
+    problem = JointPosterior(measurement.propagation, W, W, prior)
     J = problem.information(measurement.levels(u, theta))
     try:
         return Bound(*marginals(J))

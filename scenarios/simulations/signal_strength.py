@@ -17,6 +17,7 @@ from arrivals.measurement_models import LogNormalRSS, db_to_neper
 from arrivals.motion_models import MotionModel, RandomWalk
 from arrivals.scenarios.base import Scenario, Trial
 from arrivals.scenarios.registry import register
+from arrivals.trackers.rss.settings import AmplitudePrior
 from arrivals.typing import Bool, Float
 from arrivals.validation import count, number, one_of, positive
 
@@ -55,7 +56,8 @@ class RSSTrial(Trial):
 
     def known(self) -> dict[str, Any]:
         """Return models and priors by the names of a tracker's parameters."""
-        prior = {name: getattr(self, name) for name in ("x0", "P0", "mu0", "v0")}
+        amplitude = AmplitudePrior(mean=self.mu0, variance=self.v0)
+        prior = {"x0": self.x0, "P0": self.P0, "amplitude": amplitude}
         return super().known() | prior
 
 

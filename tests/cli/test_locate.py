@@ -1,4 +1,4 @@
-"""`arrivals locate` and the map: what they write, and what they refuse."""
+"""Tests of `arrivals locate` and of the map: outputs and errors."""
 
 import csv
 from pathlib import Path
@@ -8,7 +8,7 @@ import pytest
 
 import arrivals.scenarios
 from arrivals.__main__ import main
-from arrivals.cli.locate import located
+from arrivals.cli.locate import locate_sources
 from arrivals.plots.maps import ellipse, plot_map
 from arrivals.recordings.network_calibration import calibrate
 from arrivals.recordings.networks import Network
@@ -20,7 +20,7 @@ POWDER = Path(arrivals.scenarios.__file__).parent / "data" / "powder.npz"
 
 
 def walk(n_steps: int = 12) -> tuple[Float, Float, Float]:
-    """Places, true positions, and levels in dBm of one source of 20 dBm at 1 m that walks."""
+    """Return sensors, true positions, and levels in dBm of a walking source of 20 dBm at 1 m."""
     rng = np.random.default_rng(3)
     places = rng.uniform(0, 200, (25, 2))
     truth = np.stack([60 + 4.0 * np.arange(n_steps), np.full(n_steps, 90.0)], axis=-1)
@@ -72,7 +72,7 @@ def test_locate_prints_without_an_output_file(
     assert main(command) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].startswith("step,time_s,label,x_m")
-    assert len(lines) == 11  # the number is not given: two steps pass until it is sure of one
+    assert len(lines) == 11  # unknown number: the source is confirmed after two steps
 
 
 @pytest.mark.parametrize(
@@ -87,7 +87,7 @@ def test_locate_prints_without_an_output_file(
         (["--tracker", "svalse"], "invalid choice"),
     ],
 )
-def test_locate_refuses_in_one_line(
+def test_locate_invalid_argument_prints_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], change: list[str], message: str,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
@@ -110,14 +110,14 @@ def test_inputs_are_not_overwritten(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert readings.read_text() == before
 
 
-def test_times_must_grow() -> None:
+def test_times_must_increase() -> None:
     places, _, levels = walk(2)
     network = Network.fixed([str(k) for k in range(25)], places, levels, np.array([1.0, 1.0]))
-    with pytest.raises(ValueError, match="times must grow"):
-        located(network)
+    with pytest.raises(ValueError, match="time must increase"):
+        locate_sources(network)
 
 
-def test_ellipse_holds_its_share() -> None:
+def test_ellipse_contains_its_probability() -> None:
     rng = np.random.default_rng(0)
     P = np.array([[4.0, 1.5], [1.5, 2.0]])
     drawn = rng.multivariate_normal([1.0, 2.0], P, 20000) - [1.0, 2.0]
@@ -129,7 +129,7 @@ def test_ellipse_holds_its_share() -> None:
     assert inside.mean() == pytest.approx(0.95, abs=0.01)
 
 
-def test_map_shows_tracks_and_truth_and_refuses_directions() -> None:
+def test_map_shows_tracks_and_truth_and_rejects_directions() -> None:
     trial = create("rss_crossing", n_steps=6).sample(np.random.default_rng(0))
     run = trial.tracker("rss_vb").run(trial.measurements)
     ax = plot_map(run, sensors=np.zeros((2, 2)), truth=trial.truth, n_ellipses=3)
@@ -147,5 +147,5 @@ def test_shipped_walk_is_tracked() -> None:
     known = calibrate(network.take(slice(150, 300)), floor_db=FLOOR_DB)
     assert 2.0 < known.alpha < 3.2
     found = track_transmitter(network.take(slice(0, 150)), known)
-    assert np.median(found.error) < 250  # ten minutes tell little of the receivers
+    assert np.median(found.error) < 250  # ten minutes calibrate the receivers poorly
     assert np.median(found.nees) < 5.991

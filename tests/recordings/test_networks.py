@@ -1,4 +1,4 @@
-"""Files of measured networks, their calibration, and the measured data themselves."""
+"""Tests of the files of measured networks, their calibration, and the measured data."""
 
 import os
 from pathlib import Path
@@ -46,20 +46,20 @@ def test_both_forms_of_a_table_are_read(tmp_path: Path, readings: str) -> None:
     [
         (WIDE, SENSORS + "b,9,9\n", "the sensor 'b' is listed twice"),
         (WIDE, "name,x_m\na,0\n", "the column 'y_m' is missing"),
-        (WIDE, "name,x_m,y_m\na,0,0\nb,50,\nc,0,50\n", "a place is missing"),
-        (WIDE, "name,x_m,y_m\na,0,east\n", "'east' is no number"),
+        (WIDE, "name,x_m,y_m\na,0,0\nb,50,\nc,0,50\n", "a position is missing"),
+        (WIDE, "name,x_m,y_m\na,0,east\n", "'east' is not a number"),
         (WIDE.replace(",c\n", ",d\n"), SENSORS, "the sensor 'd' is not in the table"),
         (WIDE.replace(",c\n", ",a\n"), SENSORS, "the column 'a' is listed twice"),
         (LONG.replace("4,c", "4,z"), SENSORS, "the sensor 'z' is not in the table"),
         (LONG + "4,a,-62\n", SENSORS, "'a' has two readings at 4 s"),
         ("sensor,rss_db\na,-60\n", SENSORS, "the column 'time_s' is missing"),
-        ("time_s,a,b,c\n0,,,\n", SENSORS, "all readings are missing"),
-        ("time_s,a,b,c\n", SENSORS, "there is no row below the headings"),
-        ("time_s,a,b,c\n0,1,2,3,4\n", SENSORS, "more cells than there are headings"),
-        (WIDE.replace("-61", "loud"), SENSORS, "'loud' is no number"),
+        ("time_s,a,b,c\n0,,,\n", SENSORS, "rss_db must have a valid reading"),
+        ("time_s,a,b,c\n", SENSORS, "there is no row below the header"),
+        ("time_s,a,b,c\n0,1,2,3,4\n", SENSORS, "more cells than the header"),
+        (WIDE.replace("-61", "loud"), SENSORS, "'loud' is not a number"),
     ],
 )
-def test_bad_tables_are_told_in_one_line(
+def test_invalid_tables_raise_a_one_line_error(
     tmp_path: Path, readings: str, sensors: str, message: str
 ) -> None:
     with pytest.raises(ValueError, match=message):
@@ -71,14 +71,14 @@ def test_a_table_of_readings_needs_its_sensors(tmp_path: Path) -> None:
         read_network(tmp_path / "readings.csv")
 
 
-def test_two_sensors_at_one_place_are_warned_of(tmp_path: Path) -> None:
-    with pytest.warns(UserWarning, match="two sensors stand at the same place"):
+def test_two_sensors_at_one_position_raise_a_warning(tmp_path: Path) -> None:
+    with pytest.warns(UserWarning, match="two sensors have the same position"):
         read_network(*files(tmp_path, WIDE, "name,x_m,y_m\na,0,0\nb,0,0\nc,0,50\n"))
     assert read_sensors(tmp_path / "sensors.csv")[0] == ["a", "b", "c"]
 
 
 def moving(n_steps: int = 300, seed: int = 0, sigma_db: float = 4.0) -> Network:
-    """One transmitter walks among sensors with offsets; one of them moves, some readings fail."""
+    """Simulate a walk among sensors with offsets; one sensor moves, some readings are missing."""
     rng = np.random.default_rng(seed)
     sensors = np.broadcast_to(rng.uniform(-400, 400, (14, 2)), (n_steps, 14, 2)).copy()
     sensors[:, 13, 0] += np.linspace(0, 200, n_steps)
@@ -106,15 +106,15 @@ def test_npz_is_a_round_trip(tmp_path: Path) -> None:
         read_network(tmp_path / "m.npz")
 
 
-def test_a_reading_without_a_place_is_refused() -> None:
+def test_a_reading_without_a_position_is_an_error() -> None:
     network = moving(3)
     sensors = network.sensors.copy()
     sensors[0, np.flatnonzero(np.isfinite(network.rss_db[0]))[0]] = np.nan
-    with pytest.raises(ValueError, match="has a reading, but no place, in step 0"):
+    with pytest.raises(ValueError, match="has a reading, but no position, in step 0"):
         Network(network.name, network.time, network.rss_db, sensors)
 
 
-def test_calibration_finds_what_was_put_in_and_outliers_do_not_matter() -> None:
+def test_calibration_recovers_the_simulated_values_with_outliers() -> None:
     network = moving()
     rss_db = network.rss_db.copy()
     rss_db[::15] += 40.0
@@ -127,7 +127,7 @@ def test_calibration_finds_what_was_put_in_and_outliers_do_not_matter() -> None:
     assert float(neper_to_db(clean.sigma)) == pytest.approx(4.0, rel=0.1)
 
 
-def test_sensors_never_calibrated_are_less_trusted() -> None:
+def test_uncalibrated_sensors_have_a_larger_variance() -> None:
     network = moving()
     rss_db = network.rss_db.copy()
     rss_db[:, 2] = np.nan
@@ -137,7 +137,7 @@ def test_sensors_never_calibrated_are_less_trusted() -> None:
     assert model.variance[2] == pytest.approx(found.sigma**2 + float(db_to_neper(7.0)) ** 2)
 
 
-def test_calibration_wants_one_known_transmitter() -> None:
+def test_calibration_requires_one_known_transmitter() -> None:
     network = moving(20)
     one = np.asarray(network.truth)
     for truth in (None, np.concatenate([one, one], axis=1)):
@@ -146,18 +146,18 @@ def test_calibration_wants_one_known_transmitter() -> None:
             calibrate(other)
     few = np.where(np.arange(14) < 5, -60.0, np.nan)[None]
     short = Network(network.name, network.time[:1], few, network.sensors[:1], one[:1])
-    with pytest.raises(ValueError, match="ten readings at least"):
+    with pytest.raises(ValueError, match="at least 10 readings"):
         calibrate(short)
 
 
-def test_a_walk_through_a_network_is_tracked() -> None:
+def test_track_transmitter_follows_a_walk() -> None:
     known = calibrate(moving(seed=5))
     found = track_transmitter(moving(120), known, tau=4.0)
     assert np.median(found.error[20:]) < 40
     assert np.mean(found.nees[20:] < 5.991) > 0.8
 
 
-# measured data, where they are
+# measured data
 
 
 def shared() -> Path:
@@ -173,10 +173,10 @@ def test_measured_transmitter_snapshots_and_track() -> None:
     assert known.alpha == pytest.approx(2.5, abs=0.1)
     assert float(neper_to_db(known.sigma)) == pytest.approx(6.6, abs=0.3)
     eighth = single.take(np.arange(0, len(single), 8))
-    starts = {"strongest": lambda seen: strongest(seen) + 20.0, "centre": centre}
+    starts = {"strongest": lambda readings: strongest(readings) + 20.0, "centre": centre}
     for start in starts.values():
-        far = [distance(snapshot(seen, known, start(seen)[None])[0], eighth, seen.step)
-               for seen in steps_of(eighth, known)]  # fmt: skip
+        far = [distance(snapshot(one, known, start(one)[None])[0], eighth, one.step)
+               for one in steps_of(eighth, known)]  # fmt: skip
         assert 145 <= np.median(far) <= 190
     july = int(np.argmax(np.diff(single.time))) + 1
     found = track_transmitter(single.take(np.arange(july, july + 700)), known)

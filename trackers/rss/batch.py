@@ -1,103 +1,136 @@
-"""Many sequences of readings side by side."""
+"""Batches of independent sequences of readings in array calls."""
 
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
 from arrivals.trackers.estimates import PositionEstimate
-from arrivals.trackers.rss.belief import SourceBeliefs
-from arrivals.trackers.rss.inference.goodness_of_fit import Quality
-from arrivals.trackers.rss.inference.solution import Solution, Status
-from arrivals.trackers.rss.model_order.birth_death import TrackTable
+from arrivals.trackers.rss.belief import Entries, SourceBeliefs
+from arrivals.trackers.rss.inference.solution import Diagnostics
+from arrivals.trackers.rss.model_order.track_table import TrackTable
 from arrivals.trackers.run import Run
 from arrivals.typing import Float, Int
 
-if TYPE_CHECKING:
-    from arrivals.trackers.rss.base import RSSTracker
+READINGS_PER_CHUNK = 20_000  # in one array call: fits into the cache
 
-AT_ONCE = 20_000  # readings side by side: what stays in the cache
+Predict = Callable[[SourceBeliefs, float], SourceBeliefs]
+Update = Callable[[SourceBeliefs, Float, Float], tuple[SourceBeliefs, Diagnostics]]
 
 
-def run_in_chunks(tracker: RSSTracker, xi: Float, dt: float) -> list[Run]:
-    """Run sequences of readings (n_sequences, n_steps, n_sensors), some at a time."""
-    size = max(1, AT_ONCE // xi.shape[-1])
+class BatchStart(NamedTuple):
+    """Belief that all sequences of a batch start from.
+
+    Parameters
+    ----------
+    sources : SourceBeliefs
+        Leading axis: sources.
+    tracks : TrackTable
+    elapsed : float
+        Time since the last readings.
+    n_slots : int
+        Sources in one row of a `Run`.
+    position : tuple of two int
+        Entries of a state that are the position.
+    """
+
+    sources: SourceBeliefs
+    tracks: TrackTable
+    elapsed: float
+    n_slots: int
+    position: Entries
+
+
+def run_in_chunks(
+    start: BatchStart, xi: Float, dt: float, predict: Predict, update: Update
+) -> list[Run]:
+    """Run sequences of readings, as many in one array call as the cache holds.
+
+    Parameters
+    ----------
+    start : BatchStart
+    xi : ndarray, shape (n_sequences, n_steps, n_sensors)
+        Readings, Np; NaN where missing.
+    dt : float
+        Time between steps.
+    predict : callable
+        Returns a batch of beliefs after `dt`.
+    update : callable
+        Returns a batch of beliefs after readings (n_batch, n_sensors), given the time since the
+        last ones (n_batch,), and its diagnostics.
+    """
+    size = max(1, READINGS_PER_CHUNK // xi.shape[-1])
     chunks = (xi[first : first + size] for first in range(0, len(xi), size))
-    return [run for chunk in chunks for run in run_together(tracker, chunk, dt)]
+    return [run for chunk in chunks for run in run_chunk(start, chunk, dt, predict, update)]
 
 
-def run_together(tracker: RSSTracker, xi: Float, dt: float) -> list[Run]:
-    """Run sequences of readings (n_sequences, n_steps, n_sensors) side by side."""
+def run_chunk(
+    start: BatchStart, xi: Float, dt: float, predict: Predict, update: Update
+) -> list[Run]:
+    """Run sequences of readings in one array call a step; parameters as in `run_in_chunks`."""
     started = time.perf_counter()
     B, T, _ = xi.shape
-    sources = SourceBeliefs(*(np.repeat(part[None], B, axis=0) for part in tracker.by_source()))
-    elapsed = np.full(B, tracker.elapsed)
-    recorded = _Recorded(tracker, B, T, len(sources.u[0]))
+    sources = SourceBeliefs(*(np.repeat(part[None], B, axis=0) for part in start.sources))
+    elapsed = np.full(B, start.elapsed)
+    history = BatchHistory(start, B, T)
     for t in range(T):
-        sources = sources.predicted(tracker.motion, dt, tracker.q_u)
+        sources = predict(sources, dt)
         elapsed = elapsed + dt
-        heard = np.flatnonzero(~np.isnan(xi[:, t]).all(axis=1))
-        if len(heard):
-            told = tracker.told(xi[heard, t], elapsed[heard])
-            moved, found, judged = tracker.correct(sources.take(heard), told)
-            for part, new in zip(sources, moved, strict=True):
-                part[heard] = new
-            elapsed[heard] = 0.0
-            recorded.note(t, heard, found, judged)
-        recorded.add(t, sources)
-    took = (time.perf_counter() - started) / B
-    return recorded.runs(tracker.census, dt * np.arange(T, dtype=np.float64), took)
+        rows = np.flatnonzero(~np.isnan(xi[:, t]).all(axis=1))
+        if len(rows):
+            updated, diagnostics = update(sources.take(rows), xi[rows, t], elapsed[rows])
+            for part, new in zip(sources, updated, strict=True):
+                part[rows] = new
+            elapsed[rows] = 0.0
+            history.store_diagnostics(t, rows, diagnostics)
+        history.store_beliefs(t, sources)
+    return history.runs(dt * np.arange(T, dtype=np.float64), (time.perf_counter() - started) / B)
 
 
-class _Recorded:
-    """Beliefs of a batch over time, and the runs that they make."""
+class BatchHistory:
+    """Beliefs and diagnostics of a batch over time, and the runs of its sequences."""
 
-    def __init__(self, tracker: RSSTracker, n_batch: int, n_steps: int, n_sources: int) -> None:
-        n = tracker.motion.dim_x
-        shape = (n_batch, n_steps, n_sources)
-        self.xy = tracker.xy
-        self.n_slots = max(tracker.n_slots, n_sources)
+    def __init__(self, start: BatchStart, n_batch: int, n_steps: int) -> None:
+        K, n = start.sources.x.shape
+        shape = (n_batch, n_steps, K)
+        self.start = start
         self.sources = SourceBeliefs(
             np.empty((*shape, n)), np.empty((*shape, n, n)), np.empty(shape), np.empty(shape)
         )
-        default = Status()
-        self.status = {
+        self.diagnostics = {
             name: np.full(shape[:2], value)
-            for name, value in zip(Status._fields, default, strict=True)
+            for name, value in zip(Diagnostics._fields, Diagnostics(), strict=True)
         }
 
-    def note(self, t: int, rows: Int, found: Solution, judged: Quality) -> None:
-        """Enter what a step says of its own making."""
-        values = (found.converged, found.iterations, judged.fit, judged.poor_fit, judged.diverged)
-        for name, value in zip(Status._fields, values, strict=True):
-            self.status[name][rows, t] = value
+    def store_diagnostics(self, t: int, rows: Int, diagnostics: Diagnostics) -> None:
+        """Store the diagnostics of some rows at step t."""
+        for name, value in zip(Diagnostics._fields, diagnostics, strict=True):
+            self.diagnostics[name][rows, t] = value
 
-    def add(self, t: int, sources: SourceBeliefs) -> None:
-        """Enter the beliefs after a step."""
-        for mine, part in zip(self.sources, sources, strict=True):
-            mine[:, t] = part
+    def store_beliefs(self, t: int, sources: SourceBeliefs) -> None:
+        """Store the beliefs after step t."""
+        for stored, part in zip(self.sources, sources, strict=True):
+            stored[:, t] = part
 
-    def runs(self, census: TrackTable, times: Float, elapsed: float) -> list[Run]:
+    def runs(self, times: Float, elapsed: float) -> list[Run]:
         """Return one run a sequence."""
-        n_steps, K = self.sources.u.shape[1:]
-        everywhere = (n_steps, K)
-        runs = []
-        for b in range(len(self.sources.u)):
-            own = self.sources.take(b)
-            fields = {
-                "position": own.x[..., self.xy],
-                "covariance": own.P[..., self.xy, :][..., self.xy],
-                "log_amplitude": own.u,
-                "existence": np.broadcast_to(census.existence, everywhere).copy(),
-                "label": np.broadcast_to(census.label, everywhere).copy(),
-                **{name: values[b] for name, values in self.status.items()},
-            }
-            x = np.full((n_steps, self.n_slots, own.x.shape[-1] + 1), np.nan)
-            x[:, :K, :-1], x[:, :K, -1] = own.x, own.u
-            n_found = np.full(n_steps, K)
-            runs.append(
-                Run(PositionEstimate, fields, x.reshape(n_steps, -1), n_found, times, elapsed)
-            )
-        return runs
+        return [self._run(b, times, elapsed) for b in range(len(self.sources.u))]
+
+    def _run(self, b: int, times: Float, elapsed: float) -> Run:
+        xy, tracks, sources = self.start.position, self.start.tracks, self.sources.take(b)
+        n_steps, K, n = sources.x.shape
+        fields = {
+            "position": sources.x[..., xy],
+            "covariance": sources.P[..., xy, :][..., xy],
+            "log_amplitude": sources.u,
+            "existence": np.broadcast_to(tracks.existence, (n_steps, K)).copy(),
+            "label": np.broadcast_to(tracks.label, (n_steps, K)).copy(),
+            **{name: values[b] for name, values in self.diagnostics.items()},
+        }
+        x = np.full((n_steps, max(self.start.n_slots, K), n + 1), np.nan)
+        x[:, :K, :-1], x[:, :K, -1] = sources.x, sources.u
+        n_found = np.full(n_steps, K)
+        return Run(PositionEstimate, fields, x.reshape(n_steps, -1), n_found, times, elapsed)

@@ -5,46 +5,64 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.measurement_models.signal_strength.decibels import NEPER_PER_DB
 from arrivals.measurement_models.signal_strength.log_normal import LogNormalRSS
 from arrivals.motion_models.base import MotionModel
 from arrivals.trackers.registry import register
 from arrivals.trackers.rss.base import RSSTracker
 from arrivals.trackers.rss.inference.joint_posterior import JointPosterior, marginals
-from arrivals.trackers.rss.inference.map_search import Maximum, Method, maximum
-from arrivals.trackers.rss.inference.solution import Solution, laplace
+from arrivals.trackers.rss.inference.map_search import maximize
+from arrivals.trackers.rss.inference.solution import Solution
+from arrivals.trackers.rss.settings import AmplitudePrior, BirthDeath, GridSearch, MAPSolver
 from arrivals.typing import Float
-from arrivals.validation import one_of, positive
+from arrivals.validation import instance
 
 
 @register("rss_ml")
 class RSSML(RSSTracker):
-    """Several sources by their signal strength: the joint maximum.
+    """Track several sources by their signal strength with the joint maximum.
 
     Parameters
     ----------
-    motion, measurement, x0, P0, mu0, v0, q_u, n_sources, max_sources, births, confirm
-        As in `RSSVB`.
-    area_std, grid_step, correlation_time
-        As in `RSSVB`.
-    method : {"lm", "bfgs"}
-        Levenberg and Marquardt's search or Broyden, Fletcher, Goldfarb and Shanno's, scipy's
-        both, with analytic slopes.
-    prior : bool
-        Whether the predicted belief counts: the paper calls the maximum of the joint posterior
-        ML. Without, it is where the search starts, and no more; a source that the readings do
-        not hold may run away.
-    tolerance : float
-        Relative, of step and cost, at which the search ends.
+    motion : MotionModel
+        Motion of one source; its state contains the position at `measurement.position`.
+    measurement : LogNormalRSS
+        Model of the readings. Its parameters for the amplitudes and the number of sources are not
+        used: the log amplitudes u are kept beside the state.
+    x0 : array_like, shape (n_sources, n), optional
+        Initial states. If None, sources are detected in the first readings.
+    P0 : array_like, shape (n, n) or (n_sources, n, n), optional
+        Initial covariance of a state. For sources still to be detected only its part without the
+        position is used, such as that of velocities; it may be None if there is no other part.
+    n_sources : int, optional
+        Number of sources to detect where `x0` is None; selected by the evidence if None.
+    amplitude : AmplitudePrior
+        Prior and drift of the log amplitudes.
+    births : BirthDeath or bool, optional
+        Settings for sources that appear and disappear; True for the default settings, None or
+        False for a constant number of sources.
+    search : GridSearch
+        Search for sources of unknown number or positions.
+    solver : MAPSolver
+        Optimizer, and whether the prior is part of the cost.
+    correlation_time : float, optional
+        Correlation time τ of the shadowing: readings have the weight min(1, Δt/τ); weight 1 if
+        None.
 
     Raises
     ------
     TypeError, ValueError
-        As in `RSSVB`; and at an update without prior, if readings are fewer than unknowns.
+        If an argument has a wrong type or value; at an update without the prior, if there are
+        fewer readings than unknowns.
+
+    Warns
+    -----
+    UserWarning
+        If there are fewer readings than unknowns, a source starts on a sensor, or the readings
+        do not support the requested number of sources.
 
     Notes
     -----
-    Belief, start, labels and covariances are those of `RSSVB`; `max_sources` and the rest too.
+    Belief, detection, labels and covariances are those of `RSSVB`.
 
     References
     ----------
@@ -55,9 +73,9 @@ class RSSML(RSSTracker):
     --------
     >>> from arrivals.motion_models import RandomWalk
     >>> rng = np.random.default_rng(0)
-    >>> heard = LogNormalRSS(rng.uniform(-60, 60, (40, 2)), log_noise=4.6, position=(0, 1))
-    >>> tracker = RSSML(RandomWalk(q=1.0), heard, [[-20.0, 15.0]], 100.0 * np.eye(2))
-    >>> tracker.update(heard.draw([9.2], [[-25.0, 10.0]], rng))
+    >>> rss = LogNormalRSS(rng.uniform(-60, 60, (40, 2)), log_noise=4.6, position=(0, 1))
+    >>> tracker = RSSML(RandomWalk(q=1.0), rss, [[-20.0, 15.0]], 100.0 * np.eye(2))
+    >>> tracker.update(rss.draw([9.2], [[-25.0, 10.0]], rng))
     >>> tracker.estimate.position.round(0)
     array([[-25.,  10.]])
     """
@@ -69,49 +87,71 @@ class RSSML(RSSTracker):
         x0: ArrayLike | None = None,
         P0: ArrayLike | None = None,
         *,
-        mu0: ArrayLike = 80 * NEPER_PER_DB,
-        v0: ArrayLike = (3 * NEPER_PER_DB) ** 2,
-        q_u: float = (0.3 * NEPER_PER_DB) ** 2,
         n_sources: int | None = None,
-        max_sources: int = 8,
-        births: bool = False,
-        confirm: int = 3,
-        area_std: float | None = None,
-        grid_step: float | None = None,
+        amplitude: AmplitudePrior = AmplitudePrior(),
+        births: BirthDeath | bool | None = None,
+        search: GridSearch = GridSearch(),
+        solver: MAPSolver = MAPSolver(),
         correlation_time: float | None = None,
-        method: Method = "lm",
-        prior: bool = True,
-        tolerance: float = 1e-8,
     ) -> None:
-        self.method = one_of("method", method, ("lm", "bfgs"))
-        self.prior = bool(prior)
-        self.tolerance = positive("tolerance", tolerance)
+        self.solver = instance("solver", solver, MAPSolver)
         super().__init__(
-            motion, measurement, x0, P0, mu0=mu0, v0=v0, q_u=q_u, n_sources=n_sources,
-            max_sources=max_sources, births=births, confirm=confirm, area_std=area_std,
-            grid_step=grid_step, correlation_time=correlation_time,
+            motion, measurement, x0, P0, n_sources=n_sources, amplitude=amplitude, births=births,
+            search=search, correlation_time=correlation_time,
         )  # fmt: skip
 
+    def update(self, z: ArrayLike | None) -> None:
+        """Update the belief by one set of readings: the maximum of (7).
+
+        Parameters
+        ----------
+        z : array_like, shape (n_sensors,), or None
+            Readings, Np; NaN where a sensor is missing, None if all are.
+        """
+        # ξ and W = 1/r   (2), (3)
+        readings = self.observe(z)
+        if readings is None:
+            self.record_missed()
+            return
+        sources = self.sources.take(None)
+        if self.births or sources.u.size == 0:
+            self.detect_sources(readings)
+            return
+        # L(u, θ)   (7)
+        problem = self.joint_posterior(sources, readings)
+        # argmax L(u, θ)   (section 4)
+        solution = self.solve(problem, problem.prior.mu, problem.prior.theta)
+        updated, diagnostics = self.update_sources(sources, readings, problem, solution)
+        self.store(updated.take(0), solution, diagnostics)
+
     def solve(self, problem: JointPosterior, u: Float, theta: Float) -> Solution:
-        """Search the maxima one by one; then the marginals."""
-        start = problem.log_posterior(u, theta)
-        each = [self._maximum(problem, u, theta, b) for b in range(len(u))]
-        u, theta = np.array([one.u for one in each]), np.array([one.theta for one in each])
-        J, log_likelihood = laplace(problem, u, theta)
-        if not self.prior:  # what the prior says is no more than what keeps J regular
+        """Maximize a batch of problems one by one; return the maxima and their marginals.
+
+        Parameters
+        ----------
+        problem : JointPosterior
+            With one batch axis.
+        u, theta : ndarray, shape (n_batch, n_sources), (n_batch, n_sources, 2)
+            Starting points.
+
+        Returns
+        -------
+        Solution
+        """
+        initial = problem.log_posterior(u, theta)
+        maxima = [maximize(problem.take(b), u[b], theta[b], self.solver) for b in range(len(u))]
+        u, theta = np.array([one.u for one in maxima]), np.array([one.theta for one in maxima])
+        J, log_likelihood = problem.laplace(u, theta)
+        if not self.solver.prior:  # a small part of the prior keeps J regular
             J = J - (1 - 1e-9) * problem.prior_precision()
+            initial = np.full(len(u), -np.inf)
         return Solution(
             u,
             theta,
             marginals(J),
             problem.log_posterior(u, theta),
-            start if self.prior else np.full(len(u), -np.inf),
+            initial,
             log_likelihood,
-            np.array([one.iterations for one in each]),
-            np.array([one.converged for one in each]),
+            np.array([one.iterations for one in maxima]),
+            np.array([one.converged for one in maxima]),
         )
-
-    def _maximum(self, problem: JointPosterior, u: Float, theta: Float, b: int) -> Maximum:
-        field = problem.field.take(b)
-        one = JointPosterior(field, problem.xi[b], problem.W[b], problem.prior.take(b))
-        return maximum(one, u[b], theta[b], self.method, self.prior, self.tolerance)

@@ -1,103 +1,80 @@
-"""Positions of several sources from signal strength, by factored variational Bayes."""
+"""Positions of several sources from signal strength, by factorized variational Bayes."""
 
 from __future__ import annotations
 
-from typing import Literal
-
+import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.measurement_models.signal_strength.decibels import NEPER_PER_DB
 from arrivals.measurement_models.signal_strength.log_normal import LogNormalRSS
 from arrivals.motion_models.base import MotionModel
+from arrivals.trackers.gaussian.linalg import inverse_2x2
 from arrivals.trackers.registry import register
 from arrivals.trackers.rss.base import RSSTracker
+from arrivals.trackers.rss.inference.factors import update_amplitudes, update_positions
 from arrivals.trackers.rss.inference.joint_posterior import (
+    ExpansionPoint,
     JointPosterior,
-    Marginals,
-    inverse_2x2,
+    Prior,
+    VariationalPosterior,
     marginals,
 )
-from arrivals.trackers.rss.inference.solution import Solution, laplace
-from arrivals.trackers.rss.inference.variational import (
-    Refresh,
-    Sweep,
-    VariationalIterate,
-    VariationalSettings,
-    solve,
-)
-from arrivals.typing import Float
-from arrivals.validation import count, not_negative, number, one_of
+from arrivals.trackers.rss.inference.solution import Marginals, Solution
+from arrivals.trackers.rss.settings import AmplitudePrior, BirthDeath, GridSearch, VariationalSolver
+from arrivals.typing import Bool, Float, Int
+from arrivals.validation import instance
+
+ROUNDING = 1e-12  # relative decrease of L that counts as none
+MIN_STEP_FRACTION = 2.0**-6  # of an iteration's step; it is taken even if L decreases
 
 
 @register("rss_vb")
 class RSSVB(RSSTracker):
-    """Several sources by their signal strength: factored variational Bayes.
+    """Track several sources by their signal strength with factorized variational Bayes.
 
     Parameters
     ----------
     motion : MotionModel
-        Of one source; its state holds the position where `measurement.position` says.
+        Motion of one source; its state contains the position at `measurement.position`.
     measurement : LogNormalRSS
-        Its entries for amplitudes and number of sources are not used: u is beside the state.
+        Model of the readings. Its parameters for the amplitudes and the number of sources are not
+        used: the log amplitudes u are kept beside the state.
     x0 : array_like, shape (n_sources, n), optional
-        States at first. If None, sources are found in the first readings.
-    P0 : array_like, shape (n, n) or (n_sources, n, n)
-        Their covariance. For sources still to be found only what it says of the rest of the
-        state, such as velocities, is used; it may be None if there is no rest.
-    mu0, v0 : float or array_like, shape (n_sources,)
-        Mean, Np, and variance, Np², of the log amplitudes at first; 80 dB and (3 dB)².
-    q_u : float
-        Variance that a log amplitude gains per unit of time, Np².
+        Initial states. If None, sources are detected in the first readings.
+    P0 : array_like, shape (n, n) or (n_sources, n, n), optional
+        Initial covariance of a state. For sources still to be detected only its part without the
+        position is used, such as that of velocities; it may be None if there is no other part.
     n_sources : int, optional
-        How many are to be found where `x0` is None; the evidence decides if None.
-    max_sources : int
-        How many there may be where the number is not known.
-    births : bool
-        Sources may come and go.
-    confirm : int
-        Steps of clear evidence that make a new source sure, and an old one given up.
-    area_std : float, optional
-        New sources lie about the sensors' centre with this standard deviation in x and y, m;
-        that of the sensors if None.
-    grid_step : float, optional
-        Of the grid on which new sources are looked for, m; a fifth of `area_std` if None.
+        Number of sources to detect where `x0` is None; selected by the evidence if None.
+    amplitude : AmplitudePrior
+        Prior and drift of the log amplitudes.
+    births : BirthDeath or bool, optional
+        Settings for sources that appear and disappear; True for the default settings, None or
+        False for a constant number of sources.
+    search : GridSearch
+        Search for sources of unknown number or positions.
+    solver : VariationalSolver
+        Order, step and end of the iterations.
     correlation_time : float, optional
-        τ: readings repeat themselves for so long, as shadowing does. Each is weighed by
-        min(1, Δt/τ).
-    sweep : {"gauss-seidel", "jacobi"}
-        Each factor sees the newest of the others, or all as they were, as in Algorithm 1.
-    damping : float, optional
-        Share of a cycle's step that is taken; if None 1, or with "jacobi" 0.5 (0.25 from 20
-        sources).
-    refresh : {"point", "literal"}
-        "literal" is Algorithm 1: prior and expansion point are the same symbols, so that data
-        count once per cycle. For comparison only.
-    guard : bool
-        Halve steps that lower the joint posterior; never with "literal".
-    max_cycles : int
-    tol_u, tol_theta : float
-        Cycles end when log amplitudes, Np, and positions, m, move less.
-    newton_steps : int
-        At most, for a position and a cycle.
-    covariance : {"joint", "factor"}
-        Marginals of Laplace's joint Gaussian, or those of the factors, which are too small.
+        Correlation time τ of the shadowing: readings have the weight min(1, Δt/τ); weight 1 if
+        None.
 
     Raises
     ------
     TypeError, ValueError
-        If a part or a number is not what is wanted; readings that do not fit change nothing.
+        If an argument has a wrong type or value. Invalid readings leave the belief unchanged.
 
     Warns
     -----
     UserWarning
-        If readings are fewer than unknowns, a source starts on a sensor, or the readings do not
-        tell as many sources apart as are asked for.
+        If there are fewer readings than unknowns, a source starts on a sensor, or the readings
+        do not support the requested number of sources.
 
     Notes
     -----
-    The belief is x, P as in `RSSTracker`. With the prior kept fixed, fixed points are those of
-    the joint maximum (`RSSML`). The factors' covariances are too small: of three sources 30 m apart
-    that were all found within 10 m, their 95 % ellipses held 68 %, those of the joint one 84 %.
+    The belief is `x`, `P` as in `RSSTracker`. Shapes: readings (n_sensors,). Units: m, Np.
+    With the prior kept fixed, the fixed points are those of the joint maximum (`RSSML`). The
+    covariances of the factors are too small: of three sources 30 m apart, all located within 10 m,
+    their 95 % ellipses contained 68 %, those of the joint covariance 84 %.
 
     References
     ----------
@@ -106,14 +83,13 @@ class RSSVB(RSSTracker):
 
     Examples
     --------
-    >>> import numpy as np
     >>> from arrivals.motion_models import RandomWalk
     >>> rng = np.random.default_rng(0)
-    >>> heard = LogNormalRSS(rng.uniform(-60, 60, (40, 2)), log_noise=4.6, position=(0, 1))
+    >>> rss = LogNormalRSS(rng.uniform(-60, 60, (40, 2)), log_noise=4.6, position=(0, 1))
     >>> truth = np.array([[-25.0, 10.0], [30.0, -5.0]])
-    >>> tracker = RSSVB(RandomWalk(q=1.0), heard, truth + 5.0, 100.0 * np.eye(2))
+    >>> tracker = RSSVB(RandomWalk(q=1.0), rss, truth + 5.0, 100.0 * np.eye(2))
     >>> tracker.predict()
-    >>> tracker.update(heard.draw([9.2, 9.0], truth, rng))
+    >>> tracker.update(rss.draw([9.2, 9.0], truth, rng))
     >>> bool(np.abs(tracker.estimate.position - truth).max() < 2)
     True
     """
@@ -125,70 +101,194 @@ class RSSVB(RSSTracker):
         x0: ArrayLike | None = None,
         P0: ArrayLike | None = None,
         *,
-        mu0: ArrayLike = 80 * NEPER_PER_DB,
-        v0: ArrayLike = (3 * NEPER_PER_DB) ** 2,
-        q_u: float = (0.3 * NEPER_PER_DB) ** 2,
         n_sources: int | None = None,
-        max_sources: int = 8,
-        births: bool = False,
-        confirm: int = 3,
-        area_std: float | None = None,
-        grid_step: float | None = None,
+        amplitude: AmplitudePrior = AmplitudePrior(),
+        births: BirthDeath | bool | None = None,
+        search: GridSearch = GridSearch(),
+        solver: VariationalSolver = VariationalSolver(),
         correlation_time: float | None = None,
-        sweep: Sweep = "gauss-seidel",
-        damping: float | None = None,
-        refresh: Refresh = "point",
-        guard: bool = True,
-        max_cycles: int = 30,
-        tol_u: float = 0.01,
-        tol_theta: float = 0.5,
-        newton_steps: int = 5,
-        covariance: Literal["joint", "factor"] = "joint",
     ) -> None:
-        self.sweep = one_of("sweep", sweep, ("gauss-seidel", "jacobi"))
-        self.damping = damping
-        if damping is not None and not 0 < number("damping", damping) <= 1:
-            raise ValueError(f"damping must lie in (0, 1]; got {damping}")
-        self.refresh = one_of("refresh", refresh, ("point", "literal"))
-        self.guard = bool(guard)
-        self.max_cycles = count("max_cycles", max_cycles)
-        self.tol_u = not_negative("tol_u", tol_u)
-        self.tol_theta = not_negative("tol_theta", tol_theta)
-        self.newton_steps = count("newton_steps", newton_steps)
-        self.covariance = one_of("covariance", covariance, ("joint", "factor"))
+        self.solver = instance("solver", solver, VariationalSolver)
         super().__init__(
-            motion, measurement, x0, P0, mu0=mu0, v0=v0, q_u=q_u, n_sources=n_sources,
-            max_sources=max_sources, births=births, confirm=confirm, area_std=area_std,
-            grid_step=grid_step, correlation_time=correlation_time,
+            motion, measurement, x0, P0, n_sources=n_sources, amplitude=amplitude, births=births,
+            search=search, correlation_time=correlation_time,
         )  # fmt: skip
 
-    def cycling(self, n_sources: int) -> VariationalSettings:
-        """Return how to cycle with that many sources."""
-        damping = self.damping
-        if damping is None:
-            damping = 1.0 if self.sweep == "gauss-seidel" else 0.5 if n_sources < 20 else 0.25
-        return VariationalSettings(
-            self.sweep, damping, self.refresh, self.guard, self.max_cycles, self.tol_u,
-            self.tol_theta, self.newton_steps,
-        )  # fmt: skip
+    def update(self, z: ArrayLike | None) -> None:
+        """Update the belief by one set of readings: Algorithm 1 of the paper.
+
+        Parameters
+        ----------
+        z : array_like, shape (n_sensors,), or None
+            Readings, Np; NaN where a sensor is missing, None if all are.
+        """
+        # ξ and W = 1/r   (2), (3)
+        readings = self.observe(z)
+        if readings is None:
+            self.record_missed()
+            return
+        sources = self.sources.take(None)
+        if self.births or sources.u.size == 0:
+            self.detect_sources(readings)
+            return
+        # L(u, θ)   (7)
+        problem = self.joint_posterior(sources, readings)
+        # q(u_j) = N(μ_j, v_j), q(θ_j) = N(θ_j, Σ_j)   (8)-(14)
+        solution = self.solve(problem, problem.prior.mu, problem.prior.theta)
+        updated, diagnostics = self.update_sources(sources, readings, problem, solution)
+        self.store(updated.take(0), solution, diagnostics)
 
     def solve(self, problem: JointPosterior, u: Float, theta: Float) -> Solution:
-        """Cycle through the factors from a starting point; then the marginals."""
-        solution = solve(problem, u, theta, self.cycling(u.shape[-1]))
-        J, log_likelihood = laplace(problem._replace(prior=solution.prior),
-                                    solution.u, solution.theta)  # fmt: skip
+        """Fit the factors of a batch of problems from starting points; return their moments.
+
+        Parameters
+        ----------
+        problem : JointPosterior
+            With one batch axis.
+        u, theta : ndarray, shape (n_batch, n_sources), (n_batch, n_sources, 2)
+            Starting points.
+
+        Returns
+        -------
+        Solution
+        """
+        q = variational_posterior(problem, u, theta, self.solver)
+        J, log_likelihood = problem._replace(prior=q.prior).laplace(q.u, q.theta)
+        if self.solver.covariance == "joint":
+            moments = marginals(J)
+        else:
+            moments = Marginals(1 / q.w, inverse_2x2(q.P))
         return Solution(
-            solution.u,
-            solution.theta,
-            marginals(J) if self.covariance == "joint" else factored(solution),
-            solution.log_posterior,
-            solution.start,
-            log_likelihood,
-            solution.cycles,
-            solution.converged,
+            q.u, q.theta, moments, q.log_posterior, q.initial, log_likelihood, q.iterations,
+            q.converged,
+        )  # fmt: skip
+
+
+def initial_factors(point: ExpansionPoint) -> VariationalPosterior:
+    """Return the factors before the first iteration, to be filled by rows."""
+    u, theta, n = point.u, point.theta, len(point.u)
+    w, P = np.ones_like(u), np.tile(np.eye(2), (*u.shape, 1, 1))
+    prior = Prior(u.copy(), w.copy(), theta.copy(), P.copy())
+    return VariationalPosterior(
+        u.copy(), w, theta.copy(), P, np.zeros(n), point.log_posterior,
+        np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.bool_), prior,
+    )  # fmt: skip
+
+
+def variational_posterior(
+    problem: JointPosterior, u: Float, theta: Float, solver: VariationalSolver
+) -> VariationalPosterior:
+    """Fit the factors of the posterior: Algorithm 1 of the paper.
+
+    The prior stays fixed, each factor uses the newest means of the others, and a step that
+    decreases the joint posterior is halved, unless `solver` chooses the published form.
+
+    Parameters
+    ----------
+    problem : JointPosterior
+        With one batch axis; each row ends by itself.
+    u, theta : ndarray, shape (n_batch, n_sources), (n_batch, n_sources, 2)
+        Starting point ū, θ̄.
+    solver : VariationalSolver
+
+    Returns
+    -------
+    VariationalPosterior
+
+    Examples
+    --------
+    >>> from arrivals.measurement_models.signal_strength.path_loss import PropagationModel
+    >>> sensors = np.array([[0.0, 0.0], [60.0, 0.0], [0.0, 60.0], [60.0, 60.0]])
+    >>> u, theta = np.array([[9.0]]), np.array([[[20.0, 30.0]]])
+    >>> prior = Prior(u, np.full((1, 1), 8.0), theta + 5.0, np.eye(2)[None, None] / 400)
+    >>> xi = PropagationModel(sensors).levels(u, theta).log_sigma
+    >>> problem = JointPosterior(PropagationModel(sensors), xi, np.full((1, 4), 200.0), prior)
+    >>> q = variational_posterior(problem, u, theta + 5.0, VariationalSolver())
+    >>> q.theta.round(0), bool(q.converged[0])
+    (array([[[20., 30.]]]), True)
+    """
+    sequential, literal = solver.sweep == "gauss-seidel", solver.refresh == "literal"
+    line_search = solver.line_search and not literal
+    damping = step_fraction(solver, u.shape[-1])
+    point = ExpansionPoint.at(problem, u, theta)  # (8), (9)
+    q = initial_factors(point)
+    rows = np.arange(len(u))
+    for iteration in range(1, solver.max_iterations + 1):
+        # q(u_j) = N(μ_j, v_j)   (10), (11)
+        u, w, r = update_amplitudes(problem, point, sequential)
+        # q(θ_j) = N(θ_j, Σ_j)   (12)-(14)
+        theta, P = update_positions(
+            problem, point, r, sequential, solver.newton_steps, 0.02 * solver.tol_theta
         )
+        factors = Prior(damped(point.u, u, damping), w, damped(point.theta, theta, damping), P)
+        before, point = point, take_step(problem, point, factors, line_search)
+        converged = has_converged(before, point, solver)
+        store_rows(q, rows, point, factors, problem.prior, iteration, converged)
+        if literal:  # the posterior is the prior of the next iteration
+            problem = problem._replace(prior=factors)
+        if converged.all():
+            break
+        if converged.any():
+            left = ~converged
+            rows, problem, point = rows[left], problem.take(left), point.take(left)
+    return q
 
 
-def factored(solution: VariationalIterate) -> Marginals:
-    """Return the factors' own variances and covariances."""
-    return Marginals(1 / solution.w, inverse_2x2(solution.P))
+def step_fraction(solver: VariationalSolver, n_sources: int) -> float:
+    """Return the fraction of an iteration's step to take.
+
+    Examples
+    --------
+    >>> step_fraction(VariationalSolver(sweep="jacobi"), n_sources=20)
+    0.25
+    """
+    if solver.damping is not None:
+        return solver.damping
+    return 1.0 if solver.sweep == "gauss-seidel" else 0.5 if n_sources < 20 else 0.25
+
+
+def damped(before: Float, after: Float, damping: float) -> Float:
+    """Return the point at the fraction `damping` of a step."""
+    return after if damping == 1 else before + damping * (after - before)
+
+
+def take_step(
+    problem: JointPosterior, point: ExpansionPoint, factors: Prior, line_search: bool
+) -> ExpansionPoint:
+    """Return the point at the factors' means; a step that decreases L is halved."""
+    s = np.ones(len(point.u))
+    du, dtheta = factors.mu - point.u, factors.theta - point.theta
+    while True:
+        u, theta = point.u + s[:, None] * du, point.theta + s[:, None, None] * dtheta
+        moved = ExpansionPoint.at(problem, u, theta)
+        L = point.log_posterior
+        lower = (L - ROUNDING * np.abs(L) > moved.log_posterior) & (s > MIN_STEP_FRACTION)
+        if not line_search or not lower.any():
+            return moved
+        s = np.where(lower, s / 2, s)
+
+
+def has_converged(before: ExpansionPoint, after: ExpansionPoint, solver: VariationalSolver) -> Bool:
+    """Return True where a step is shorter than the tolerances, or not finite."""
+    du = np.abs(after.u - before.u).max(axis=-1, initial=0.0)
+    dtheta = np.abs(after.theta - before.theta).max(axis=(-2, -1), initial=0.0)
+    short = (du < solver.tol_u) & (dtheta < solver.tol_theta)
+    return np.asarray(short | ~np.isfinite(du + dtheta))
+
+
+def store_rows(
+    q: VariationalPosterior,
+    rows: Int,
+    point: ExpansionPoint,
+    factors: Prior,
+    prior: Prior,
+    iteration: int,
+    converged: Bool,
+) -> None:
+    """Store the factors of some rows of the batch after an iteration."""
+    q.u[rows], q.theta[rows], q.log_posterior[rows] = point.u, point.theta, point.log_posterior
+    q.w[rows], q.P[rows] = factors.w, factors.P
+    q.iterations[rows] = iteration
+    q.converged[rows] = converged & np.isfinite(point.log_posterior)
+    for stored, part in zip(q.prior, prior, strict=True):
+        stored[rows] = part

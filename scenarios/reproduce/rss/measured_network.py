@@ -1,4 +1,4 @@
-"""What the trackers make of a measured network whose transmitters' true positions are known."""
+"""Localization and tracking in a measured network with known transmitter positions."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from arrivals.measurement_models import LogNormalRSS
 from arrivals.motion_models import ConstantVelocity
 from arrivals.recordings.network_calibration import Calibration
 from arrivals.recordings.networks import Network
-from arrivals.trackers import RSSVB
+from arrivals.trackers import RSSVB, AmplitudePrior, VariationalSolver
 from arrivals.trackers.rss.inference.joint_posterior import JointPosterior, Prior
-from arrivals.trackers.rss.inference.map_search import maximum
-from arrivals.trackers.rss.inference.variational import VariationalSettings, solve
+from arrivals.trackers.rss.inference.map_search import maximize
+from arrivals.trackers.rss.rss_vb import variational_posterior
 from arrivals.typing import Float
 
-FLOOR_DB = -97.0  # on which quiet sensors of the shared data sit
-GAP = 120.0  # s, after which a track begins anew
-POWER_STD = 3 * np.log(10) / 20  # Np
+FLOOR_DB = -97.0  # noise floor of the shared data
+MAX_GAP = 120.0  # s; after a longer gap a new track begins
+POWER_STD = 3 * np.log(10) / 20  # of the transmitter, Np
 
 
 class FramedReadings(NamedTuple):
@@ -34,46 +34,46 @@ class FramedReadings(NamedTuple):
 def steps_of(
     network: Network, calibration: Calibration, position: tuple[int, int] = (0, 2)
 ) -> Iterator[FramedReadings]:
-    """Give the steps of a network as a tracker sees them."""
+    """Yield the steps of a network with the model of their readings."""
     model = calibration.model(
         np.zeros((len(network.name), 2)), floor_db=FLOOR_DB, position=position
     )
     for step in range(len(network)):
-        yield FramedReadings(step, *network.heard(step, model), float(network.time[step]))
+        yield FramedReadings(step, *network.readings_at(step, model), float(network.time[step]))
 
 
-def strongest(seen: FramedReadings) -> Float:
-    """Return the place of the sensor that hears most, its offset taken off, (2,)."""
-    level = np.where(np.isnan(seen.z), -np.inf, seen.z - seen.model.offsets)
-    return np.asarray(seen.model.sensors[level.argmax()])
+def strongest(readings: FramedReadings) -> Float:
+    """Return the position of the sensor with the largest level without its offset, (2,)."""
+    level = np.where(np.isnan(readings.z), -np.inf, readings.z - readings.model.offsets)
+    return np.asarray(readings.model.sensors[level.argmax()])
 
 
-def centre(seen: FramedReadings) -> Float:
-    """Return the middle of the sensors that are heard, (2,)."""
-    return np.asarray(seen.model.sensors[~np.isnan(seen.z)].mean(axis=0))
+def centre(readings: FramedReadings) -> Float:
+    """Return the mean position of the sensors with a reading, (2,)."""
+    return np.asarray(readings.model.sensors[~np.isnan(readings.z)].mean(axis=0))
 
 
 def snapshot(
-    seen: FramedReadings, calibration: Calibration, theta: Float, method: str = "vb"
+    readings: FramedReadings, calibration: Calibration, theta: Float, method: str = "vb"
 ) -> Float:
-    """Locate transmitters from one step's readings alone.
+    """Locate transmitters by the readings of one step.
 
     Parameters
     ----------
-    seen : Seen
+    readings : FramedReadings
     calibration : Calibration
-        Tells their power.
+        Its log amplitude is the prior mean.
     theta : ndarray, shape (n_sources, 2)
-        Where the search starts, m.
+        Starting point, m.
     method : {"vb", "lm"}
 
     Returns
     -------
     ndarray, shape (n_sources, 2)
-        Positions, m. The prior is that of anywhere among the sensors.
+        Positions, m. The prior covers the area of the sensors.
     """
-    heard = ~np.isnan(seen.z)
-    sensors = seen.model.sensors[heard]
+    valid = ~np.isnan(readings.z)
+    sensors = readings.model.sensors[valid]
     K = len(theta)
     spread = float(np.sqrt(np.square(sensors - sensors.mean(axis=0)).mean()))
     prior = Prior(
@@ -82,16 +82,17 @@ def snapshot(
         np.tile(sensors.mean(axis=0), (K, 1)),
         np.tile(np.eye(2) / spread**2, (K, 1, 1)),
     )
-    xi = np.where(heard, seen.model.readings(seen.z), 0.0)
-    problem = JointPosterior(seen.model.field, xi, heard / seen.model.variance, prior)
+    model = readings.model
+    xi = np.where(valid, model.readings(readings.z), 0.0)
+    problem = JointPosterior(model.propagation, xi, valid / model.variance, prior)
     if method == "lm":
-        return maximum(problem, prior.mu, theta).theta
-    batch = problem._replace(xi=xi[None], W=problem.W[None], prior=prior.take(None))
-    how = VariationalSettings(max_cycles=60, tol_theta=1.0)
-    return np.asarray(solve(batch, prior.mu[None], theta[None], how).theta[0])
+        return maximize(problem, prior.mu, theta).theta
+    solver = VariationalSolver(max_iterations=60, tol_theta=1.0)
+    q = variational_posterior(problem.take(None), prior.mu[None], theta[None], solver)
+    return np.asarray(q.theta[0])
 
 
-class Tracked(NamedTuple):
+class TrackErrors(NamedTuple):
     """Errors over time: distances, m, and normalised squared errors of two degrees of freedom."""
 
     error: Float
@@ -100,53 +101,52 @@ class Tracked(NamedTuple):
 
 def track_transmitter(
     network: Network, calibration: Calibration, *, q: float = 0.5, tau: float = 120.0, **params: Any
-) -> Tracked:
+) -> TrackErrors:
     """Track one transmitter through a network with `rss_vb`.
 
     Parameters
     ----------
     network : Network
-        With its true positions.
+        With the true positions of the transmitter.
     calibration : Calibration
     q : float
-        Of `ConstantVelocity`, m²/s³.
+        Acceleration noise of `ConstantVelocity`, m²/s³.
     tau : float
         Correlation time of the shadowing, s.
     **params
-        Others of `RSSVB`.
+        Other parameters of `RSSVB`.
     """
     error, nees = [], []
     tracker, before = None, -np.inf
-    for seen in steps_of(network, calibration):
-        dt = seen.time - before
-        before = seen.time
-        if tracker is None or dt > GAP:
-            tracker = _started(seen, calibration, q, tau, params)
+    for readings in steps_of(network, calibration):
+        dt = readings.time - before
+        before = readings.time
+        if tracker is None or dt > MAX_GAP:
+            tracker = _initial_tracker(readings, calibration, q, tau, params)
         else:
-            tracker.measurement = seen.model
+            tracker.measurement = readings.model
             tracker.predict(dt=dt)
-        tracker.update(seen.z)
+        tracker.update(readings.z)
         if network.truth is None:
             continue
         estimate = tracker.estimate
-        miss = estimate.position[0] - network.truth[seen.step, 0]
+        miss = estimate.position[0] - network.truth[readings.step, 0]
         error.append(float(np.hypot(*miss)))
         nees.append(float(miss @ np.linalg.solve(estimate.covariance[0], miss)))
-    return Tracked(np.array(error), np.array(nees))
+    return TrackErrors(np.array(error), np.array(nees))
 
 
-def _started(
-    seen: FramedReadings, calibration: Calibration, q: float, tau: float, params: dict[str, Any]
+def _initial_tracker(
+    readings: FramedReadings, calibration: Calibration, q: float, tau: float, params: dict[str, Any]
 ) -> RSSVB:
     """Return a tracker that starts near the strongest sensor, at rest."""
-    x, y = strongest(seen) + seen.model.r_min
+    x, y = strongest(readings) + readings.model.r_min
     return RSSVB(
         ConstantVelocity(q),
-        seen.model,
+        readings.model,
         [[x, 0.0, y, 0.0]],
         np.diag([300.0, 3.0, 300.0, 3.0]) ** 2,
-        mu0=calibration.log_amplitude,
-        v0=POWER_STD**2,
+        amplitude=AmplitudePrior(mean=calibration.log_amplitude, variance=POWER_STD**2),
         correlation_time=tau,
         **params,
     )

@@ -1,4 +1,4 @@
-"""Table 1 and Fig. 4 of the paper on signal strength, and what becomes of its claims.
+"""Table 1 and Fig. 4 of the paper on signal strength, and its claims.
 
 The paper gives neither its target positions nor its number of snapshots and its noise: the
 scenarios of `rss` are our reading.
@@ -16,17 +16,17 @@ from arrivals.measurement_models import db_to_neper, neper_to_db
 from arrivals.scenarios.metrics.position_errors import Scores, assign, scores
 from arrivals.scenarios.reproduce.claims import verdict
 from arrivals.scenarios.reproduce.rss.trials import (
-    CYCLING,
-    Answers,
+    SOLVERS,
     Draws,
-    answers,
+    TrialEstimates,
     draws,
-    one_of_batch,
+    estimates,
 )
 from arrivals.scenarios.reproduce.studies import Report
 from arrivals.scenarios.simulations.signal_strength import FixedSources, Table1K3, Table1K7
-from arrivals.trackers.rss.inference.map_search import maximum
-from arrivals.trackers.rss.inference.variational import VariationalSettings, solve
+from arrivals.trackers.rss.inference.map_search import maximize
+from arrivals.trackers.rss.rss_vb import variational_posterior
+from arrivals.trackers.rss.settings import MAPSolver, VariationalSolver
 from arrivals.typing import Float
 
 if TYPE_CHECKING:
@@ -60,15 +60,15 @@ NAMES = {
 
 def table1(runs: int, seed: int) -> Report:
     """Table 1 for every method, Fig. 4 (a) to (h), and the claims."""
-    found: dict[tuple[str, str], Answers] = {}
+    found: dict[tuple[str, str], TrialEstimates] = {}
     results: dict[tuple[str, str], Scores] = {}
     rows: list[tuple[Any, ...]] = []
     trials = {case: draws(scenario, runs, seed) for case, scenario in CASES.items()}
     for case, drawn in trials.items():
         for method in METHODS:
             if method == "started" and "prior" not in case:
-                continue  # the trial's start is not used: the same again
-            got = found[case, method] = answers(drawn, method)
+                continue  # the start of the trial is not used: the same as from the prior
+            got = found[case, method] = estimates(drawn, method)
             ours = results[case, method] = scores(got.theta, drawn.theta, got.u, drawn.u)
             strict = scores(got.theta, drawn.theta, got.u, drawn.u, "one-to-one")
             paper = PAPER.get((case, method), (np.nan,) * 4)
@@ -97,7 +97,7 @@ def table1(runs: int, seed: int) -> Report:
 
 
 def claims(results: dict[tuple[str, str], Scores], trials: dict[str, Draws]) -> list[str]:
-    """Say of each of the paper's claims whether these trials bear it out."""
+    """Return for each claim of the paper whether these trials support it."""
     early = {case: _early(trials[case]) for case in ("K=3 prior", "K=7 prior")}
     shares = "; ".join(
         f"{case}: {share:.0%} of trials are then within 1 m and 0.5 dB of where 60 cycles end"
@@ -153,18 +153,21 @@ def _problem(K: int) -> Draws:
 
 
 def _cycle_ms(K: int) -> float:
-    """Return the processor time of one VB cycle of K sources, ms."""
-    problem = _problem(K).problem
-    how = VariationalSettings(max_cycles=4, tol_u=0.0, tol_theta=1e-6)
-    return _least_ms(lambda: solve(problem, problem.prior.mu, problem.prior.theta, how)) / 4
+    """Return the processor time of one VB iteration of K sources, ms."""
+    problem, solver = (
+        _problem(K).problem,
+        VariationalSolver(max_iterations=4, tol_u=0.0, tol_theta=1e-6),
+    )
+    start = problem.prior.mu, problem.prior.theta
+    return _least_ms(lambda: variational_posterior(problem, *start, solver)) / 4
 
 
 def _search_ms(K: int) -> float:
     """Return the processor time of one iteration of Levenberg and Marquardt, ms."""
-    problem = one_of_batch(_problem(K).problem, 0)
+    problem, solver = _problem(K).problem.take(0), MAPSolver(tolerance=1e-3)
     mu, theta = problem.prior.mu, problem.prior.theta
-    n = maximum(problem, mu, theta, tolerance=1e-3).iterations
-    return _least_ms(lambda: maximum(problem, mu, theta, tolerance=1e-3)) / n
+    n = maximize(problem, mu, theta, solver).iterations
+    return _least_ms(lambda: maximize(problem, mu, theta, solver)) / n
 
 
 def _least_ms(work: Any) -> float:
@@ -177,27 +180,29 @@ def _least_ms(work: Any) -> float:
 
 
 def _early(trials: Draws) -> float:
-    """Return the share of trials whose 10 cycles lead to where 60 do."""
-    how = VariationalSettings(tol_u=0.0, tol_theta=1e-6)
+    """Return the fraction of trials in which 10 and 60 iterations end at the same point."""
     problem = trials.problem
     few, many = (
-        solve(problem, problem.prior.mu, problem.prior.theta, replace(how, max_cycles=n))
+        variational_posterior(
+            problem, problem.prior.mu, problem.prior.theta,
+            VariationalSolver(max_iterations=n, tol_u=0.0, tol_theta=1e-6),
+        )
         for n in (10, 60)
-    )
+    )  # fmt: skip
     there = np.linalg.norm(few.theta - many.theta, axis=-1).max(axis=1) < 1.0
     level = np.abs(few.u - many.u).max(axis=1) < float(db_to_neper(0.5))
     return float(np.mean(there & level))
 
 
 def _jumped(trials: Draws, method: str) -> float:
-    """Return the share of trials in which a source jumps by more than 100 m in one cycle."""
-    how = replace(CYCLING[method], max_cycles=1)
+    """Return the fraction of trials in which an iteration moves a source by more than 100 m."""
+    solver = SOLVERS[method].replace(max_iterations=1)
     problem = trials.problem
     u, theta = problem.prior.mu, problem.prior.theta
     farthest = np.zeros(len(u))
     for _ in range(15):
         with np.errstate(over="ignore", invalid="ignore"):
-            after = solve(problem, u, theta, how)
+            after = variational_posterior(problem, u, theta, solver)
             step = np.linalg.norm(after.theta - theta, axis=-1).max(axis=1)
         farthest = np.fmax(farthest, np.where(np.isfinite(step), step, np.inf))
         u, theta = after.u, after.theta
@@ -207,7 +212,7 @@ def _jumped(trials: Draws, method: str) -> float:
 # -- Fig. 4 --------------------------------------------------------------------------------------
 
 
-def _figure4(trials: dict[str, Draws], found: dict[tuple[str, str], Answers]) -> Figure:
+def _figure4(trials: dict[str, Draws], found: dict[tuple[str, str], TrialEstimates]) -> Figure:
     """Draw starts, estimates of VB and ML, and power histograms, for 3 and for 7 sources."""
     from matplotlib.figure import Figure
 
@@ -242,7 +247,7 @@ def _draw_places(ax: Axes, places: Float, truth: Float, disc: float, title: str)
     ax.set_aspect("equal")
 
 
-def _draw_powers(ax: Axes, drawn: Draws, vb: Answers, ml: Answers) -> None:
+def _draw_powers(ax: Axes, drawn: Draws, vb: TrialEstimates, ml: TrialEstimates) -> None:
     """Draw histograms of the powers; estimates beyond 30 dB from the mean are left out."""
     mean = float(neper_to_db(drawn.problem.prior.mu[0, 0]))
     edges = np.linspace(mean - 15, mean + 15, 41)
@@ -256,7 +261,7 @@ def _draw_powers(ax: Axes, drawn: Draws, vb: Answers, ml: Answers) -> None:
     ax.legend(fontsize=8)
 
 
-def _of_truths(found: Answers, drawn: Draws) -> Float:
-    """Return the log amplitudes found for each true source."""
+def _of_truths(found: TrialEstimates, drawn: Draws) -> Float:
+    """Return the estimated log amplitude of each true source."""
     which = np.array([assign(t, s) for t, s in zip(found.theta, drawn.theta, strict=True)])
     return np.take_along_axis(found.u, which, axis=1)

@@ -1,4 +1,4 @@
-"""Many trials of sources at rest, and what each method makes of them."""
+"""Batches of trials of sources at rest, and their estimates by each method."""
 
 from __future__ import annotations
 
@@ -14,31 +14,33 @@ from arrivals.measurement_models.signal_strength.path_loss import PropagationMod
 from arrivals.scenarios.simulations.signal_strength import FixedSources, in_disc
 from arrivals.trackers.rss.inference.joint_posterior import (
     JointPosterior,
-    Marginals,
     Prior,
+    VariationalPosterior,
     marginals,
 )
-from arrivals.trackers.rss.inference.map_search import Method, maximum
-from arrivals.trackers.rss.inference.variational import (
-    VariationalIterate,
-    VariationalSettings,
-    solve,
-)
+from arrivals.trackers.rss.inference.map_search import maximize
+from arrivals.trackers.rss.inference.solution import Marginals
 from arrivals.trackers.rss.model_order.grid_search import NewSourcePrior
-from arrivals.trackers.rss.model_order.model_selection import grown, refined
+from arrivals.trackers.rss.model_order.model_selection import (
+    forward_selection,
+    local_search,
+    no_source,
+)
+from arrivals.trackers.rss.rss_vb import variational_posterior
+from arrivals.trackers.rss.settings import MAPSolver, Method, VariationalSolver
 from arrivals.typing import Float
 from arrivals.validation import one_of
 
 
 class Draws(NamedTuple):
-    """Trials with sensors, powers and starts of their own: one problem with a batch axis.
+    """Trials with their own sensors, powers and starting points: one problem with a batch axis.
 
     Parameters
     ----------
-    problem : Problem
-        Its prior's mean is where searches start.
+    problem : JointPosterior
+        Its prior mean is the starting point.
     u, theta : ndarray, shape (n_runs, n_sources), (n_runs, n_sources, 2)
-        The truth.
+        True log amplitudes, Np, and positions, m.
     """
 
     problem: JointPosterior
@@ -46,21 +48,23 @@ class Draws(NamedTuple):
     theta: Float
 
 
-class Answers(NamedTuple):
-    """What a method found, and the processor time it took, s a trial.
+class TrialEstimates(NamedTuple):
+    """Estimates of a batch of trials, and their processor time.
 
     Parameters
     ----------
     u, theta : ndarray, shape (n_runs, n_sources), (n_runs, n_sources, 2)
+        Log amplitudes, Np, and positions, m.
     seconds : float
-    solution : Solution or None
-        More of it, from the variational methods.
+        Processor time of a trial, s.
+    posterior : VariationalPosterior or None
+        Of the variational methods.
     """
 
     u: Float
     theta: Float
     seconds: float
-    solution: VariationalIterate | None = None
+    posterior: VariationalPosterior | None = None
 
 
 def draws(scenario: FixedSources, runs: int, seed: int) -> Draws:
@@ -78,88 +82,88 @@ def draws(scenario: FixedSources, runs: int, seed: int) -> Draws:
     u = scenario.mu0 + np.sqrt(scenario.v0) * rng.standard_normal((runs, K))
     theta = np.tile(scenario.positions(rng)[0], (runs, 1, 1))
     model = scenario.measurement(sensors[0])
-    field: PropagationModel = model.field._replace(sensors=sensors)
+    propagation: PropagationModel = model.propagation._replace(sensors=sensors)
     noise = sample_log_envelope(scenario.n_snapshots, (runs, M), rng)
-    xi = field.levels(u, theta).log_sigma + noise
+    xi = propagation.levels(u, theta).log_sigma + noise
     prior = Prior(
         np.full((runs, K), scenario.mu0),
         np.full((runs, K), 1 / scenario.v0),
         scenario.starts(theta, rng),
         np.tile(np.eye(2) / scenario.prior_std**2, (runs, K, 1, 1)),
     )
-    return Draws(JointPosterior(field, xi, np.tile(1 / model.variance, (runs, 1)), prior), u, theta)
+    W = np.tile(1 / model.variance, (runs, 1))
+    return Draws(JointPosterior(propagation, xi, W, prior), u, theta)
 
 
-def one_of_batch(problem: JointPosterior, b: int) -> JointPosterior:
-    """Return one of a batch of problems, without a batch axis."""
-    return JointPosterior(problem.field.take(b), problem.xi[b], problem.W[b], problem.prior.take(b))
-
-
-CYCLING: dict[str, VariationalSettings] = {
-    "vb_literal": VariationalSettings(sweep="jacobi", refresh="literal", tol_u=0.0, tol_theta=1e-6),
-    "vb_jacobi": VariationalSettings(
-        sweep="jacobi", damping=0.5, guard=False, tol_u=0.0, tol_theta=1e-6
+SOLVERS: dict[str, VariationalSolver] = {
+    "vb_literal": VariationalSolver(
+        sweep="jacobi", damping=1.0, refresh="literal", tol_u=0.0, tol_theta=1e-6
     ),
-    "vb_undamped": VariationalSettings(sweep="jacobi", guard=False, tol_u=0.0, tol_theta=1e-6),
-    "vb": VariationalSettings(),
+    "vb_jacobi": VariationalSolver(
+        sweep="jacobi", damping=0.5, line_search=False, tol_u=0.0, tol_theta=1e-6
+    ),
+    "vb_undamped": VariationalSolver(
+        sweep="jacobi", damping=1.0, line_search=False, tol_u=0.0, tol_theta=1e-6
+    ),
+    "vb": VariationalSolver(),
 }
 
 
-def answers(trials: Draws, method: str, cycles: int | None = None) -> Answers:
-    """Return what a method finds in every trial.
+def estimates(trials: Draws, method: str, max_iterations: int | None = None) -> TrialEstimates:
+    """Estimate amplitudes and positions of every trial by one method.
 
     Parameters
     ----------
     trials : Draws
     method : str
-        "vb", as `RSSVB` has it; "vb_literal", Algorithm 1; "vb_jacobi", damped by a half;
-        "vb_undamped"; "lm", "bfgs", the joint maximum; "started", data-driven start, then the
-        maximum without the trial's location prior.
-    cycles : int, optional
-        In place of the variational methods' 30.
+        "vb", as in `RSSVB`; "vb_literal", Algorithm 1; "vb_jacobi", with half of each step;
+        "vb_undamped"; "lm", "bfgs", the joint maximum; "started", a data-driven start, then the
+        maximum without the location prior of the trial.
+    max_iterations : int, optional
+        In place of the 30 of the variational methods.
     """
     one_of("method", method, tuple(METHODS))
     started = time.process_time()
-    found = METHODS[method](trials.problem, cycles)
-    return found._replace(seconds=(time.process_time() - started) / len(trials.u))
+    result = METHODS[method](trials.problem, max_iterations)
+    return result._replace(seconds=(time.process_time() - started) / len(trials.u))
 
 
-def _cycled(name: str, problem: JointPosterior, cycles: int | None) -> Answers:
-    how = CYCLING[name]
-    if cycles is not None:
-        how = VariationalSettings(**vars(how) | {"max_cycles": cycles})
-    found = solve(problem, problem.prior.mu, problem.prior.theta, how)
-    return Answers(found.u, found.theta, 0.0, found)
+def _variational(name: str, problem: JointPosterior, max_iterations: int | None) -> TrialEstimates:
+    solver = SOLVERS[name]
+    if max_iterations is not None:
+        solver = solver.replace(max_iterations=max_iterations)
+    q = variational_posterior(problem, problem.prior.mu, problem.prior.theta, solver)
+    return TrialEstimates(q.u, q.theta, 0.0, q)
 
 
-def _searched(name: Method, problem: JointPosterior, cycles: int | None) -> Answers:
+def _maxima(name: Method, problem: JointPosterior, max_iterations: int | None) -> TrialEstimates:
     each = []
     for b in range(len(problem.xi)):
-        one = one_of_batch(problem, b)
-        each.append(maximum(one, one.prior.mu, one.prior.theta, name))
-    return Answers(np.array([m.u for m in each]), np.array([m.theta for m in each]), 0.0)
+        one = problem.take(b)
+        each.append(maximize(one, one.prior.mu, one.prior.theta, MAPSolver(method=name)))
+    return TrialEstimates(np.array([m.u for m in each]), np.array([m.theta for m in each]), 0.0)
 
 
-def _started(problem: JointPosterior, cycles: int | None) -> Answers:
+def _detected(problem: JointPosterior, max_iterations: int | None) -> TrialEstimates:
     each = []
     for b in range(len(problem.xi)):
-        one = one_of_batch(problem, b)
-        mu, w = float(one.prior.mu[0]), float(one.prior.w[0])
-        new = NewSourcePrior.among(one.field.sensors, mu, 1 / w)
-        K = len(one.prior.mu)
-        each.append(refined(grown(one.field, one.xi, one.W, new, K)[K], new))
-    return Answers(np.array([fit.u for fit in each]), np.array([fit.theta for fit in each]), 0.0)
+        one = problem.take(b)
+        mu, w, K = float(one.prior.mu[0]), float(one.prior.w[0]), len(one.prior.mu)
+        new = NewSourcePrior.among(one.propagation.sensors, mu, 1 / w)
+        candidates = forward_selection(no_source(one.propagation, one.xi, one.W), new, K)
+        each.append(local_search(candidates[K], new, same_number=True))
+    return TrialEstimates(np.array([c.u for c in each]), np.array([c.theta for c in each]), 0.0)
 
 
-METHODS: dict[str, Callable[[JointPosterior, int | None], Answers]] = {
-    **{name: partial(_cycled, name) for name in CYCLING},
-    "lm": partial(_searched, "lm"),
-    "bfgs": partial(_searched, "bfgs"),
-    "started": _started,
+METHODS: dict[str, Callable[[JointPosterior, int | None], TrialEstimates]] = {
+    **{name: partial(_variational, name) for name in SOLVERS},
+    "lm": partial(_maxima, "lm"),
+    "bfgs": partial(_maxima, "bfgs"),
+    "started": _detected,
 }
 
 
 def bounds(trials: Draws) -> Marginals:
     """Return the Cramér-Rao bounds of every trial, at the truth."""
-    found = trials.problem.field.levels(trials.u, trials.theta)
-    return marginals(trials.problem.information(found, with_prior=False))
+    levels = trials.problem.propagation.levels(trials.u, trials.theta)
+    return marginals(trials.problem.information(levels, with_prior=False))

@@ -1,4 +1,4 @@
-"""Exponent, offsets and shadowing of a measured network, from one transmitter at known places."""
+"""Loss exponent, offsets and shadowing of a measured network, by a transmitter of known path."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from arrivals.recordings.networks import Network
 from arrivals.typing import Float, Int
 from arrivals.validation import positive
 
-ROUNDS = 3  # of scale and fit
+N_ITERATIONS = 3  # of scale and fit
 
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """What a network's readings of a known transmitter tell of path and sensors.
+    """Propagation and sensor offsets, estimated from readings of a known transmitter.
 
     Parameters
     ----------
@@ -25,7 +25,7 @@ class Calibration:
     log_amplitude : float
         u of the transmitter, Np.
     offsets : ndarray, shape (n_sensors,)
-        Log gains, Np, shrunk to 0 where readings are few; 0 where there are none.
+        Log gains, Np, shrunk to 0 for few readings; 0 without readings.
     sigma : float
         Shadowing: standard deviation of the readings, Np.
     n_readings : ndarray of int, shape (n_sensors,)
@@ -46,16 +46,15 @@ class Calibration:
     def model(
         self, sensors: Float, *, floor_db: float | None = None, position: tuple[int, int] = (0, 2)
     ) -> LogNormalRSS:
-        """Return the model of readings at places (n_sensors, 2), m.
+        """Return the model of readings at sensor positions (n_sensors, 2), m.
 
-        Readings of sensors that were never calibrated have the variance of an unknown offset
-        added.
+        The readings of uncalibrated sensors have the variance of an unknown offset added.
 
         Parameters
         ----------
         sensors : ndarray, shape (n_sensors, 2)
         floor_db : float, optional
-            Level on which quiet sensors sit, dB, whatever their offset.
+            Noise floor of all sensors, dB, offsets included.
         position : tuple of two int
             As in `LogNormalRSS`.
         """
@@ -82,7 +81,7 @@ def calibrate(
 ) -> Calibration:
     """Fit exponent, offsets and shadowing by a robust regression on the log distance.
 
-    ξ = u + offset - ½α log R, Huber's loss by scipy, the offsets held by a ridge.
+    ξ = u + offset - ½α log R, Huber's loss by scipy, with a ridge penalty on the offsets.
 
     Parameters
     ----------
@@ -91,40 +90,40 @@ def calibrate(
     r_min : float
         Floor of the range, m.
     offset_std_db : float
-        Standard deviation that offsets are expected to have, dB: the ridge.
+        Prior standard deviation of an offset, dB: the ridge.
     floor_db : float, optional
-        Readings within one deviation of this level, dB, are left out: noise, not signal.
+        Noise floor, dB; readings below it plus 3 dB are excluded.
 
     Raises
     ------
     ValueError
-        If the network has not the truth of one source, or too few readings.
+        If the network lacks the true positions of one source, or has too few readings.
 
     Examples
     --------
     >>> from arrivals.measurement_models import neper_to_db
     >>> rng = np.random.default_rng(0)
-    >>> places, truth = rng.uniform(-500, 500, (8, 2)), rng.uniform(-500, 500, (200, 1, 2))
-    >>> far = np.hypot(*np.moveaxis(truth - places, -1, 0))
+    >>> sensors, truth = rng.uniform(-500, 500, (8, 2)), rng.uniform(-500, 500, (200, 1, 2))
+    >>> far = np.hypot(*np.moveaxis(truth - sensors, -1, 0))
     >>> rss_db = -20 - 30 * np.log10(far) + 5 * rng.standard_normal(far.shape)
-    >>> known = Network(tuple("abcdefgh"), np.arange(200.0), rss_db,
-    ...                 np.broadcast_to(places, (200, 8, 2)), truth)
-    >>> found = calibrate(known)
-    >>> round(found.alpha, 1), float(neper_to_db(found.sigma).round(1))
+    >>> network = Network(tuple("abcdefgh"), np.arange(200.0), rss_db,
+    ...                 np.broadcast_to(sensors, (200, 8, 2)), truth)
+    >>> fitted = calibrate(network)
+    >>> round(fitted.alpha, 1), float(neper_to_db(fitted.sigma).round(1))
     (3.0, 5.0)
     """
     if network.truth is None or network.truth.shape[1] != 1:
-        raise ValueError("calibration wants the true positions of one transmitter")
+        raise ValueError("network must have the true positions of one transmitter")
     ridge = float(db_to_neper(positive("offset_std_db", offset_std_db)))
     far = np.linalg.norm(network.truth - network.sensors, axis=-1)
     log_range = np.log(np.maximum(far, positive("r_min", r_min)))
-    heard = np.isfinite(network.rss_db) & np.isfinite(log_range)
+    valid = np.isfinite(network.rss_db) & np.isfinite(log_range)
     if floor_db is not None:
-        heard &= network.rss_db > floor_db + 3.0
-    sensor = np.nonzero(heard)[1]
+        valid &= network.rss_db > floor_db + 3.0
+    sensor = np.nonzero(valid)[1]
     if len(sensor) < 10:
-        raise ValueError(f"calibration wants ten readings at least; got {len(sensor)}")
-    xi, log_range = network.readings[heard], log_range[heard]
+        raise ValueError(f"network must have at least 10 readings; got {len(sensor)}")
+    xi, log_range = network.readings[valid], log_range[valid]
     x, sigma = _regression(xi, log_range, sensor, len(network.name), ridge)
     n_readings = np.bincount(sensor, minlength=len(network.name))
     return Calibration(float(x[1]), float(x[0]), x[2:], sigma, n_readings, r_min, ridge)
@@ -133,7 +132,7 @@ def calibrate(
 def _regression(
     xi: Float, log_range: Float, sensor: Int, n_sensors: int, ridge: float
 ) -> tuple[Float, float]:
-    """Return u, α and the offsets, and the deviation of what is left."""
+    """Return u, α and the offsets, and the standard deviation of the residuals."""
     from scipy.optimize import least_squares
     from scipy.sparse import coo_matrix, vstack
 
@@ -143,16 +142,16 @@ def _regression(
     values = np.concatenate([np.ones(n), -0.5 * log_range, np.ones(n)])
     A = coo_matrix((values, (rows, columns)), shape=(n, 2 + n_sensors)).tocsr()
     each = np.arange(n_sensors)
-    hold = coo_matrix((np.ones(n_sensors), (each, 2 + each)), shape=(n_sensors, 2 + n_sensors))
+    penalty = coo_matrix((np.ones(n_sensors), (each, 2 + each)), shape=(n_sensors, 2 + n_sensors))
     x, sigma = np.zeros(2 + n_sensors), 1.0
     x[1] = 2.0
-    for _ in range(ROUNDS):
-        B = vstack([A / sigma, hold / ridge]).tocsr()
+    for _ in range(N_ITERATIONS):
+        B = vstack([A / sigma, penalty / ridge]).tocsr()
         y = np.concatenate([xi / sigma, np.zeros(n_sensors)])
         x = least_squares(
             lambda x, B=B, y=y: B @ x - y, x, lambda x, B=B: B, loss="huber",
             f_scale=1.345, tr_solver="lsmr",
         ).x  # fmt: skip
-        left = xi - A @ x
-        sigma = float(np.median(np.abs(left - np.median(left)))) / 0.6745
-    return x, float(np.std(left))
+        residual = xi - A @ x
+        sigma = float(np.median(np.abs(residual - np.median(residual)))) / 0.6745
+    return x, float(np.std(residual))

@@ -1,4 +1,4 @@
-"""Measured networks: a table of sensors, and their readings over time, from CSV or npz."""
+"""Measured sensor networks: positions and readings over time, from CSV or npz."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ class Network:
     Parameters
     ----------
     name : tuple of str
-        Of the sensors.
+        Names of the sensors.
     time : ndarray, shape (n_steps,)
-        s.
+        Times of the steps, s.
     rss_db : ndarray, shape (n_steps, n_sensors)
         Levels, dB or dBm; NaN where missing.
     sensors : ndarray, shape (n_steps, n_sensors, 2)
@@ -38,8 +38,8 @@ class Network:
 
     Examples
     --------
-    >>> places = np.array([[0.0, 0.0], [50.0, 0.0]])
-    >>> network = Network.fixed(["a", "b"], places, [[-60.0, -72.0], [-61.0, np.nan]])
+    >>> sensors = np.array([[0.0, 0.0], [50.0, 0.0]])
+    >>> network = Network.fixed(["a", "b"], sensors, [[-60.0, -72.0], [-61.0, np.nan]])
     >>> network.readings.round(2)
     array([[-6.91, -8.29],
            [-7.02,   nan]])
@@ -54,7 +54,7 @@ class Network:
     def __post_init__(self) -> None:
         repeated = sorted({name for name in self.name if self.name.count(name) > 1})
         if repeated:
-            raise ValueError(f"the sensor {repeated[0]!r} is listed twice")
+            raise ValueError(f"name must have no duplicates; got {repeated[0]!r} twice")
         shape = (len(self.time), len(self.name))
         for name, wanted in (("rss_db", shape), ("sensors", (*shape, 2))):
             got = getattr(self, name).shape
@@ -62,24 +62,26 @@ class Network:
                 raise ValueError(
                     f"{name} must have shape {wanted}; got {getattr(self, name).shape}"
                 )
-        heard = np.isfinite(self.rss_db)
-        if not heard.any():
-            raise ValueError("all readings are missing")
-        lost = heard & ~np.isfinite(self.sensors).all(axis=-1)
-        if lost.any():
-            step, sensor = np.argwhere(lost)[0]
-            raise ValueError(f"{self.name[sensor]!r} has a reading, but no place, in step {step}")
+        valid = np.isfinite(self.rss_db)
+        if not valid.any():
+            raise ValueError("rss_db must have a valid reading; all are missing")
+        unplaced = valid & ~np.isfinite(self.sensors).all(axis=-1)
+        if unplaced.any():
+            step, sensor = np.argwhere(unplaced)[0]
+            raise ValueError(
+                f"{self.name[sensor]!r} has a reading, but no position, in step {step}"
+            )
 
     @classmethod
     def fixed(
-        cls, name: Sequence[str], places: Float, rss_db: Any, time: Float | None = None
+        cls, name: Sequence[str], positions: Float, rss_db: Any, time: Float | None = None
     ) -> Network:
-        """Make a network whose sensors do not move: places (n_sensors, 2), m."""
+        """Return a network of sensors that do not move, positions (n_sensors, 2), m."""
         rss_db = np.asarray(rss_db, dtype=np.float64)
-        sensors = np.broadcast_to(places, (len(rss_db), *np.shape(places)))
-        same = {tuple(place) for place in np.asarray(places).tolist()}
-        if len(same) < len(places):
-            warnings.warn("two sensors stand at the same place", stacklevel=2)
+        sensors = np.broadcast_to(positions, (len(rss_db), *np.shape(positions)))
+        distinct = {tuple(position) for position in np.asarray(positions).tolist()}
+        if len(distinct) < len(positions):
+            warnings.warn("two sensors have the same position", stacklevel=2)
         time = np.arange(len(rss_db), dtype=np.float64) if time is None else time
         return cls(tuple(name), time, rss_db, sensors)
 
@@ -92,14 +94,14 @@ class Network:
         return len(self.time)
 
     def take(self, steps: Any) -> Network:
-        """Return some of the steps."""
+        """Return the network at some of the steps."""
         truth = None if self.truth is None else self.truth[steps]
         return Network(
             self.name, self.time[steps], self.rss_db[steps], self.sensors[steps], truth
         )  # fmt: skip
 
-    def heard(self, step: int, model: LogNormalRSS) -> tuple[LogNormalRSS, Float]:
-        """Return a model with the sensors where they are in one step, and the readings, Np.
+    def readings_at(self, step: int, model: LogNormalRSS) -> tuple[LogNormalRSS, Float]:
+        """Return the model with the sensor positions of one step, and its readings, Np.
 
         Parameters
         ----------
@@ -107,9 +109,9 @@ class Network:
         model : LogNormalRSS
             With one entry for each sensor of the network.
         """
-        places = self.sensors[step]
-        known = np.isfinite(places).all(axis=-1, keepdims=True)
-        return model.replace(sensors=np.where(known, places, 0.0)), self.readings[step]
+        positions = self.sensors[step]
+        known = np.isfinite(positions).all(axis=-1, keepdims=True)
+        return model.replace(sensors=np.where(known, positions, 0.0)), self.readings[step]
 
 
 def read_network(
@@ -121,7 +123,7 @@ def read_network(
     ----------
     readings : path
         ``.npz``: arrays ``rss_db`` (n_steps, n_sensors), ``sensor_xy`` (n_steps, n_sensors, 2) or
-        (n_sensors, 2), and if there are ``sensor_name``, ``time``, ``tx_xy``. ``.csv``: a heading
+        (n_sensors, 2), and optionally ``sensor_name``, ``time``, ``tx_xy``. ``.csv``: a heading
         and one row a step, ``time_s`` and a column for each sensor; or one row a reading,
         ``time_s, sensor, rss_db``. Levels in dB or dBm; empty where missing.
     sensors : path, optional
@@ -130,7 +132,7 @@ def read_network(
     Raises
     ------
     ValueError
-        If a sensor is listed twice or unknown, all readings are missing, or a cell is no number.
+        If a sensor is listed twice or unknown, all readings are missing, or a cell is not a number.
 
     Examples
     --------
@@ -142,13 +144,13 @@ def read_network(
         return _from_npz(readings)
     if sensors is None:
         raise ValueError(f"{readings} needs a table of sensors, with the columns name, x_m, y_m")
-    name, places = read_sensors(sensors)
+    name, positions = read_sensors(sensors)
     time, rss_db = _levels(readings, name)
-    return Network.fixed(name, places, rss_db, time)
+    return Network.fixed(name, positions, rss_db, time)
 
 
 def read_sensors(path: str | PathLike[str]) -> tuple[list[str], Float]:
-    """Return names and places, (n_sensors, 2), m, of a table with the columns name, x_m, y_m."""
+    """Return names and positions (n_sensors, 2), m, of a table with columns name, x_m, y_m."""
     rows = _table(path)
     for column in ("name", "x_m", "y_m"):
         if column not in rows[0]:
@@ -157,10 +159,10 @@ def read_sensors(path: str | PathLike[str]) -> tuple[list[str], Float]:
     repeated = sorted({one for one in name if name.count(one) > 1})
     if repeated:
         raise ValueError(f"{path}: the sensor {repeated[0]!r} is listed twice")
-    places = np.array([[_number(path, row[c]) for c in ("x_m", "y_m")] for row in rows])
-    if not np.isfinite(places).all():
-        raise ValueError(f"{path}: a place is missing")
-    return name, places
+    positions = np.array([[_number(path, row[c]) for c in ("x_m", "y_m")] for row in rows])
+    if not np.isfinite(positions).all():
+        raise ValueError(f"{path}: a position is missing")
+    return name, positions
 
 
 def _from_npz(path: str | PathLike[str]) -> Network:
@@ -186,7 +188,7 @@ def _levels(path: str | PathLike[str], name: list[str]) -> tuple[Float, Float]:
     if "sensor" in rows[0] and level is not None:
         return _long(path, rows, name, time, level)
     columns = [key for key in rows[0] if key != time]
-    _refuse_unknown(path, columns, name)
+    _check_sensors_known(path, columns, name)
     rss_db = np.full((len(rows), len(name)), np.nan)
     for column in columns:
         rss_db[:, name.index(column)] = [_number(path, row[column]) for row in rows]
@@ -204,7 +206,7 @@ def _long(
 ) -> tuple[Float, Float]:
     if time is None:
         raise ValueError(f"{path}: the column 'time_s' is missing")
-    _refuse_unknown(path, [row["sensor"].strip() for row in rows], name)
+    _check_sensors_known(path, [row["sensor"].strip() for row in rows], name)
     times = np.array([_number(path, row[time]) for row in rows])
     steps, at = np.unique(times, return_inverse=True)
     rss_db = np.full((len(steps), len(name)), np.nan)
@@ -216,7 +218,7 @@ def _long(
     return steps, rss_db
 
 
-def _refuse_unknown(path: str | PathLike[str], names: list[str], known: list[str]) -> None:
+def _check_sensors_known(path: str | PathLike[str], names: list[str], known: list[str]) -> None:
     for name in names:
         if name not in known:
             raise ValueError(f"{path}: the sensor {name!r} is not in the table of sensors")
@@ -231,9 +233,9 @@ def _table(path: str | PathLike[str]) -> list[dict[str, str]]:
             raise ValueError(f"{path}: the column {repeated[0]!r} is listed twice")
         rows = list(reader)
     if not rows:
-        raise ValueError(f"{path}: there is no row below the headings")
+        raise ValueError(f"{path}: there is no row below the header")
     if any(None in row for row in rows):
-        raise ValueError(f"{path}: a row has more cells than there are headings")
+        raise ValueError(f"{path}: a row has more cells than the header")
     return rows
 
 
@@ -241,4 +243,4 @@ def _number(path: str | PathLike[str], cell: str) -> float:
     try:
         return float(cell) if cell.strip() else np.nan
     except ValueError:
-        raise ValueError(f"{path}: {cell!r} is no number") from None
+        raise ValueError(f"{path}: {cell!r} is not a number") from None

@@ -1,4 +1,4 @@
-"""The trackers of signal strength, for `test_conformance`."""
+"""Trackers of signal strength for `test_conformance`."""
 
 from typing import Any
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from arrivals.measurement_models import LogNormalRSS, db_to_neper
 from arrivals.motion_models import ConstantVelocity, CoordinatedTurn, RandomWalk
-from arrivals.trackers import RSSML, RSSVB
+from arrivals.trackers import RSSML, RSSVB, BirthDeath, GridSearch, MAPSolver, VariationalSolver
 from arrivals.trackers.conformance import MakeTracker, Measurements
 
 RNG = np.random.default_rng(7)
@@ -20,7 +20,7 @@ P4 = np.diag([50.0, 2.0, 50.0, 2.0])
 
 
 def readings(model: LogNormalRSS) -> Measurements:
-    """Two sources at rest; one reading is missing, and later all of them."""
+    """Return readings of two sources at rest; one is missing, and later all of them."""
     u = db_to_neper([81.0, 79.0])
     rng = np.random.default_rng(8)
     z = np.array([model.draw(u, TRUTH, rng) for _ in range(5)])
@@ -42,17 +42,38 @@ TRACKERS: list[tuple[str, MakeTracker, Measurements]] = [
         ),
         readings(MOVING),
     ),
-    ("rss_vb", lambda: RSSVB(WALK, STILL, **START, sweep="jacobi"), readings(STILL)),
     (
         "rss_vb",
-        lambda: RSSVB(WALK, STILL, **START, refresh="literal", covariance="factor", max_cycles=5),
+        lambda: RSSVB(WALK, STILL, **START, solver=VariationalSolver(sweep="jacobi")),
+        readings(STILL),
+    ),
+    (
+        "rss_vb",
+        lambda: RSSVB(
+            WALK,
+            STILL,
+            **START,
+            solver=VariationalSolver(refresh="literal", covariance="factor", max_iterations=5),
+        ),
         readings(STILL),
     ),
     ("rss_vb", lambda: RSSVB(DRIVE, MOVING, P0=P4, n_sources=2), readings(MOVING)),
-    ("rss_vb", lambda: RSSVB(WALK, STILL, max_sources=4), readings(STILL)),
-    ("rss_vb", lambda: RSSVB(DRIVE, MOVING, P0=P4, births=True, confirm=2), readings(MOVING)),
+    ("rss_vb", lambda: RSSVB(WALK, STILL, search=GridSearch(max_sources=4)), readings(STILL)),
+    (
+        "rss_vb",
+        lambda: RSSVB(DRIVE, MOVING, P0=P4, births=BirthDeath(confirm_steps=2)),
+        readings(MOVING),
+    ),
     ("rss_ml", lambda: RSSML(WALK, STILL, **START), readings(STILL)),
-    ("rss_ml", lambda: RSSML(WALK, STILL, **START, method="bfgs"), readings(STILL)),
-    ("rss_ml", lambda: RSSML(DRIVE, MOVING, X4, P4, prior=False), readings(MOVING)),
+    (
+        "rss_ml",
+        lambda: RSSML(WALK, STILL, **START, solver=MAPSolver(method="bfgs")),
+        readings(STILL),
+    ),
+    (
+        "rss_ml",
+        lambda: RSSML(DRIVE, MOVING, X4, P4, solver=MAPSolver(prior=False)),
+        readings(MOVING),
+    ),
     ("rss_ml", lambda: RSSML(WALK, STILL, n_sources=2), readings(STILL)),
 ]

@@ -79,7 +79,7 @@ def test_level_has_no_slope_below_the_least_range() -> None:
 def test_shares_sum_to_less_than_one_and_power_shifts_level(theta: Float, rise: float) -> None:
     u = np.array([9.0, 9.5])
     found = TWO.levels(u, theta)
-    assert (found.shares.sum(axis=0) < 1).all()
+    assert (found.responsibilities.sum(axis=0) < 1).all()
     quiet = TWO.replace(log_noise=None)
     moved = quiet.levels(u + rise, theta).log_sigma - quiet.levels(u, theta).log_sigma
     np.testing.assert_allclose(moved, rise, atol=1e-12)
@@ -95,7 +95,7 @@ def test_leading_axes_are_a_batch() -> None:
 def test_nothing_overflows_at_the_ends_of_the_scale() -> None:
     found = TWO.levels([400.0, -400.0], [[0.0, 0.0], [1.0, 1.0]])
     assert np.isfinite(found.log_sigma).all()
-    np.testing.assert_allclose(found.shares[0], 1.0)
+    np.testing.assert_allclose(found.responsibilities[0], 1.0)
 
 
 def test_silence_is_the_noise() -> None:

@@ -1,4 +1,4 @@
-"""The factors of the variational posterior: log amplitudes [10]-[11], positions [12]-[14]."""
+"""Factors of the variational posterior: log amplitudes (10)-(11), positions (12)-(14)."""
 
 from __future__ import annotations
 
@@ -6,233 +6,235 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arrivals.measurement_models.signal_strength.path_loss import Levels, Offsets
-from arrivals.trackers.rss.inference.joint_posterior import JointPosterior, symmetric_2x2
+from arrivals.measurement_models.signal_strength.path_loss import Offsets
+from arrivals.trackers.gaussian.linalg import symmetric_2x2
+from arrivals.trackers.rss.inference.joint_posterior import ExpansionPoint, JointPosterior
 from arrivals.typing import Bool, Float, Int
 
-HALVINGS = 12  # of a Newton step that makes φ rise
-LOWEST = 1e-3  # of the Gauss-Newton trace: below, the curvature is not trusted
+MAX_HALVINGS = 12  # of a Newton step that increases φ
+MIN_RELATIVE_CURVATURE = 1e-3  # of the Gauss-Newton trace; below it Gauss-Newton replaces Newton
 
 
-class Factors(NamedTuple):
-    """Means and precisions of all factors after one cycle.
-
-    Parameters
-    ----------
-    u, w : ndarray, shape (..., n_sources)
-        Means and precisions of the log amplitudes.
-    theta : ndarray, shape (..., n_sources, 2)
-        Modes of the positions.
-    P : ndarray, shape (..., n_sources, 2, 2)
-        Their precisions.
-    """
-
-    u: Float
-    w: Float
-    theta: Float
-    P: Float
-
-
-def powers_precision(problem: JointPosterior, lam: Float) -> Float:
-    """Return 1/v = 1/v₀ + Σ W λ², (..., n_sources)."""
-    return np.asarray(problem.prior.w + dot(problem.W[..., None, :] * lam, lam))  # (11)
-
-
-def gauss_seidel(
-    problem: JointPosterior,
-    found: Levels,
-    u: Float,
-    theta: Float,
-    newton_steps: int,
-    tolerance: float,
-) -> Factors:
-    """Return the factors after one cycle in which each sees the newest of the others.
+def update_amplitudes(
+    problem: JointPosterior, point: ExpansionPoint, sequential: bool
+) -> tuple[Float, Float, Float]:
+    """Update the factors N(u, 1/w) of the log amplitudes.
 
     Parameters
     ----------
-    problem : Problem
+    problem : JointPosterior
         With one batch axis.
-    found : Levels
-        Those of the expansion point.
-    u, theta : ndarray, shape (n_batch, n_sources), (n_batch, n_sources, 2)
-        The expansion point.
-    newton_steps : int
-        At most, for each position.
-    tolerance : float
-        Positions have settled once Newton's step is shorter, m.
+    point : ExpansionPoint
+    sequential : bool
+        Whether each factor uses the new means of the factors before it.
 
-    Examples
-    --------
-    See `rss_cycles.solve`.
+    Returns
+    -------
+    u, w : ndarray, shape (n_batch, n_sources)
+        Means, Np, and precisions, Np⁻².
+    r : ndarray, shape (n_batch, n_sensors)
+        Residuals that the factors of the positions start from.
     """
-    lam, r = found.shares, problem.xi - found.log_sigma
-    w = powers_precision(problem, lam)
-    u, theta, P = u.copy(), theta.copy(), np.empty((*theta.shape, 2))
-    mu, w0 = problem.prior.mu, problem.prior.w
-    Wlam = problem.W[:, None] * lam
+    prior, lam = problem.prior, point.levels.responsibilities
+    W_lam = problem.W[:, None] * lam
+    r = problem.xi - point.levels.log_sigma
+    # 1/v = 1/v₀ + Σ W λ²   (11)
+    w = np.asarray(prior.w + dot(W_lam, lam))
+    if not sequential:
+        # μ = v (μ₀/v₀ + Σ W λ (r + λ ū))   (10)
+        u = (prior.w * prior.mu + dot(W_lam, r[:, None] + lam * point.u[..., None])) / w
+        return u, w, r
+    u = point.u.copy()
     for j in range(u.shape[-1]):
-        pull = dot(Wlam[:, j], r + lam[:, j] * u[:, j, None])
-        new = (w0[:, j] * mu[:, j] + pull) / w[:, j]  # (10)
-        r = r - lam[:, j] * (new - u[:, j])[:, None]
-        u[:, j] = new
-    c = 0.5 * problem.field.alpha * lam
-    log_range = found.offsets.log_range
-    for j in range(u.shape[-1]):
-        one = slice(j, j + 1)
-        bowl = bowl_of(problem, c[:, one], r[:, None], log_range[:, one], one)
-        theta[:, one], P[:, one], rho = newton(bowl, theta[:, one], newton_steps, tolerance)
-        r = rho[:, 0]
-    return Factors(u, w, theta, P)
+        # μ = v (μ₀/v₀ + Σ W λ (r + λ ū))   (10)
+        data = dot(W_lam[:, j], r + lam[:, j] * u[:, j, None])
+        mean = (prior.w[:, j] * prior.mu[:, j] + data) / w[:, j]
+        r = r - lam[:, j] * (mean - u[:, j])[:, None]
+        u[:, j] = mean
+    return u, w, r
 
 
-def jacobi(
+def update_positions(
     problem: JointPosterior,
-    found: Levels,
-    u: Float,
-    theta: Float,
+    point: ExpansionPoint,
+    r: Float,
+    sequential: bool,
     newton_steps: int,
     tolerance: float,
-) -> Factors:
-    """Return the factors after one cycle in which each sees the others as they were.
+) -> tuple[Float, Float]:
+    """Update the factors N(θ, P⁻¹) of the positions.
 
-    Parameters are those of `gauss_seidel`. Algorithm 1 as printed.
+    Parameters
+    ----------
+    problem : JointPosterior
+        With one batch axis.
+    point : ExpansionPoint
+    r : ndarray, shape (n_batch, n_sensors)
+        Residuals.
+    sequential : bool
+        Whether each factor uses the new modes of the factors before it.
+    newton_steps : int
+        Largest number of Newton steps for a position.
+    tolerance : float
+        Length of the Newton step at convergence, m.
+
+    Returns
+    -------
+    theta : ndarray, shape (n_batch, n_sources, 2)
+        Modes of φ (12), m.
+    P : ndarray, shape (n_batch, n_sources, 2, 2)
+        Hessians of φ there (14), the precisions, m⁻².
     """
-    lam, r = found.shares, problem.xi - found.log_sigma
-    w = powers_precision(problem, lam)
-    pull = dot(problem.W[:, None] * lam, r[:, None] + lam * u[..., None])
-    new = (problem.prior.w * problem.prior.mu + pull) / w  # (10)
-    c = 0.5 * problem.field.alpha * lam
-    bowl = bowl_of(problem, c, r[:, None], found.offsets.log_range, slice(None))
-    theta, P, _ = newton(bowl, theta, newton_steps, tolerance)
-    return Factors(new, w, theta, P)
+    c = 0.5 * problem.propagation.alpha * point.levels.responsibilities
+    log_range = point.levels.offsets.log_range
+    if not sequential:
+        cost = PositionCost.at(problem, c, r[:, None], log_range, slice(None))
+        theta, P, _ = minimize(cost, point.theta, newton_steps, tolerance)
+        return theta, P
+    theta, P = point.theta.copy(), np.empty((*point.theta.shape, 2))
+    for j in range(theta.shape[1]):
+        one = slice(j, j + 1)
+        cost = PositionCost.at(problem, c[:, one], r[:, None], log_range[:, one], one)
+        theta[:, one], P[:, one], rho = minimize(cost, theta[:, one], newton_steps, tolerance)
+        r = rho[:, 0]
+    return theta, P
 
 
-class _Look(NamedTuple):
-    seen: Offsets
+class CostEvaluation(NamedTuple):
+    """Offsets, residuals ρ and cost φ of positions."""
+
+    offsets: Offsets
     rho: Float
     phi: Float
 
 
 class PositionCost(NamedTuple):
-    """What one cycle asks of positions: φ(θ) = ½ Σ W ρ² + the prior's, ρ = base + c log R(θ).
+    """Cost of positions: φ(θ) = ½ Σ W ρ² + ½ (θ - θ₀)ᵀ Σ₀⁻¹ (θ - θ₀), ρ = base + c log R(θ).
 
     Parameters
     ----------
-    problem : Problem
-    c, half : ndarray, shape (n_batch, n, n_sensors)
+    problem : JointPosterior
+    c, half_c : ndarray, shape (n_batch, n, n_sensors)
         ½αλ of some sources, and half of it.
     base : ndarray, shape (n_batch, n, n_sensors)
         r - c log R̄.
-    which : slice
+    sources : slice
         Those sources.
     """
 
     problem: JointPosterior
     c: Float
-    half: Float
+    half_c: Float
     base: Float
-    which: slice
+    sources: slice
 
-    def look(self, theta: Float) -> _Look:
+    @classmethod
+    def at(
+        cls, problem: JointPosterior, c: Float, r: Float, log_range: Float, sources: slice
+    ) -> PositionCost:
+        """Return the cost by residuals r and log ranges log R̄ at the expansion point."""
+        return cls(problem, c, 0.5 * c, r - c * log_range, sources)
+
+    def evaluate(self, theta: Float) -> CostEvaluation:
         """Return offsets, ρ and φ at positions (n_batch, n, 2)."""
-        seen = self.problem.field.offsets(theta)
-        rho = np.log(seen.square)
-        rho *= self.half
+        offsets = self.problem.propagation.offsets(theta)
+        # ρ = r + ½αλ (log R - log R̄)   (12)
+        rho = np.log(offsets.square)
+        rho *= self.half_c
         rho += self.base
-        step, pull = self.step(theta)
+        step, of_prior = self.prior_gradient(theta)
         W = self.problem.W[:, None]
-        phi = 0.5 * (dot(W * rho, rho) + (step * pull).sum(axis=-1))
-        return _Look(seen, rho, phi)
+        # φ = ½ Σ W ρ² + ½ (θ - θ₀)' Σ₀⁻¹ (θ - θ₀)   (12)
+        phi = 0.5 * (dot(W * rho, rho) + (step * of_prior).sum(axis=-1))
+        return CostEvaluation(offsets, rho, phi)
 
     def take(self, rows: Int) -> PositionCost:
-        """Return some of the batch."""
+        """Return the cost at some rows of the batch axis."""
         return PositionCost(
-            self.problem.take(rows), self.c[rows], self.half[rows], self.base[rows], self.which
+            self.problem.take(rows), self.c[rows], self.half_c[rows], self.base[rows], self.sources
         )
 
-    def step(self, theta: Float) -> tuple[Float, Float]:
-        """Return θ - θ₀ and Σ₀⁻¹(θ - θ₀)."""
-        step = theta - self.problem.prior.theta[:, self.which]
-        P = self.problem.prior.P[:, self.which]
+    def prior_gradient(self, theta: Float) -> tuple[Float, Float]:
+        """Return θ - θ₀ and Σ₀⁻¹ (θ - θ₀)."""
+        step = theta - self.problem.prior.theta[:, self.sources]
+        P = self.problem.prior.P[:, self.sources]
         return step, (P * step[..., None, :]).sum(axis=-1)
 
-    def slopes(self, theta: Float, look: _Look) -> tuple[Float, Float]:
+    def derivatives(self, theta: Float, evaluation: CostEvaluation) -> tuple[Float, Float]:
         """Return gradient (n_batch, n, 2) and a positive Hessian (n_batch, n, 2, 2) of φ.
 
-        Where the curvature is not clearly positive, it is Gauss and Newton's.
+        Where the Hessian is not clearly positive, it is that of Gauss and Newton.
         """
-        W, P0 = self.problem.W[:, None], self.problem.prior.P[:, self.which]
-        seen, rho = look.seen, look.rho
-        inverse = seen.inverse
-        ex, ey = seen.dx * inverse, seen.dy * inverse
+        W, P0 = self.problem.W[:, None], self.problem.prior.P[:, self.sources]
+        offsets, rho = evaluation.offsets, evaluation.rho
+        inverse = offsets.inverse
+        ex, ey = offsets.dx * inverse, offsets.dy * inverse
         s = W * self.c
         t = s * rho
         s = s * self.c
-        _, pull = self.step(theta)
-        gradient = np.stack([dot(t, ex), dot(t, ey)], axis=-1) + pull
+        _, of_prior = self.prior_gradient(theta)
+        # ∇φ = ½α Σ W ρ λ d/R² + Σ₀⁻¹ (θ - θ₀)   (13)
+        gradient = np.stack([dot(t, ex), dot(t, ey)], axis=-1) + of_prior
         sx, sy = s * ex, s * ey
         a, b, c = dot(sx, ex), dot(sx, ey), dot(sy, ey)
         tx, ty = t * ex, t * ey
-        bend = dot(t, inverse)
-        full = (
-            a + bend - 2 * dot(tx, ex) + P0[..., 0, 0],
+        curvature = dot(t, inverse)
+        # ∇²φ = Σ W (¼α²λ² dd'/R⁴ + ½αρλ (I/R² - 2dd'/R⁴)) + Σ₀⁻¹   (14)
+        newton = (
+            a + curvature - 2 * dot(tx, ex) + P0[..., 0, 0],
             b - 2 * dot(tx, ey) + P0[..., 0, 1],
-            c + bend - 2 * dot(ty, ey) + P0[..., 1, 1],
+            c + curvature - 2 * dot(ty, ey) + P0[..., 1, 1],
         )
-        newton = (a + P0[..., 0, 0], b + P0[..., 0, 1], c + P0[..., 1, 1])
-        sound = lowest(*full) > LOWEST * (newton[0] + newton[2])
+        gauss_newton = (a + P0[..., 0, 0], b + P0[..., 0, 1], c + P0[..., 1, 1])
+        trace = gauss_newton[0] + gauss_newton[2]
+        positive = smaller_eigenvalue(*newton) > MIN_RELATIVE_CURVATURE * trace
         return gradient, symmetric_2x2(
-            *(np.where(sound, x, y) for x, y in zip(full, newton, strict=True))
+            *(np.where(positive, x, y) for x, y in zip(newton, gauss_newton, strict=True))
         )
 
 
-def bowl_of(
-    problem: JointPosterior, c: Float, r: Float, log_range: Float, which: slice
-) -> PositionCost:
-    """Return the bowl of sources from the residuals r and log ranges at the expansion point."""
-    return PositionCost(problem, c, 0.5 * c, r - c * log_range, which)
-
-
-def newton(
-    bowl: PositionCost, theta: Float, steps: int, tolerance: float
+def minimize(
+    cost: PositionCost, theta: Float, steps: int, tolerance: float
 ) -> tuple[Float, Float, Float]:
-    """Return the modes of φ, its Hessians there, and ρ there.
+    """Return the minimizers of φ by Newton's method, the Hessians and ρ there.
 
-    Each position stops by itself, when its step is shorter than `tolerance`, m.
+    Each position ends by itself, when its step is shorter than `tolerance`, m.
     """
-    look = bowl.look(theta)
-    moving = np.ones(look.phi.shape, dtype=np.bool_)
+    evaluation = cost.evaluate(theta)
+    active = np.ones(evaluation.phi.shape, dtype=np.bool_)
     for _ in range(steps):
-        gradient, H = bowl.slopes(theta, look)
-        step = np.where(moving[..., None], -solve_2x2(H, gradient), 0.0)
-        moving = moving & (np.hypot(step[..., 0], step[..., 1]) > tolerance)
-        theta, look = _descended(bowl, theta, step, look)
-        if not moving.any():
+        gradient, H = cost.derivatives(theta, evaluation)
+        step = np.where(active[..., None], -solve_2x2(H, gradient), 0.0)
+        active = active & (np.hypot(step[..., 0], step[..., 1]) > tolerance)
+        theta, evaluation = backtrack(cost, theta, step, evaluation)
+        if not active.any():
             break
-    _, H = bowl.slopes(theta, look)
-    return theta, H, look.rho
+    _, H = cost.derivatives(theta, evaluation)
+    return theta, H, evaluation.rho
 
 
-def _descended(bowl: PositionCost, theta: Float, step: Float, before: _Look) -> tuple[Float, _Look]:
-    """Return positions after a step, halved until φ does not rise, and the look from there."""
-    to = theta + step
-    look = bowl.look(to)
-    rows = np.flatnonzero(_rises(look.phi, before.phi, step).any(axis=-1))
+def backtrack(
+    cost: PositionCost, theta: Float, step: Float, before: CostEvaluation
+) -> tuple[Float, CostEvaluation]:
+    """Return positions after a step that is halved until φ does not increase, and φ there."""
+    moved = theta + step
+    after = cost.evaluate(moved)
+    rows = np.flatnonzero(_increases(after.phi, before.phi, step).any(axis=-1))
     if len(rows) == 0:
-        return to, look
-    few, step = bowl.take(rows), step[rows]
-    for halving in range(HALVINGS):
-        now = few.look(theta[rows] + step)
-        rises = _rises(now.phi, before.phi[rows], step)
-        if not rises.any():
+        return moved, after
+    part, step = cost.take(rows), step[rows]
+    for halving in range(MAX_HALVINGS):
+        phi = part.evaluate(theta[rows] + step).phi
+        increases = _increases(phi, before.phi[rows], step)
+        if not increases.any():
             break
-        shorter = 0.0 if halving == HALVINGS - 1 else 0.5
-        step = np.where(rises[..., None], shorter * step, step)
-    to[rows] = theta[rows] + step
-    return to, bowl.look(to)
+        shorter = 0.0 if halving == MAX_HALVINGS - 1 else 0.5
+        step = np.where(increases[..., None], shorter * step, step)
+    moved[rows] = theta[rows] + step
+    return moved, cost.evaluate(moved)
 
 
-def _rises(phi: Float, before: Float, step: Float) -> Bool:
+def _increases(phi: Float, before: Float, step: Float) -> Bool:
     higher = ~(phi <= before + 1e-12 * np.abs(before))
     return np.asarray(higher & step.any(axis=-1))
 
@@ -248,12 +250,12 @@ def dot(a: Float, b: Float) -> Float:
     return np.asarray(np.einsum("...i,...i->...", a, b))
 
 
-def lowest(a: Float, b: Float, c: Float) -> Float:
+def smaller_eigenvalue(a: Float, b: Float, c: Float) -> Float:
     """Return the smaller eigenvalues of [[a, b], [b, c]].
 
     Examples
     --------
-    >>> float(lowest(2.0, 1.0, 2.0))
+    >>> float(smaller_eigenvalue(2.0, 1.0, 2.0))
     1.0
     """
     return np.asarray(0.5 * (a + c) - np.hypot(0.5 * (a - c), b))

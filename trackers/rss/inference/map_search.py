@@ -1,20 +1,19 @@
-"""The joint maximum of amplitudes and positions: least squares and BFGS, by scipy."""
+"""Joint maximum of amplitudes and positions by scipy: least squares and BFGS."""
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from arrivals.measurement_models.signal_strength.path_loss import slopes
 from arrivals.trackers.rss.inference.joint_posterior import JointPosterior
+from arrivals.trackers.rss.settings import MAPSolver
 from arrivals.typing import Bool, Float
 
-Method = Literal["lm", "bfgs"]
 
-
-class Maximum(NamedTuple):
-    """Where the search ended: u (n_sources,), θ (n_sources, 2), and how."""
+class MAPEstimate(NamedTuple):
+    """Maximum of one problem: u (n_sources,), Np, and θ (n_sources, 2), m."""
 
     u: Float
     theta: Float
@@ -22,29 +21,22 @@ class Maximum(NamedTuple):
     iterations: int
 
 
-def maximum(
-    problem: JointPosterior,
-    u: Float,
-    theta: Float,
-    method: Method = "lm",
-    prior: bool = True,
-    tolerance: float = 1e-8,
-) -> Maximum:
-    """Search the maximum of the joint posterior, or of the likelihood, from a starting point.
+def maximize(
+    problem: JointPosterior, u: Float, theta: Float, solver: MAPSolver = MAPSolver()
+) -> MAPEstimate:
+    """Maximize the joint posterior, or the likelihood, from a starting point.
 
     Parameters
     ----------
-    problem : Problem
+    problem : JointPosterior
         Without a batch axis.
     u, theta : ndarray, shape (n_sources,), (n_sources, 2)
         Starting point.
-    method : {"lm", "bfgs"}
-        Levenberg and Marquardt's, or Broyden, Fletcher, Goldfarb and Shanno's; both with
-        analytic slopes.
-    prior : bool
-        Whether the priors count: the maximum of L, [7], or of the likelihood alone.
-    tolerance : float
-        Relative, of the step and the cost.
+    solver : MAPSolver
+
+    Returns
+    -------
+    MAPEstimate
 
     Raises
     ------
@@ -54,75 +46,69 @@ def maximum(
     References
     ----------
     Cevher, Sankaranarayanan, Chellappa, ICASSP 2008, (7) and section 4: the method called ML.
-
-    Examples
-    --------
-    See `RSSML`.
     """
-    heard = problem.W > 0
+    valid = problem.W > 0
     n = 3 * len(u)
-    if not prior and heard.sum() < n:
+    if not solver.prior and valid.sum() < n:
         raise ValueError(
-            f"{heard.sum()} readings cannot tell {n} unknowns without a prior: use prior=True"
+            f"readings must be at least {n}, the number of unknowns; got {valid.sum()}: "
+            "use prior=True"
         )
-    field = problem.field._replace(
-        sensors=problem.field.sensors[heard],
-        log_noise=_of(problem.field.log_noise, heard),
-        log_gain=_of(problem.field.log_gain, heard),
+    propagation = problem.propagation._replace(
+        sensors=problem.propagation.sensors[valid],
+        log_noise=_select(problem.propagation.log_noise, valid),
+        log_gain=_select(problem.propagation.log_gain, valid),
     )
-    told = problem._replace(field=field, xi=problem.xi[heard], W=problem.W[heard])
-    search = _levenberg_marquardt if method == "lm" else _bfgs
-    return search(told, np.concatenate([u, theta.ravel()]), prior, tolerance)
+    problem = problem._replace(propagation=propagation, xi=problem.xi[valid], W=problem.W[valid])
+    search = _levenberg_marquardt if solver.method == "lm" else _bfgs
+    return search(problem, np.concatenate([u, theta.ravel()]), solver)
 
 
-def _of(values: float | Float, heard: Bool) -> float | Float:
-    return np.asarray(values)[..., heard] if np.ndim(values) else values
+def _select(values: float | Float, valid: Bool) -> float | Float:
+    return np.asarray(values)[..., valid] if np.ndim(values) else values
 
 
-def _levenberg_marquardt(
-    problem: JointPosterior, x: Float, with_prior: bool, tolerance: float
-) -> Maximum:
+def _levenberg_marquardt(problem: JointPosterior, x: Float, solver: MAPSolver) -> MAPEstimate:
     from scipy.optimize import least_squares
 
     K = len(problem.prior.mu)
-    root_W, root = np.sqrt(problem.W), _root(problem)
+    root_W = np.sqrt(problem.W)
+    root_prior = np.asarray(np.linalg.cholesky(problem.prior_precision()).T, np.float64)
     centre = np.concatenate([problem.prior.mu, problem.prior.theta.ravel()])
 
     def residual(x: Float) -> Float:
         u, theta = x[:K], x[K:].reshape(K, 2)
-        misfit = root_W * (problem.field.levels(u, theta).log_sigma - problem.xi)
-        return np.concatenate([misfit, root @ (x - centre)]) if with_prior else misfit
+        misfit = root_W * (problem.propagation.levels(u, theta).log_sigma - problem.xi)
+        return np.concatenate([misfit, root_prior @ (x - centre)]) if solver.prior else misfit
 
     def jacobian(x: Float) -> Float:
-        found = problem.field.levels(x[:K], x[K:].reshape(K, 2))
-        J = root_W[:, None] * slopes(found, problem.field.alpha)
-        return np.concatenate([J, root]) if with_prior else J
+        levels = problem.propagation.levels(x[:K], x[K:].reshape(K, 2))
+        J = root_W[:, None] * slopes(levels, problem.propagation.alpha)
+        return np.concatenate([J, root_prior]) if solver.prior else J
 
-    found = least_squares(
-        residual, x, jacobian, method="lm", x_scale="jac", xtol=tolerance, ftol=tolerance
+    result = least_squares(
+        residual, x, jacobian, method="lm", x_scale="jac", xtol=solver.tolerance,
+        ftol=solver.tolerance,
+    )  # fmt: skip
+    return MAPEstimate(
+        result.x[:K], result.x[K:].reshape(K, 2), bool(result.success), int(result.nfev)
     )
-    return Maximum(found.x[:K], found.x[K:].reshape(K, 2), bool(found.success), int(found.nfev))
 
 
-def _root(problem: JointPosterior) -> Float:
-    """Return the transposed Cholesky factor of the priors' precision."""
-    return np.asarray(np.linalg.cholesky(problem.prior_precision()).T, np.float64)
-
-
-def _bfgs(problem: JointPosterior, x: Float, with_prior: bool, tolerance: float) -> Maximum:
+def _bfgs(problem: JointPosterior, x: Float, solver: MAPSolver) -> MAPEstimate:
     from scipy.optimize import minimize
 
     K = len(problem.prior.mu)
-    if not with_prior:
-        nothing = problem.prior._replace(w=0 * problem.prior.w, P=0 * problem.prior.P)
-        problem = problem._replace(prior=nothing)
+    if not solver.prior:
+        flat = problem.prior._replace(w=0 * problem.prior.w, P=0 * problem.prior.P)
+        problem = problem._replace(prior=flat)
     scale = 1 / np.sqrt(np.concatenate([np.full(K, 1.0), np.full(2 * K, 1e-2)]))
 
     def cost(x: Float) -> tuple[float, Float]:
         u, theta = scale[:K] * x[:K], (scale[K:] * x[K:]).reshape(K, 2)
         return -float(problem.log_posterior(u, theta)), -scale * problem.gradient(u, theta)
 
-    found = minimize(cost, x / scale, jac=True, method="BFGS", options={"gtol": 1e-4})
-    best = scale * found.x
-    settled = bool(found.success) or found.status == 2  # 2: no lower point along the line
-    return Maximum(best[:K], best[K:].reshape(K, 2), settled, int(found.nit))
+    result = minimize(cost, x / scale, jac=True, method="BFGS", options={"gtol": 1e-4})
+    x = scale * result.x
+    converged = bool(result.success) or result.status == 2  # 2: no lower point along the line
+    return MAPEstimate(x[:K], x[K:].reshape(K, 2), converged, int(result.nit))

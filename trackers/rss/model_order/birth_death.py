@@ -1,200 +1,154 @@
-"""Sources that come and go: counted by the evidence, believed after several steps."""
+"""Births and deaths of sources by the Laplace evidence."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
-from arrivals.trackers.rss.belief import SourceBeliefs
-from arrivals.trackers.rss.inference.joint_posterior import JointPosterior, Marginals
-from arrivals.trackers.rss.inference.solution import Solution, found_of, in_batch
+from arrivals.trackers.rss.inference.joint_posterior import JointPosterior
+from arrivals.trackers.rss.inference.solution import Solution
 from arrivals.trackers.rss.model_order.grid_search import NewSourcePrior
 from arrivals.trackers.rss.model_order.model_selection import Candidate
-from arrivals.typing import Bool, Float, Int
+from arrivals.trackers.rss.model_order.track_table import MAX_LOG_ODDS, TrackTable
+from arrivals.typing import Float, Int
 
-if TYPE_CHECKING:
-    from arrivals.trackers.rss.base import RSSTracker
-
-SURE = float(np.log(99.0))  # log odds at which a source is believed in, or given up
+Solve = Callable[[JointPosterior, Float, Float], Solution]
 
 
-@dataclass(frozen=True, eq=False)
-class TrackTable:
-    """Who is there; all (n_sources,).
+class BirthDeathUpdate(NamedTuple):
+    """Result of an update with births and deaths.
 
     Parameters
     ----------
-    label : ndarray of int
-    odds : ndarray
-        Log odds that the source is there, within ± ln 99.
-    confirmed : ndarray of bool
-        It has once been sure.
-    next_label : int
+    candidate : Candidate
+        Estimates of the supported sources, followed by the new ones.
+    supported : ndarray of int
+        Indices of the supported ones among the predicted sources.
+    tracks : TrackTable
+        Predicted sources with the evidence of this step, followed by the new ones.
     """
 
-    label: Int
-    odds: Float
-    confirmed: Bool
-    next_label: int
-
-    @classmethod
-    def known(cls, n: int) -> TrackTable:
-        """Return n sources that are there beyond doubt.
-
-        Examples
-        --------
-        >>> TrackTable.known(2).existence
-        array([1., 1.])
-        """
-        return cls(np.arange(n), np.full(n, np.inf), np.ones(n, dtype=np.bool_), n)
-
-    @property
-    def existence(self) -> Float:
-        """Probabilities that the sources are there."""
-        return np.asarray(1 / (1 + np.exp(-self.odds)))
-
-    def take(self, rows: Int | Bool) -> TrackTable:
-        """Return some of the sources."""
-        return TrackTable(self.label[rows], self.odds[rows], self.confirmed[rows], self.next_label)
-
-    def weighed(self, evidence: Float, confirm: int) -> TrackTable:
-        """Return the census after one more step's evidence for each source.
-
-        A step counts for 2 ln 99 / `confirm` at most: so many it takes to be sure, either way.
-        """
-        most = 2 * SURE / confirm
-        odds = np.clip(self.odds, -SURE, SURE) + np.clip(evidence, -most, most)
-        odds = np.clip(odds, -SURE, SURE)
-        return replace(self, odds=odds, confirmed=self.confirmed | (odds >= SURE - 1e-9))
-
-    def with_newborn(self, gains: list[float], confirm: int) -> TrackTable:
-        """Return the census with some more, of whom nothing is sure but a first step's evidence."""
-        n = len(gains)
-        fresh = TrackTable(
-            self.next_label + np.arange(n),
-            np.full(n, -SURE),
-            np.zeros(n, dtype=np.bool_),
-            self.next_label + n,
-        ).weighed(np.array(gains), confirm)
-        return TrackTable(
-            np.append(self.label, fresh.label),
-            np.append(self.odds, fresh.odds),
-            np.append(self.confirmed, fresh.confirmed),
-            fresh.next_label,
-        )
+    candidate: Candidate
+    supported: Int
+    tracks: TrackTable
 
 
-class Counted(NamedTuple):
-    """Sources, census, and the fit behind them."""
+def update_with_births(
+    predicted: Candidate,
+    tracks: TrackTable,
+    new: NewSourcePrior,
+    solve: Solve,
+    confirm_steps: int,
+    max_sources: int,
+) -> BirthDeathUpdate:
+    """Update sources that may appear and disappear.
 
-    sources: SourceBeliefs
-    census: TrackTable
-    fit: Candidate
-    found: Solution
-
-
-def counted(
-    tracker: RSSTracker, sources: SourceBeliefs, census: TrackTable, xi: Float, W: Float
-) -> Counted:
-    """Correct sources by readings, with births and deaths.
-
-    The sources that the readings speak for are corrected, the others only predicted. What speaks
-    for a source is the difference of the Laplace evidence with it and without it. Whatever
-    raises the evidence as one more source is kept as a newborn. Each is shown once it is sure,
-    and given up when its odds have fallen to the same depth.
+    Sources supported by the readings are updated; the others keep their prediction. The support
+    of a source is the difference of the Laplace evidence with it and without it. A source whose
+    addition increases the evidence by ln 99 is new. It is confirmed, and later deleted, by the
+    log odds in the track table.
 
     Parameters
     ----------
-    tracker : RSSTracker
-    sources : Sources
-        Predicted.
-    census : Census
-    xi, W : ndarray, shape (n_sensors,)
-        Readings and weights.
-    """
-    problem = JointPosterior(tracker.measurement.field, xi, W, sources.prior(tracker.xy))
-    expected = Candidate(problem, sources.u, sources.x[:, tracker.xy])
-    fit, heard, evidence = spoken_for(tracker, expected)
-    census = census.weighed(evidence, tracker.confirm)
-    room = tracker.max_sources - len(sources.u)
-    fit, gains = with_newborn(fit, expected.part(heard), tracker.newcomers(W > 0), room)
-    found = found_of(fit)
-    K = len(heard)
-    old = Marginals(found.marginals.v[0, :K], found.marginals.Sigma[0, :K])
-    moved = sources.take(heard).corrected(
-        fit.u[:K], fit.theta[:K], old, tracker.xy, tracker.motion.angles
-    )
-    sources = SourceBeliefs(*(part.copy() for part in sources))
-    for part, new in zip(sources, moved, strict=True):
-        part[heard] = new
-    alive = census.odds > -SURE + 1e-9
-    sources = sources.take(alive).joined(tracker.fresh(fit).take(slice(K, None)))
-    return Counted(sources, census.take(alive).with_newborn(gains, tracker.confirm), fit, found)
-
-
-def with_newborn(
-    fit: Candidate, expected: Candidate, new: NewSourcePrior, room: int
-) -> tuple[Candidate, list[float]]:
-    """Return a fit enlarged as long as each more source raises the evidence enough, and the gains.
-
-    Sources that have just appeared pull the known ones off their places, so the newborn are also
-    looked for from where those were expected.
-
-    Parameters
-    ----------
-    fit : Fit
-        Of the sources that are known.
-    expected : Fit
-        The same sources as predicted.
-    new : Newcomers
-    room : int
-        Sources that may be added.
-    """
-    gains: list[float] = []
-    while len(gains) < room:
-        both = [fit.enlarged(new)]
-        if len(expected.u):
-            expected = expected.enlarged(new)
-            both.append(expected)
-        larger = max(both, key=lambda other: other.log_evidence)
-        gain = larger.log_evidence - fit.log_evidence
-        if not gain > SURE:
-            break
-        gains.append(gain)
-        fit = larger
-    return fit, gains
-
-
-def spoken_for(tracker: RSSTracker, whole: Candidate) -> tuple[Candidate, Int, Float]:
-    """Return the fit of the sources that raise the evidence, their numbers, and what it says.
+    predicted : Candidate
+        Predicted sources.
+    tracks : TrackTable
+        Their labels and existence.
+    new : NewSourcePrior
+    solve : callable
+        The tracker's method, for a batch of problems.
+    confirm_steps, max_sources : int
+        As in `BirthDeath` and `GridSearch`.
 
     Returns
     -------
-    fit : Fit
-    heard : ndarray of int
-        Which of the sources the fit is of.
-    evidence : ndarray, shape (n_sources,)
-        Log evidence with a source less that without it; negative for the others.
+    BirthDeathUpdate
     """
-    evidence = np.zeros(len(whole.u))
-    heard = np.arange(len(whole.u))
-    fit = solved(tracker, whole)
-    while len(heard):
-        lost = np.array([fit.log_evidence - fit.without(j).log_evidence for j in range(len(heard))])
-        evidence[heard] = lost
-        j = int(lost.argmin())
-        if lost[j] > 0:
+    candidate, supported, evidence = supported_sources(predicted, solve)
+    tracks = tracks.updated(evidence, confirm_steps)
+    n_free = max_sources - len(predicted.u)
+    candidate, gains = add_new_sources(candidate, predicted.part(supported), new, n_free)
+    return BirthDeathUpdate(candidate, supported, tracks.extended(gains, confirm_steps))
+
+
+def add_new_sources(
+    candidate: Candidate, predicted: Candidate, new: NewSourcePrior, n_free: int
+) -> tuple[Candidate, list[float]]:
+    """Add sources while each increases the evidence by more than ln 99.
+
+    Sources that have just appeared bias the estimates of the known ones, so the search also
+    starts from the predictions of those.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        Estimates of the known sources.
+    predicted : Candidate
+        Predictions of the same sources.
+    new : NewSourcePrior
+    n_free : int
+        Largest number of sources to add.
+
+    Returns
+    -------
+    candidate : Candidate
+    gains : list of float
+        Increase of the log evidence by each new source.
+    """
+    gains: list[float] = []
+    while len(gains) < n_free:
+        larger = [candidate.enlarged(new)]
+        if len(predicted.u):
+            predicted = predicted.enlarged(new)
+            larger.append(predicted)
+        best = max(larger, key=lambda other: other.log_evidence)
+        gain = best.log_evidence - candidate.log_evidence
+        if not gain > MAX_LOG_ODDS:
             break
-        fit = fit.without(j)
-        heard = np.delete(heard, j)
-    return fit, heard, evidence
+        gains.append(gain)
+        candidate = best
+    return candidate, gains
 
 
-def solved(tracker: RSSTracker, fit: Candidate) -> Candidate:
-    """Return the fit after the tracker's own method, and the joint maximum from there."""
-    if len(fit.u) == 0:
-        return fit
-    found = tracker.solve(in_batch(fit.problem), fit.u[None], fit.theta[None])
-    return Candidate(fit.problem, found.u[0], found.theta[0]).refitted()
+def supported_sources(predicted: Candidate, solve: Solve) -> tuple[Candidate, Int, Float]:
+    """Return the sources that increase the evidence, after an update.
+
+    Parameters
+    ----------
+    predicted : Candidate
+        Predicted sources.
+    solve : callable
+        The tracker's method, for a batch of problems.
+
+    Returns
+    -------
+    candidate : Candidate
+        Estimates of the supported sources.
+    supported : ndarray of int
+        Their indices among the predicted ones.
+    evidence : ndarray, shape (n_sources,)
+        Log evidence with a source minus that without it; negative for unsupported sources.
+    """
+    evidence = np.zeros(len(predicted.u))
+    supported = np.arange(len(predicted.u))
+    candidate = solved(predicted, solve)
+    while len(supported):
+        without = [candidate.without(j) for j in range(len(supported))]
+        losses = np.array([candidate.log_evidence - other.log_evidence for other in without])
+        evidence[supported] = losses
+        j = int(losses.argmin())
+        if losses[j] > 0:
+            break
+        candidate = without[j]
+        supported = np.delete(supported, j)
+    return candidate, supported, evidence
+
+
+def solved(candidate: Candidate, solve: Solve) -> Candidate:
+    """Return the joint maximum that starts at the solution of a tracker's own method."""
+    if len(candidate.u) == 0:
+        return candidate
+    solution = solve(candidate.problem.take(None), candidate.u[None], candidate.theta[None])
+    return Candidate(candidate.problem, solution.u[0], solution.theta[0]).refitted()

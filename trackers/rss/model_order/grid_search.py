@@ -1,4 +1,4 @@
-"""Where one more source would explain most: a look at every place of a grid."""
+"""Grid search for one additional source."""
 
 from __future__ import annotations
 
@@ -9,16 +9,17 @@ import numpy as np
 
 from arrivals.measurement_models.signal_strength.path_loss import offsets
 from arrivals.trackers.rss.inference.joint_posterior import JointPosterior, Prior
+from arrivals.trackers.rss.settings import GridSearch
 from arrivals.typing import Float, Int
 
-CANDIDATES = 3  # minima over the grid that are followed
-ENOUGH = 2000  # sensors to look at a grid with, evenly taken from all
-CHUNK = 2_000_000  # numbers held at once while a grid is scanned
+MAX_MINIMA = 3  # minima over the grid that are refined
+MAX_SENSORS = 2000  # in a grid search, taken at equal spacing from all
+CHUNK_SIZE = 2_000_000  # numbers in one array of the grid search
 
 
 @dataclass(frozen=True, eq=False)
 class NewSourcePrior:
-    """What is known of a source that nobody has seen yet.
+    """Prior of a source that has not been detected yet.
 
     Parameters
     ----------
@@ -29,7 +30,7 @@ class NewSourcePrior:
     std : float
         Standard deviation of each coordinate, m.
     step : float
-        Of the grid on which it is looked for, m.
+        Step of the search grid, m.
     """
 
     mu: float
@@ -40,14 +41,9 @@ class NewSourcePrior:
 
     @classmethod
     def among(
-        cls,
-        sensors: Float,
-        mu: float,
-        v: float,
-        std: float | None = None,
-        step: float | None = None,
+        cls, sensors: Float, mu: float, v: float, search: GridSearch = GridSearch()
     ) -> NewSourcePrior:
-        """Return what sensors (n_sensors, 2) tell: sources may be where the sensors are.
+        """Return the prior of a source in the area of the sensors (n_sensors, 2).
 
         Examples
         --------
@@ -55,21 +51,22 @@ class NewSourcePrior:
         35.36
         """
         centre = sensors.mean(axis=0)
-        spread = float(np.sqrt(np.square(sensors - centre).mean()))
-        std = (spread if spread > 0 else 1.0) if std is None else std
+        std, step = search.area_std, search.grid_step
+        if std is None:
+            std = float(np.sqrt(np.square(sensors - centre).mean())) or 1.0
         return cls(mu, v, centre, std, std / 5 if step is None else step)
 
     @cached_property
     def grid(self) -> Float:
-        """Places to look at, (n_places, 2): the square of two standard deviations."""
+        """Positions of the grid, (n_points, 2): a square of two standard deviations each way."""
         n = int(np.ceil(2 * self.std / self.step))
         axis = self.step * np.arange(-n, n + 1)
         east, north = np.meshgrid(axis, axis)
         return np.asarray(self.centre + np.stack([east.ravel(), north.ravel()], axis=-1))
 
     @cached_property
-    def powers(self) -> Float:
-        """Log amplitudes to look for, Np: seven, three standard deviations either side."""
+    def log_amplitudes(self) -> Float:
+        """Log amplitudes of the grid, Np: seven, up to three standard deviations each way."""
         return np.asarray(self.mu + np.sqrt(self.v) * np.arange(-3.0, 4.0))
 
     def prior(self, n: int) -> Prior:
@@ -81,50 +78,49 @@ class NewSourcePrior:
         )  # fmt: skip
 
 
-def scan(
+def grid_search(
     problem: JointPosterior, log_sigma: Float, new: NewSourcePrior
 ) -> list[tuple[float, Float]]:
-    """Return log amplitudes and places of sources whose addition lowers Σ W r² most.
+    """Return log amplitudes and positions of sources whose addition lowers Σ W r² most.
 
     Parameters
     ----------
-    problem : Problem
+    problem : JointPosterior
         Without a batch axis.
     log_sigma : ndarray, shape (n_sensors,)
-        Levels without it; -inf for none.
-    new : Newcomers
-        Where to look.
+        Levels without the additional source, Np; -inf for none.
+    new : NewSourcePrior
+        Grid of positions and log amplitudes.
 
     Returns
     -------
     list of (float, ndarray of shape (2,))
-        The lowest minima over the grid, the lowest first.
+        The lowest local minima over the grid in ascending order.
     """
-    heard = np.flatnonzero(problem.W > 0)
-    heard = heard[:: max(1, len(heard) // ENOUGH)]
-    xi, W, floor = problem.xi[heard], problem.W[heard], 2 * log_sigma[heard]
-    field = problem.field
-    sensors = field.sensors[heard]
-    gain = np.zeros(len(problem.W)) + np.atleast_2d(field.log_gain)[0]
-    powers = 2 * new.powers[:, None] + 2 * gain[heard]
+    valid = np.flatnonzero(problem.W > 0)
+    valid = valid[:: max(1, len(valid) // MAX_SENSORS)]
+    xi, W, floor = problem.xi[valid], problem.W[valid], 2 * log_sigma[valid]
+    propagation = problem.propagation
+    sensors = propagation.sensors[valid]
+    gain = np.zeros(len(problem.W)) + np.atleast_2d(propagation.log_gain)[0]
+    powers = 2 * new.log_amplitudes[:, None] + 2 * gain[valid]
     cost = np.empty((len(new.grid), len(powers)))
-    size = max(1, CHUNK // powers.size)
+    size = max(1, CHUNK_SIZE // powers.size)
     for first in range(0, len(cost), size):
-        places = slice(first, first + size)
-        seen = offsets(new.grid[places], sensors, field.r_min)
-        loss = field.alpha * seen.log_range
+        points = slice(first, first + size)
+        loss = propagation.alpha * offsets(new.grid[points], sensors, propagation.r_min).log_range
         r = xi - 0.5 * np.logaddexp(floor, powers - loss[:, None])
-        cost[places] = (r * r) @ W
-    found = minima(cost.min(axis=1))[:CANDIDATES]
-    return [(float(new.powers[cost[k].argmin()]), new.grid[k]) for k in found]
+        cost[points] = (r * r) @ W
+    lowest = local_minima(cost.min(axis=1))[:MAX_MINIMA]
+    return [(float(new.log_amplitudes[cost[k].argmin()]), new.grid[k]) for k in lowest]
 
 
-def minima(cost: Float) -> Int:
-    """Return the indices of the local minima over a square grid, (n²,), the lowest first.
+def local_minima(cost: Float) -> Int:
+    """Return the indices of the local minima over a square grid, (n²,), in ascending order.
 
     Examples
     --------
-    >>> minima(np.array([1.0, 2.0, 3.0, 2.0, 3.0, 3.0, 3.0, 3.0, 0.0]))
+    >>> local_minima(np.array([1.0, 2.0, 3.0, 2.0, 3.0, 3.0, 3.0, 3.0, 0.0]))
     array([8, 0])
     """
     n = round(len(cost) ** 0.5)

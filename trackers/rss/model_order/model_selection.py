@@ -1,4 +1,4 @@
-"""Where sources are when nobody knows: found one by one, and counted by the Laplace evidence."""
+"""Number of sources by the Laplace evidence: forward selection and local search."""
 
 from __future__ import annotations
 
@@ -10,24 +10,27 @@ from math import lgamma, log, pi
 import numpy as np
 
 from arrivals.measurement_models.signal_strength.path_loss import Levels, PropagationModel
-from arrivals.trackers.rss.inference.joint_posterior import JointPosterior, Prior
-from arrivals.trackers.rss.inference.map_search import maximum
-from arrivals.trackers.rss.model_order.grid_search import NewSourcePrior, scan
+from arrivals.trackers.rss.inference.joint_posterior import JointPosterior, Prior, marginals
+from arrivals.trackers.rss.inference.map_search import maximize
+from arrivals.trackers.rss.inference.solution import Marginals, Solution
+from arrivals.trackers.rss.model_order.grid_search import NewSourcePrior, grid_search
 from arrivals.typing import Float, Int
 
-GAIN = 0.1  # least rise of the log evidence that is worth another round
+MIN_GAIN = 0.1  # of the log evidence by one change of the local search
 
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """Sources fitted to readings, and how well they explain them.
+    """A set of sources and its evidence.
 
     Parameters
     ----------
-    problem : Problem
+    problem : JointPosterior
         Without a batch axis.
     u : ndarray, shape (n_sources,)
+        Log amplitudes, Np.
     theta : ndarray, shape (n_sources, 2)
+        Positions, m.
     """
 
     problem: JointPosterior
@@ -36,14 +39,14 @@ class Candidate:
 
     @cached_property
     def levels(self) -> Levels:
-        """What the sources make at the sensors."""
-        return self.problem.field.levels(self.u, self.theta)
+        """Levels of the sources at the sensors."""
+        return self.problem.propagation.levels(self.u, self.theta)
 
     @cached_property
     def log_evidence(self) -> float:
-        """Laplace's approximation to log p(ξ | K), less the constant of the readings.
+        """Laplace's approximation to log p(ξ | K), without the constant of the readings.
 
-        -½q + log p(û, θ̂) + (3K/2) log 2π - ½ log|J|, the priors normalised.
+        -½q + log p(û, θ̂) + (3K/2) log 2π - ½ log|J|, with normalised priors.
         """
         K, prior = len(self.u), self.problem.prior
         q = float(self.problem.misfit(self.levels))
@@ -57,144 +60,172 @@ class Candidate:
 
     @cached_property
     def log_evidence_of_set(self) -> float:
-        """The same with log K!: sources that nothing tells apart may be numbered in any order.
+        """The evidence plus log K!, as the numbering of equal sources is arbitrary.
 
-        -inf if two are nearer to each other than the least range. Such a pair is one source; its
-        readings say nothing, to second order, of how far apart the two are, and Laplace's
-        Gaussian would take that for knowledge not needed.
+        -inf if two sources are closer to each other than the floor of the range. Such a pair is
+        one source: to second order the readings do not depend on their separation, and Laplace's
+        Gaussian would count it as a parameter without cost.
         """
-        _, nearest = neighbours(self.theta)
-        if (nearest < self.problem.field.r_min).any():
+        _, distance = nearest_sources(self.theta)
+        if (distance < self.problem.propagation.r_min).any():
             return -np.inf
         return self.log_evidence + lgamma(len(self.u) + 1)
 
     @property
     def log_likelihood(self) -> float:
-        """The evidence with the readings' constant, ½ Σ log(W/2π)."""
+        """The evidence with the constant of the readings, ½ Σ log(W/2π)."""
         W = self.problem.W[self.problem.W > 0]
         return self.log_evidence + 0.5 * float(np.log(W).sum() - len(W) * log(2 * pi))
 
+    @property
+    def solution(self) -> Solution:
+        """The sources as a solution with one batch axis."""
+        one = np.ones(1)
+        moments = Marginals(np.zeros(0), np.zeros((0, 2, 2)))
+        if len(self.u):
+            moments = marginals(self.problem.information(self.levels))
+        L = one * self.problem.log_posterior(self.u, self.theta, self.levels)
+        return Solution(
+            self.u[None], self.theta[None], Marginals(moments.v[None], moments.Sigma[None]), L, L,
+            one * self.log_likelihood, np.zeros(1, dtype=np.int64), one.astype(np.bool_),
+        )  # fmt: skip
+
     def refitted(self) -> Candidate:
-        """Return the joint maximum from here."""
+        """Return the joint maximum that starts here."""
         if len(self.u) == 0:
             return self
-        found = maximum(self.problem, self.u, self.theta)
-        return Candidate(self.problem, found.u, found.theta)
+        maximum = maximize(self.problem, self.u, self.theta)
+        return Candidate(self.problem, maximum.u, maximum.theta)
 
     def part(self, rows: Int) -> Candidate:
-        """Return some of the sources, as they are."""
+        """Return some of the sources, unchanged."""
         problem = self.problem._replace(prior=self.problem.prior.take(rows))
         return Candidate(problem, self.u[rows], self.theta[rows])
 
     def without(self, j: int) -> Candidate:
-        """Return the fit without one source, the others refitted."""
+        """Return the candidate without one source, the others refitted."""
         return self.part(np.delete(np.arange(len(self.u)), j)).refitted()
 
     def enlarged(self, new: NewSourcePrior) -> Candidate:
-        """Return the fit with the source added that lowers Σ W r² most, all refitted.
+        """Return the candidate with the source added that lowers Σ W r² most, all refitted.
 
-        The lowest few minima over the grid are tried: near a sensor there are several.
+        The lowest minima over the grid are all tried: near a sensor there are several.
         """
         prior = Prior(*(
             np.concatenate(parts) for parts in zip(self.problem.prior, new.prior(1), strict=True)
         ))  # fmt: skip
         problem = self.problem._replace(prior=prior)
-        places = scan(self.problem, self.levels.log_sigma, new)
-        fits = [Candidate(problem, np.append(self.u, u), np.vstack([self.theta, theta])).refitted()
-                for u, theta in places]  # fmt: skip
-        return max(fits, key=lambda fit: fit.log_evidence)
+        candidates = [
+            Candidate(problem, np.append(self.u, u), np.vstack([self.theta, theta])).refitted()
+            for u, theta in grid_search(self.problem, self.levels.log_sigma, new)
+        ]
+        return max(candidates, key=lambda candidate: candidate.log_evidence)
 
 
-def nothing(field: PropagationModel, xi: Float, W: Float) -> Candidate:
-    """Return the fit of no source at all."""
+def no_source(propagation: PropagationModel, xi: Float, W: Float) -> Candidate:
+    """Return the candidate without a source, for readings and weights (n_sensors,)."""
     prior = Prior(np.zeros(0), np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2, 2)))
-    return Candidate(JointPosterior(field, xi, W, prior), prior.mu, prior.theta)
+    return Candidate(JointPosterior(propagation, xi, W, prior), prior.mu, prior.theta)
 
 
-def grown(
-    field: PropagationModel,
-    xi: Float,
-    W: Float,
-    new: NewSourcePrior,
-    n: int,
-    patience: int | None = None,
+def forward_selection(
+    empty: Candidate, new: NewSourcePrior, n: int, patience: int | None = None
 ) -> list[Candidate]:
-    """Return the fits of 0 to n sources, each the last one with a source added.
+    """Return candidates of 0 to n sources, each the previous one with a source added.
 
-    With a `patience`, growing ends when that many additions have not raised the evidence.
+    Parameters
+    ----------
+    empty : Candidate
+        The candidate without a source.
+    new : NewSourcePrior
+    n : int
+        Largest number of sources.
+    patience : int, optional
+        Number of additions in a row without an increase of the evidence that ends the selection;
+        no end before n if None.
+
+    Returns
+    -------
+    list of Candidate
 
     Examples
     --------
     >>> from arrivals.measurement_models.signal_strength.path_loss import PropagationModel
     >>> rng = np.random.default_rng(0)
-    >>> field = PropagationModel(rng.uniform(-100.0, 100.0, (60, 2)), log_noise=4.6)
+    >>> model = PropagationModel(rng.uniform(-100.0, 100.0, (60, 2)), log_noise=4.6)
     >>> truth = np.array([[-40.0, 10.0], [30.0, 50.0]])
-    >>> xi = field.levels(np.array([9.0, 9.2]), truth).log_sigma
-    >>> new = NewSourcePrior.among(field.sensors, mu=9.2, v=0.12)
-    >>> found = best(grown(field, xi, np.full(60, 200.0), new, 3), new)
-    >>> found.theta[np.argsort(found.theta[:, 0])].round(0)
+    >>> xi = model.levels(np.array([9.0, 9.2]), truth).log_sigma
+    >>> new = NewSourcePrior.among(model.sensors, mu=9.2, v=0.12)
+    >>> empty = no_source(model, xi, np.full(60, 200.0))
+    >>> best = best_model(forward_selection(empty, new, 3), new)
+    >>> best.theta[np.argsort(best.theta[:, 0])].round(0)
     array([[-40.,  10.],
            [ 30.,  50.]])
     """
-    fits = [nothing(field, xi, W)]
-    while len(fits) <= n:
-        evidence = [fit.log_evidence_of_set for fit in fits]
-        if patience is not None and len(fits) - 1 - int(np.argmax(evidence)) >= patience:
+    candidates = [empty]
+    while len(candidates) <= n:
+        evidence = [candidate.log_evidence_of_set for candidate in candidates]
+        if patience is not None and len(candidates) - 1 - int(np.argmax(evidence)) >= patience:
             break
-        fits.append(fits[-1].enlarged(new))
-    return fits
+        candidates.append(candidates[-1].enlarged(new))
+    return candidates
 
 
-def best(fits: list[Candidate], new: NewSourcePrior) -> Candidate:
-    """Return the fit of the largest evidence, then changed as long as that raises it.
+def best_model(candidates: list[Candidate], new: NewSourcePrior) -> Candidate:
+    """Return the candidate of the largest evidence after a local search over all changes."""
+    best = max(candidates, key=lambda candidate: candidate.log_evidence_of_set)
+    return local_search(best, new, same_number=False)
 
-    Growing one by one ends in basins where several sources share what is one's, or one has what
-    is several's. The changes: drop a source; put one in place of two neighbours; take one out and
-    look for it again.
+
+def local_search(candidate: Candidate, new: NewSourcePrior, same_number: bool) -> Candidate:
+    """Change a candidate as long as that increases the evidence.
+
+    Forward selection ends in local maxima where several sources share the place of one, or one
+    stands for several. A change removes a source, replaces two near ones by one, or removes one
+    and searches for it again.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    new : NewSourcePrior
+    same_number : bool
+        Whether a source is added for each one removed.
+
+    Returns
+    -------
+    Candidate
     """
-    return _climbed(max(fits, key=lambda fit: fit.log_evidence_of_set), new, same_number=False)
-
-
-def refined(fit: Candidate, new: NewSourcePrior) -> Candidate:
-    """Return a fit of as many sources, changed as long as that raises the evidence."""
-    return _climbed(fit, new, same_number=True)
-
-
-def _climbed(fit: Candidate, new: NewSourcePrior, same_number: bool) -> Candidate:
     while True:
-        least = fit.log_evidence_of_set + GAIN
-        others = changes(fit, new, same_number)
-        better = next((other for other in others if other.log_evidence_of_set > least), None)
+        wanted = candidate.log_evidence_of_set + MIN_GAIN
+        changed = changes(candidate, new, same_number)
+        better = next((other for other in changed if other.log_evidence_of_set > wanted), None)
         if better is None:
-            return fit
-        fit = better
+            return candidate
+        candidate = better
 
 
-def changes(fit: Candidate, new: NewSourcePrior, same_number: bool) -> Iterator[Candidate]:
-    """Give fits with one source dropped, two merged, or one looked for again.
-
-    With `same_number`, a source is added for one dropped or merged.
-    """
-    fewer = [fit.without(j) for j in range(len(fit.u))]
+def changes(candidate: Candidate, new: NewSourcePrior, same_number: bool) -> Iterator[Candidate]:
+    """Yield candidates with one source removed, two merged, or one searched for again."""
+    fewer = [candidate.without(j) for j in range(len(candidate.u))]
     if not same_number:
         yield from sorted(fewer, key=lambda other: -other.log_evidence_of_set)
-    near, _ = neighbours(fit.theta)
+    near, _ = nearest_sources(candidate.theta)
     for j, k in sorted({(min(j, k), max(j, k)) for j, k in enumerate(near.tolist())}):
         merged = fewer[k].without(j).enlarged(new)
         yield merged.enlarged(new) if same_number else merged
     yield from (other.enlarged(new) for other in fewer)
 
 
-def neighbours(theta: Float) -> tuple[Int, Float]:
-    """Return for each of some places, (n, 2), the number and distance of the nearest other one.
+def nearest_sources(theta: Float) -> tuple[Int, Float]:
+    """Return index and distance of the nearest other source, for positions (n, 2).
 
     Examples
     --------
-    >>> neighbours(np.array([[0.0, 0.0], [3.0, 4.0], [3.0, 5.0]]))
+    >>> nearest_sources(np.array([[0.0, 0.0], [3.0, 4.0], [3.0, 5.0]]))
     (array([1, 2, 1]), array([5., 1., 1.]))
     """
     if len(theta) < 2:
         return np.zeros(0, dtype=np.int64), np.zeros(0)
-    apart = np.linalg.norm(theta[:, None] - theta, axis=-1)
-    np.fill_diagonal(apart, np.inf)
-    return apart.argmin(axis=1), np.asarray(apart.min(axis=1))
+    distance = np.linalg.norm(theta[:, None] - theta, axis=-1)
+    np.fill_diagonal(distance, np.inf)
+    return distance.argmin(axis=1), np.asarray(distance.min(axis=1))
