@@ -21,7 +21,7 @@ from tqdm import tqdm
 
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.motion_models import BernoulliVonMises
-from arrivals.recordings.framing import looks
+from arrivals.recordings.framing import frame_recording
 from arrivals.recordings.recording import Recording
 from arrivals.scenarios import Trial, create, mean_gospa
 from arrivals.scenarios.demos.infrasound import brp2012, tracker
@@ -195,8 +195,8 @@ def yka2012(folder: Path) -> None:
     data = np.load(folder / "yka2012" / "yka_2012-08-14.npz")
     array = SensorArray(1000 * data["position_km"][:, ::-1], speed=1000.0)  # x north, y east
     samples = data["x"] - data["x"].mean(axis=0)
-    frames = looks(Recording(samples, 20.0, array=array), (0.5, 1.0, 1.5), window=80, hop=20,
-                   n_snapshots=7, stride=5)  # fmt: skip
+    recording = Recording(samples, 20.0, array=array)
+    frames = frame_recording(recording, (0.5, 1.0, 1.5), window=80, hop=20, n_snapshots=7, stride=5)
     steps, after = frames.values[:, :, ::2], frames.time - 72
     model = ArraySnapshot(array, [2000.0, 1000.0, 2000 / 3], n_snapshots=4,
                           slowness=np.linspace(0.03, 0.15, 10).tolist())  # fmt: skip

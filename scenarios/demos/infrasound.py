@@ -11,7 +11,7 @@ import numpy as np
 
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.motion_models import BernoulliVonMises
-from arrivals.recordings.framing import looks
+from arrivals.recordings.framing import frame_recording
 from arrivals.recordings.readers import read
 from arrivals.scenarios.demos.comparison import MethodComparison
 from arrivals.trackers import CBF, SVALSE, VALSE, NewtonSolver, Tracker
@@ -49,7 +49,7 @@ def brp2012() -> tuple[ArraySnapshot, Complex, Float]:
         array = SensorArray.from_toml(path)
     with as_file(files("arrivals.scenarios") / "data" / "brp2012.npz") as path:
         recording = read(path, array=array, variable="samples")
-    steps = looks(recording, FREQUENCIES, window=125, hop=62, n_snapshots=3, stride=2)
+    steps = frame_recording(recording, FREQUENCIES, window=125, hop=62, n_snapshots=3, stride=2)
     measurement = ArraySnapshot(
         array,
         [array.wavelength(f) for f in FREQUENCIES],

@@ -11,13 +11,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     Parameters
     ----------
     argv : sequence of str, optional
-        The arguments; those of the process if None.
+        Arguments; those of the process if None.
 
     Returns
     -------
     int
-        0; 2 for bad input, told in one line on standard error; 130 when interrupted. A reader
-        that closes our standard output ends the program quietly, with status 0.
+        0; 2 for invalid input, with one line on standard error; 130 after an interrupt. If the
+        reader of standard output closes it, the program ends with status 0.
 
     Examples
     --------
@@ -44,7 +44,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def message(error: Exception) -> str:
-    """Return what went wrong in one line.
+    """Return the message of an error in one line.
 
     Examples
     --------
@@ -65,10 +65,10 @@ def _flush_output() -> None:
 
 
 def _drop_output() -> None:
-    """Send what is still buffered nowhere, so that the interpreter's last flush is silent."""
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, sys.stdout.fileno())
-    os.close(nowhere)
+    """Redirect standard output to the null device, so that the last flush raises no error."""
+    null = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, sys.stdout.fileno())
+    os.close(null)
 
 
 if __name__ == "__main__":

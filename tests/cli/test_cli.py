@@ -16,7 +16,7 @@ from arrivals.scenarios.demos.swellex96 import demo
 from arrivals.trackers import available
 
 
-def test_a_moving_source_in_a_wav_is_tracked_within_a_degree_under_one_label(
+def test_track_of_a_moving_source_has_one_label_within_a_degree(
     scene: Path, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(track(scene, "--out", "tracks.csv", "--plot", "tracks.png")) == 0
@@ -31,7 +31,7 @@ def test_a_moving_source_in_a_wav_is_tracked_within_a_degree_under_one_label(
     assert sorted(os.listdir(here)) == ["tracks.csv", "tracks.png"]
 
 
-def test_without_out_the_table_goes_to_standard_output(
+def test_track_without_out_prints_the_table(
     scene: Path, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(track(scene, "--tracker", "cbf")) == 0
@@ -41,7 +41,7 @@ def test_without_out_the_table_goes_to_standard_output(
     assert printed.startswith(HEADING + "\n")
 
 
-def test_progress_is_shown_on_a_terminal_and_not_if_it_is_not_wanted(
+def test_track_shows_progress_on_a_terminal_unless_quiet(
     scene: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
@@ -51,7 +51,7 @@ def test_progress_is_shown_on_a_terminal_and_not_if_it_is_not_wanted(
     assert capsys.readouterr().err == ""
 
 
-def test_parameters_are_set_by_nested_names(
+def test_track_sets_parameters_by_nested_names(
     scene: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(track(scene, "--tracker", "cbf", "--set", "max_sources=1")) == 0
@@ -62,7 +62,7 @@ def test_parameters_are_set_by_nested_names(
     assert main(track(scene, *settings)) == 0
 
 
-def test_complex_snapshots_of_a_file_need_no_rate_and_their_time_is_kept(
+def test_track_of_complex_snapshots_keeps_their_times(
     scene: Path, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     array = SensorArray.ula(8, 0.17, speed=343.0)
@@ -80,7 +80,7 @@ def test_complex_snapshots_of_a_file_need_no_rate_and_their_time_is_kept(
 
 
 @pytest.mark.parametrize("name", SUBSPACE)
-def test_subspace_methods_track_with_the_number_of_sources_given(
+def test_track_by_subspace_methods_with_given_number_of_sources(
     scene: Path, name: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     more = ("--tracker", name, "--set", "n_sources=1", "--set", "forgetting=0.5")
@@ -92,7 +92,7 @@ def test_subspace_methods_track_with_the_number_of_sources_given(
     assert "n_sources must be at most 7" in capsys.readouterr().err
 
 
-def test_silence_holds_no_sources_and_makes_no_noise(
+def test_track_of_zeros_detects_no_source_without_warnings(
     scene: Path, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     wavfile.write(here / "silence.wav", RATE, np.zeros((2000, 8), "<i2"))
@@ -104,7 +104,7 @@ def test_silence_holds_no_sources_and_makes_no_noise(
         assert (here / "t.csv").read_text() == HEADING + "\n"
 
 
-def test_a_sensor_without_finite_samples_is_left_out(
+def test_track_leaves_out_a_sensor_without_finite_samples(
     scene: Path, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     samples = pressure(np.full(1000, 12.0))
@@ -122,7 +122,7 @@ def test_list_names_all_trackers_and_scenarios(capsys: pytest.CaptureFixture[str
     assert "Peaks of the conventional beamformer" in listed
 
 
-def test_the_demo_leaves_a_table_of_each_tracker_and_a_picture(
+def test_demo_writes_a_table_of_each_tracker_and_a_picture(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     demo(tmp_path / "new" / "folder", n_steps=10)
@@ -157,7 +157,7 @@ def band(here: Path) -> Path:
 BAND = ("--array", "line.toml", "--band", "600", "1400", "--tracker", "interpolation_ekf")
 
 
-def test_a_band_is_tracked_sample_by_sample_from_a_wav_and_from_a_stream(
+def test_track_of_a_band_is_equal_for_wav_and_stream(
     band: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     job = [*BAND, "--snr", "15", "--hop", "100", "--quiet"]
@@ -175,34 +175,37 @@ def test_a_band_is_tracked_sample_by_sample_from_a_wav_and_from_a_stream(
 
 
 @pytest.mark.parametrize(
-    ("more", "told"),
+    ("more", "message"),
     [
-        (("--frequency", "1000"), "--frequency goes with snapshots, not with --band"),
-        (("--window", "64"), "--window goes with snapshots"),
-        (("--snapshots", "3"), "--snapshots goes with snapshots"),
-        (("--tracker", "mvdr", "--frequencies", "700"), "give one of --frequency, --frequencies"),
+        (("--frequency", "1000"), "--frequency requires snapshots"),
+        (("--window", "64"), "--window requires snapshots"),
+        (("--snapshots", "3"), "--snapshots requires snapshots"),
+        (
+            ("--tracker", "mvdr", "--frequencies", "700"),
+            "pass only one of --frequency, --frequencies",
+        ),
         (("--tracker", "mvdr"), "mvdr takes one snapshot a step"),
         (("--tracker", "svalse", "--band", "600", "2500"), "half the rate, 2000 Hz"),
         (("--band", "600", "3000"), "half the rate, 2000 Hz"),
-        (("--tracker", "ekf"), "is made from motion, measurement, x, P, not from an array file"),
+        (("--tracker", "ekf"), "requires motion, measurement, x, P, not an array file"),
         (("--set", "variant=Z"), "variant must be one of 'B'"),
     ],
 )
-def test_what_does_not_go_with_a_band_is_refused(
-    band: Path, more: tuple[str, ...], told: str, capsys: pytest.CaptureFixture[str]
+def test_track_of_a_band_with_invalid_arguments_is_refused(
+    band: Path, more: tuple[str, ...], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["track", "band.wav", *BAND, "--out", "t.csv", *more]) == 2
     error = capsys.readouterr().err
-    assert told in error
+    assert message in error
     assert error.count("\n") == 1
     assert not Path("t.csv").exists()
 
 
-def test_neither_frequency_nor_band_is_an_error(
+def test_track_without_frequency_and_band_is_refused(
     band: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["track", "band.wav", "--array", "line.toml"]) == 2
-    assert "give --frequency, or --band" in capsys.readouterr().err
+    assert "pass --frequency, or --band" in capsys.readouterr().err
 
 
 def test_reproduce_writes_table_page_and_pictures(

@@ -10,8 +10,8 @@ import pytest
 from command_line import (
     ARRAY,
     RATE,
-    refused,
-    shell,
+    assert_rejected,
+    run_cli,
     track,
 )
 from scipy.io import wavfile
@@ -35,30 +35,30 @@ OUT = ("--out", "tracks.csv", "--plot", "tracks.png")
         (("--set", "merge"), ("NAME=VALUE",)),
         (("--set", "solver__tolerance=small"), ("tolerance must be a number; got 'small'",)),
         (("--window", "1"), ("window must be at least 2",)),
-        (("--window", "100000"), ("one window takes 100000",)),
+        (("--window", "100000"), ("one window requires 100000",)),
         (("--hop", "0"), ("hop must be at least 1",)),
         (("--out", "nowhere/tracks.csv"), ("nowhere: the folder does not exist",)),
         (("--plot", "nowhere/tracks.png"), ("nowhere: the folder does not exist",)),
         (("--plot", "tracks.xyz"), (".png", "'.xyz'")),
         (("--out", "."), ("this is a folder",)),
-        (("--variable", "z"), ("variable is for npz and mat",)),
-        (("--dtype", "int16"), ("--dtype goes with samples from standard input",)),
+        (("--variable", "z"), ("variable must be None except for npz and mat",)),
+        (("--dtype", "int16"), ("--dtype requires samples from standard input",)),
         (("--frobnicate",), ("unrecognized arguments",)),
     ],
 )
-def test_a_wrong_argument_is_told_in_one_line(
+def test_track_invalid_argument_prints_one_line(
     arguments: tuple[str, ...], words: tuple[str, ...], scene: Path, here: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
-    refused(track(scene, *OUT, *arguments), capsys, here, *words)
+    assert_rejected(track(scene, *OUT, *arguments), capsys, here, *words)
 
 
-def test_nyquist_is_named_where_the_array_would_allow_more(
+def test_track_frequency_above_nyquist_is_refused(
     scene: Path, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (here / "fine.toml").write_text(ARRAY.replace("0.17", "0.01"))
     arguments = track(scene, *OUT, "--frequency", "4500", array=str(here / "fine.toml"))
-    refused(arguments, capsys, here, "frequency", "4000 Hz", "got 4500 Hz")
+    assert_rejected(arguments, capsys, here, "frequency", "4000 Hz", "got 4500 Hz")
 
 
 @pytest.mark.parametrize(
@@ -81,12 +81,12 @@ def test_nyquist_is_named_where_the_array_would_allow_more(
         ),
     ],
 )
-def test_a_wrong_array_file_is_told_in_one_line(
+def test_track_invalid_array_file_prints_one_line(
     toml: str, words: tuple[str, ...], scene: Path, here: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
     (here / "array.toml").write_text(toml)
-    refused(track(scene, *OUT, array=str(here / "array.toml")), capsys, here, *words)
+    assert_rejected(track(scene, *OUT, array=str(here / "array.toml")), capsys, here, *words)
 
 
 def write_wav(path: Path, samples: Any) -> None:
@@ -97,14 +97,14 @@ def write_wav(path: Path, samples: Any) -> None:
     ("name", "content", "words"),
     [
         ("empty.wav", b"", ("empty.wav: the file is empty",)),
-        ("short.wav", np.zeros((100, 8), "<i2"), ("one window takes 256",)),
+        ("short.wav", np.zeros((100, 8), "<i2"), ("one window requires 256",)),
         ("nan.wav", np.full((1000, 8), np.nan, "<f4"), ("no sample of the recording is finite",)),
         ("narrow.wav", np.zeros((1000, 3), "<i2"), ("must have 8 channels; got 3",)),
         ("absent.wav", None, ("absent.wav", "No such file")),
         ("tow.ogg", b"OggS", ("suffix must be one of",)),
     ],
 )
-def test_a_wrong_recording_is_told_in_one_line(
+def test_track_invalid_recording_prints_one_line(
     name: str, content: Any, words: tuple[str, ...], scene: Path, here: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
@@ -113,95 +113,95 @@ def test_a_wrong_recording_is_told_in_one_line(
     elif content is not None:
         write_wav(here / name, content)
     arguments = track(here, *OUT, file=name, array=str(scene / "array.toml"))
-    refused(arguments, capsys, here, *words)
+    assert_rejected(arguments, capsys, here, *words)
 
 
-def test_a_truncated_recording_is_told_in_one_line(
+def test_track_truncated_recording_prints_one_line(
     scene: Path, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (here / "cut.wav").write_bytes((scene / "tow.wav").read_bytes()[:-1000])
     arguments = track(here, *OUT, file="cut.wav", array=str(scene / "array.toml"))
-    refused(arguments, capsys, here, "cut.wav: truncated")
+    assert_rejected(arguments, capsys, here, "cut.wav: truncated")
 
 
-def test_the_array_s_own_channels_must_hold_something_finite(
+def test_track_without_finite_samples_of_the_array_is_refused(
     scene: Path, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     samples = np.zeros((1000, 9), "<f4")
     samples[:, :8] = np.nan
-    write_wav(here / "deaf.wav", samples)
+    write_wav(here / "invalid.wav", samples)
     (here / "array.toml").write_text(ARRAY.replace("= 8", "= 9") + "missing = [9]\n")
-    arguments = track(here, *OUT, file="deaf.wav")
-    refused(arguments, capsys, here, "no sample of the recording is finite")
+    arguments = track(here, *OUT, file="invalid.wav")
+    assert_rejected(arguments, capsys, here, "no sample of the recording is finite")
 
 
 @pytest.mark.parametrize(
     ("raw", "arguments", "words"),
     [
-        (b"", (), ("ended after 0 frames", "one window takes 256")),
+        (b"", (), ("ended after 0 frames", "one window requires 256")),
         (b"\0" * 16 * 255, (), ("ended after 255 frames",)),
         (np.full((300, 8), np.nan, "<f4").tobytes(), ("--dtype", "float32"), ("finite",)),
         (b"", ("--dtype", "complex64"), ("ended after 0 frames",)),
-        (b"", ("--dtype", "complex64", "--hop", "5"), ("no window or hop",)),
+        (b"", ("--dtype", "complex64", "--hop", "5"), ("window and hop must be None",)),
         (b"", ("--dtype", "int24"), ("invalid choice: 'int24'",)),
         (b"", ("--rate", "1500"), ("750 Hz", "got 1000 Hz")),
         (b"", ("--channels", "7"), ("must have 8 channels; got 7",)),
         (b"", ("--channels", "0"), ("channels must be at least 1",)),
-        (b"", ("--plot", "tracks.png"), ("--plot goes with a file",)),
-        (b"", ("--transpose",), ("--transpose goes with a file",)),
+        (b"", ("--plot", "tracks.png"), ("--plot requires a file",)),
+        (b"", ("--transpose",), ("--transpose requires a file",)),
     ],
 )
-def test_a_wrong_stream_is_told_in_one_line(
+def test_track_invalid_stream_prints_one_line(
     raw: bytes, arguments: tuple[str, ...], words: tuple[str, ...], scene: Path, here: Path,
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
     monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(raw)))
     live = track(scene, "--rate", str(RATE), "--out", "live.csv", *arguments, file="-")
-    refused(live, capsys, here, *words)
+    assert_rejected(live, capsys, here, *words)
 
 
-def test_a_stream_wants_a_rate_and_channels_that_are_known(
+def test_track_of_a_stream_requires_rate_and_channels(
     scene: Path, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    refused(track(scene, file="-"), capsys, here, "want a rate")
+    assert_rejected(track(scene, file="-"), capsys, here, "require a rate")
     (here / "array.toml").write_text(ARRAY + "channels = [1, 3, 5, 7, 9, 11, 13, 15]\n")
     live = track(here, "--rate", str(RATE), file="-")
-    refused(live, capsys, here, "pass --channels")
+    assert_rejected(live, capsys, here, "pass --channels")
 
 
 @pytest.mark.parametrize("arguments", [[], ["fly"], ["track"], ["demo", "--out"]])
-def test_a_wrong_command_is_told_in_one_line(
+def test_cli_invalid_command_prints_one_line(
     arguments: list[str], here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    refused(arguments, capsys, here)
+    assert_rejected(arguments, capsys, here)
 
 
-def test_a_demo_that_cannot_make_its_folder_is_told_in_one_line(
+def test_demo_without_folder_prints_one_line(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (here / "taken").write_text("")
-    refused(["demo", "--out", "taken"], capsys, here, "taken: ")
+    assert_rejected(["demo", "--out", "taken"], capsys, here, "taken: ")
 
 
-def test_an_error_keeps_what_was_there_before(
+def test_track_after_an_error_keeps_the_old_file(
     scene: Path, here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (here / "tracks.csv").write_text("of yesterday")
     monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(b"\0" * 100)))
     live = track(scene, "--rate", str(RATE), "--out", "tracks.csv", file="-")
-    refused(live, capsys, here, "ended after")
+    assert_rejected(live, capsys, here, "ended after")
     assert (here / "tracks.csv").read_text() == "of yesterday"
 
 
-def test_the_shell_sees_status_and_line(scene: Path, here: Path) -> None:
-    done = shell(track(scene, "--tracker", "nobody", "--out", "tracks.csv"))
+def test_cli_error_has_status_2_and_one_line(scene: Path, here: Path) -> None:
+    done = run_cli(track(scene, "--tracker", "unknown", "--out", "tracks.csv"))
     assert done.returncode == 2
     assert done.stdout == b""
     assert done.stderr.count(b"\n") == 1
-    assert done.stderr.startswith(b"arrivals: there is no tracker 'nobody'")
+    assert done.stderr.startswith(b"arrivals: there is no tracker 'unknown'")
 
 
-def test_an_interrupt_is_status_130_and_leaves_no_file(
+def test_interrupt_has_status_130_and_leaves_no_file(
     scene: Path, here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def interrupted(*_: Any, **__: Any) -> None:
@@ -213,7 +213,7 @@ def test_an_interrupt_is_status_130_and_leaves_no_file(
     assert os.listdir(here) == []
 
 
-def test_an_output_never_takes_the_place_of_an_input(
+def test_output_equal_to_an_input_is_refused(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     np.save("in.npy", np.ones((4, 4), complex))

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import refused, table
+from command_line import assert_rejected, table
 from scipy.io import wavfile
 
 from arrivals.__main__ import main
@@ -49,7 +49,7 @@ def plane(here: Path) -> Path:
     ],
 )
 @pytest.mark.parametrize("tracker", ["svalse", "cbf"])
-def test_a_source_around_a_plane_array_is_tracked(
+def test_track_of_a_planar_array_follows_the_azimuth(
     plane: Path, kind: str, looks: tuple[str, ...], n_steps: int, tracker: str,
     capsys: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
@@ -74,7 +74,7 @@ def test_a_source_around_a_plane_array_is_tracked(
         ("--band", "450", "850", "--window", "200", "--hop", "111", "--snapshots", "2"),
     ],
 )
-def test_a_stream_of_several_looks_gives_the_numbers_of_the_file(
+def test_stream_of_several_bins_and_snapshots_equals_the_file(
     plane: Path, looks: tuple[str, ...], capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
@@ -95,33 +95,38 @@ def test_a_stream_of_several_looks_gives_the_numbers_of_the_file(
         (("--frequencies", "500", "-5"), ("frequency must be finite and positive",)),
         (("--band", "450", "2100"), ("half the rate, 2000 Hz", "450 and 2100")),
         (("--band", "850", "450"), ("got 850 and 450",)),
-        (("--frequency", "500", "--band", "450", "850"), ("give one of --frequency",)),
+        (("--frequency", "500", "--band", "450", "850"), ("pass only one of --frequency",)),
         (("--frequency", "500", "--snapshots", "0"), ("snapshots must be at least 1",)),
-        (("--frequency", "500", "--snapshots", "99"), ("16 snapshots; one step takes 99",)),
+        (("--frequency", "500", "--snapshots", "99"), ("16 snapshots; one step requires 99",)),
         (("--frequencies", "500", "700", "--tracker", "mvdr"), ("mvdr takes one snapshot a step",)),
     ],
 )
-def test_what_does_not_fit_several_looks_is_told_in_one_line(
+def test_track_of_several_bins_with_invalid_arguments_prints_one_line(
     plane: Path, arguments: tuple[str, ...], words: tuple[str, ...],
     capsys: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
     job = ["track", "plane.wav", "--array", "uca.toml", "--out", "t.csv"]
-    refused([*job, *arguments], capsys, plane, *words)
+    assert_rejected([*job, *arguments], capsys, plane, *words)
 
 
-def test_a_stream_that_ends_within_its_first_step_is_told(
+def test_stream_shorter_than_one_step_is_refused(
     plane: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     job = ["track", "-", "--array", "uca.toml", "--rate", "4000", "--dtype", "float32"]
     several = ["--frequencies", "500", "700", "--snapshots", "9"]
     monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(bytes(6 * 4 * 600))))
-    refused([*job, *several], capsys, plane, "ended after 2 windows; one step takes 9")
+    assert_rejected([*job, *several], capsys, plane, "ended after 2 windows; one step requires 9")
     monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(b"")))
     complex_frames = ["--dtype", "complex64", "--frequencies", "500", "700"]
-    refused([*job, *complex_frames], capsys, plane, "complex frames are snapshots already")
+    assert_rejected(
+        [*job, *complex_frames],
+        capsys,
+        plane,
+        "frequencies must be one for a stream of complex frames",
+    )
 
 
-def test_directions_that_look_alike_are_told_once(
+def test_ambiguous_directions_print_one_warning(
     plane: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     text = 'kind = "positions"\nspeed = 343.0\npositions = [[0, 0], [0, 1], [1, 0], [1, 1]]\n'
@@ -130,13 +135,13 @@ def test_directions_that_look_alike_are_told_once(
     wavfile.write("square.wav", 4000, samples)
     job = ["track", "square.wav", "--array", "square.toml", "--frequency", "400", "--out", "t.csv"]
     assert main(job) == 0
-    told = capsys.readouterr().err
-    assert told.count("\n") == 1
-    assert told.startswith("arrivals: warning: directions ")
-    assert "are ambiguous: they have the same response at every frequency" in told
+    message = capsys.readouterr().err
+    assert message.count("\n") == 1
+    assert message.startswith("arrivals: warning: directions ")
+    assert "are ambiguous: they have the same response at every frequency" in message
 
 
-def test_the_infrasound_demo_finds_silence_and_both_sources(
+def test_infrasound_demo_detects_both_sources_and_none_before(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """What several estimators agree on: 320, 250 and 321 degrees from north, or wind alone."""

@@ -1,4 +1,4 @@
-"""The command line on samples as they come."""
+"""Command line on streams."""
 
 import io
 import signal
@@ -8,14 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import FREQUENCY, HEADING, RATE, SHELL, WINDOW, pressure, shell, table, track
+from command_line import FREQUENCY, HEADING, RATE, SHELL, WINDOW, pressure, run_cli, table, track
 from scipy.io import wavfile
 
 from arrivals.__main__ import main
 from arrivals.measurement_models import SensorArray
 
 
-def test_a_stream_gives_the_numbers_of_the_file_and_drops_the_tail(
+def test_stream_equals_the_file_and_drops_an_incomplete_frame(
     scene: Path, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     windows = ("--window", "300", "--hop", "170")
@@ -23,10 +23,10 @@ def test_a_stream_gives_the_numbers_of_the_file_and_drops_the_tail(
     expected = capsys.readouterr().out
     live = track(scene, *windows, "--rate", str(RATE), file="-")
     raw = (scene / "tow.raw").read_bytes()
-    done = shell(live, input=raw + b"\x01\x02\x03")
+    done = run_cli(live, input=raw + b"\x01\x02\x03")
     assert (done.returncode, done.stderr) == (0, b"")
     assert done.stdout.decode() == expected
-    done = shell([*live, "--out", "live.csv"], input=raw)
+    done = run_cli([*live, "--out", "live.csv"], input=raw)
     assert (done.returncode, done.stdout) == (0, b"")
     assert (here / "live.csv").read_text() == expected
 
@@ -34,7 +34,7 @@ def test_a_stream_gives_the_numbers_of_the_file_and_drops_the_tail(
 @pytest.mark.parametrize(
     ("dtype", "hop"), [("int32", 512), ("float32", 100), ("float64", 256), ("int16", 999)]
 )
-def test_every_type_of_sample_and_any_hop_gives_what_the_file_gives(
+def test_stream_of_any_type_and_hop_equals_the_file(
     dtype: str, hop: int, scene: Path, here: Path,
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
@@ -53,7 +53,7 @@ def test_every_type_of_sample_and_any_hop_gives_what_the_file_gives(
 
 
 @pytest.mark.parametrize("dtype", ["complex64", "complex128"])
-def test_each_complex_frame_is_a_snapshot(
+def test_stream_of_complex_frames_has_one_snapshot_per_frame(
     dtype: str, scene: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     array = SensorArray.ula(8, 0.17, speed=343.0)
@@ -67,18 +67,22 @@ def test_each_complex_frame_is_a_snapshot(
     np.testing.assert_allclose([float(row["doa_deg"]) for row in rows], [5, 6], atol=0.5)
 
 
+def start(scene: Path) -> subprocess.Popen[bytes]:
+    arguments = track(scene, "--rate", str(RATE), file="-")
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    return subprocess.Popen([*SHELL, *arguments], **pipes)  # type: ignore[call-overload, no-any-return]
+
+
 @pytest.fixture
 def live(scene: Path) -> Iterator[subprocess.Popen[bytes]]:
     """Start a live tracker."""
-    arguments = track(scene, "--rate", str(RATE), file="-")
-    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-    with subprocess.Popen([*SHELL, *arguments], **pipes) as process:  # type: ignore[call-overload]
+    with start(scene) as process:
         yield process
         process.kill()
 
 
 def feed(process: subprocess.Popen[bytes], scene: Path) -> bytes:
-    """Give it three windows, and take its heading and the line that shows that it runs."""
+    """Write three windows to the process, and return the heading and the first line."""
     assert process.stdin is not None
     assert process.stdout is not None
     process.stdin.write((scene / "tow.raw").read_bytes()[: 3 * WINDOW * 16])
@@ -86,7 +90,7 @@ def feed(process: subprocess.Popen[bytes], scene: Path) -> bytes:
     return process.stdout.readline() + process.stdout.readline()
 
 
-def test_estimates_come_while_the_stream_goes_on_and_an_interrupt_leaves_them_whole(
+def test_stream_prints_estimates_at_once_and_whole_lines_after_an_interrupt(
     live: subprocess.Popen[bytes], scene: Path
 ) -> None:
     first = feed(live, scene)
@@ -102,7 +106,7 @@ def test_estimates_come_while_the_stream_goes_on_and_an_interrupt_leaves_them_wh
     assert all(line.count(",") == 6 for line in lines.splitlines())
 
 
-def test_a_reader_that_has_seen_enough_ends_it_quietly(
+def test_stream_ends_with_status_0_when_its_output_is_closed(
     live: subprocess.Popen[bytes], scene: Path
 ) -> None:
     feed(live, scene)
@@ -114,3 +118,16 @@ def test_a_reader_that_has_seen_enough_ends_it_quietly(
     live.stdin.flush()
     assert live.wait(timeout=30) == 0
     assert live.stderr.read() == b""
+
+
+def test_interrupt_ends_a_stream_where_the_parent_ignores_it(scene: Path) -> None:
+    """A child of `nohup pytest &` inherits that SIGINT is ignored."""
+    inherited = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        process = start(scene)
+    finally:
+        signal.signal(signal.SIGINT, inherited)
+    with process:
+        feed(process, scene)
+        process.send_signal(signal.SIGINT)
+        assert process.wait(timeout=30) == 130

@@ -66,7 +66,7 @@ def table(path: Path) -> list[dict[str, str]]:
 
 
 @pytest.mark.parametrize("how", [("--frequency", "1000"), ("--band", "500", "1500")], ids=str)
-def test_a_recording_of_microphones_becomes_a_wav_of_the_sources(
+def test_signals_of_a_recording_are_written_as_wav(
     how: tuple[str, ...], scene: Path, tmp_path: Path, voices: Float,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
@@ -85,7 +85,7 @@ def test_a_recording_of_microphones_becomes_a_wav_of_the_sources(
     np.testing.assert_allclose([float(row["doa_deg"]) for row in rows[-2:]], expected, atol=3.0)
 
 
-def test_hop_spaces_the_lines_and_a_picture_is_drawn(
+def test_hop_selects_lines_and_a_picture_is_drawn(
     scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -95,7 +95,7 @@ def test_hop_spaces_the_lines_and_a_picture_is_drawn(
     assert (tmp_path / "t.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_windows_and_complex_snapshots_give_complex_signals(
+def test_windows_and_complex_snapshots_have_complex_signals(
     scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch, voices: Float,
 ) -> None:  # fmt: skip
@@ -107,8 +107,8 @@ def test_windows_and_complex_snapshots_give_complex_signals(
     assert main(track(scene, *snapshots, file="complex.npz")) == 0
     alike = np.corrcoef(np.load("z.npy")[200:].T, voices[200:600].T)[:2, 2:]
     assert abs(alike).max(axis=1).min() > 0.95
-    told = ("--set", "motion__real_valued=True", "--signals", "z.wav", "--out", "r.csv")
-    assert main(track(scene, "--frequency", "1000", *told, file="complex.npz")) == 0
+    message = ("--set", "motion__real_valued=True", "--signals", "z.wav", "--out", "r.csv")
+    assert main(track(scene, "--frequency", "1000", *message, file="complex.npz")) == 0
     assert wavfile.read("z.wav")[1].shape == (600, 2)
     assert capsys.readouterr() == ("", "")
 
@@ -127,13 +127,13 @@ def test_number_and_spectra_of_the_sources_are_set_by_the_model(
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        (("--signals", "o.mp3"), ("signals are written as .wav or .npy",)),
+        (("--signals", "o.mp3"), ("signal files must end in .wav or .npy",)),
         (("--signals", "nowhere/o.wav"), ("the folder does not exist",)),
         (("--signals", "t.csv", "--out", "t.csv"), ("different files",)),
-        (("--signals", "o.wav", "--tracker", "cbf"), ("'cbf' tells no signals",)),
-        (("--signals", "o.wav", "--window", "64"), ("no complex signals: write them as .npy",)),
+        (("--signals", "o.wav", "--tracker", "cbf"), ("'cbf' estimates no signals",)),
+        (("--signals", "o.wav", "--window", "64"), ("cannot store complex signals: use .npy",)),
         (("--band", "500", "9000"), ("half the rate, 4000 Hz; got 500 and 9000",)),
-        (("--band", "500", "900", "--window", "64"), ("--band goes with real samples",)),
+        (("--band", "500", "900", "--window", "64"), ("--band requires real samples",)),
         (("--set", "kapa=3"), ("no parameter 'kapa'",)),
         (("--set", "measurement__noise=3"), ("the measurement comes from --array",)),
         (("--set", "motion__coefficients=[[1.5]]"), ("unstable",)),
@@ -141,31 +141,31 @@ def test_number_and_spectra_of_the_sources_are_set_by_the_model(
         (("--set", "doa=[0.1]"), ("doa must have shape (2,)",)),
         (("--set", "interval=1"), ("not be longer than the interval",)),
         (("--frequency", "3000"), ("alias limit",)),
-        (("--dtype", "int16"), ("goes with samples from standard input",)),
+        (("--dtype", "int16"), ("requires samples from standard input",)),
     ],
 )
-def test_what_is_wrong_is_told_in_one_line_and_nothing_is_written(
+def test_signals_invalid_argument_prints_one_line_and_writes_nothing(
     more: tuple[str, ...], words: tuple[str, ...], scene: Path, tmp_path: Path,
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
     monkeypatch.chdir(tmp_path)
     assert main(track(scene, "--frequency", "1000", *more)) == 2
-    printed, told = capsys.readouterr()
+    printed, message = capsys.readouterr()
     assert printed == ""
-    assert told.startswith("arrivals: ")
-    assert told.count("\n") == 1
-    assert all(word in told for word in words)
+    assert message.startswith("arrivals: ")
+    assert message.count("\n") == 1
+    assert all(word in message for word in words)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_silence_streams_and_arrays_that_do_not_fit_are_refused(
+def test_signals_of_zeros_streams_and_other_arrays_are_refused(
     scene: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(track(scene, "--frequency", "1000", file="silence.wav")) == 2
-    assert "the recording is silent" in capsys.readouterr().err
+    assert "the recording is zero" in capsys.readouterr().err
     stream = ["track", "-", *track(scene, "--frequency", "1000")[2:], "--signals", "o.wav"]
     assert main(stream) == 2
-    assert "--signals goes with a file" in capsys.readouterr().err
+    assert "--signals requires a file" in capsys.readouterr().err
     (scene / "four.toml").write_text('kind = "ula"\nn_sensors = 4\nspacing = 0.06\nspeed = 343.0\n')
     four = track(scene, "--frequency", "1000")
     four[four.index("--array") + 1] = str(scene / "four.toml")
@@ -173,9 +173,9 @@ def test_silence_streams_and_arrays_that_do_not_fit_are_refused(
     assert "the recording must have 4 channels" in capsys.readouterr().err
 
 
-def test_a_failure_leaves_what_was_there_before(tmp_path: Path, scene: Path) -> None:
+def test_write_signals_after_an_error_keeps_the_old_file(tmp_path: Path, scene: Path) -> None:
     (tmp_path / "o.wav").write_text("old")
-    with pytest.raises(ValueError, match="no complex signals"):
+    with pytest.raises(ValueError, match="cannot store complex signals"):
         write_signals(tmp_path / "o.wav", np.zeros((3, 2), complex), 8000.0)
     with pytest.raises(ValueError, match="pass --rate"):
         write_signals(tmp_path / "o.wav", np.zeros((3, 2)))
@@ -185,7 +185,7 @@ def test_a_failure_leaves_what_was_there_before(tmp_path: Path, scene: Path) -> 
 
 
 @pytest.mark.parametrize("n", [64, 65])
-def test_analytic_signals_are_hilberts(n: int) -> None:
+def test_analytic_equals_scipy_hilbert(n: int) -> None:
     x = np.random.default_rng(n).standard_normal((n, 2))
     np.testing.assert_allclose(analytic(x, 1.0), hilbert(x, axis=0), atol=1e-12)
     gap: Any = x.copy()

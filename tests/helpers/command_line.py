@@ -1,4 +1,4 @@
-"""A scene on disk, and calls of the command line on it."""
+"""Scene on disk, and calls of the command line on it."""
 
 import csv
 import io
@@ -16,10 +16,13 @@ from arrivals.measurement_models import SensorArray
 
 RATE, FREQUENCY, WINDOW = 8000, 1000.0, 256
 ARRAY = 'kind = "ula"\nn_sensors = 8\nspacing = 0.17\nspeed = 343.0\n'
-DOA = np.linspace(-8.0, 12.0, 20)  # degrees, one a window
+DOA = np.linspace(-8.0, 12.0, 20)  # degrees, one per window
 SUBSPACE = ("music", "root_music", "esprit", "past")
 HEADING = "step,time_s,label,doa_deg,std_deg,existence,level_db"
-SHELL = [sys.executable, "-W", "error", "-m", "arrivals"]
+# as in a terminal, also where the parent ignores SIGINT (`nohup`, `&`) and children inherit that
+RESTORED = "import runpy, signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+START = RESTORED + "runpy.run_module('arrivals', run_name='__main__', alter_sys=True)"
+SHELL = [sys.executable, "-W", "error", "-c", START]
 
 
 def pressure(doa: Any, n_sensors: int = 8) -> Any:
@@ -27,8 +30,8 @@ def pressure(doa: Any, n_sensors: int = 8) -> Any:
     rng = np.random.default_rng(0)
     array = SensorArray.ula(n_sensors, 0.17, speed=343.0)
     a = array.steering_vector(np.deg2rad(doa), array.wavelength(FREQUENCY))
-    turn = np.exp(2j * np.pi * FREQUENCY * np.arange(len(a)) / RATE)
-    return 0.3 * (turn[:, None] * a).real + 0.1 * rng.standard_normal(a.shape)
+    phasor = np.exp(2j * np.pi * FREQUENCY * np.arange(len(a)) / RATE)
+    return 0.3 * (phasor[:, None] * a).real + 0.1 * rng.standard_normal(a.shape)
 
 
 def track(scene: Path, *more: str, file: str = "tow.wav", array: str = "array.toml") -> list[str]:
@@ -40,21 +43,21 @@ def table(text: str) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO(text)))
 
 
-def shell(arguments: list[str], **more: Any) -> subprocess.CompletedProcess[bytes]:
+def run_cli(arguments: list[str], **more: Any) -> subprocess.CompletedProcess[bytes]:
     return subprocess.run([*SHELL, *arguments], capture_output=True, timeout=60, **more)
 
 
-def refused(
+def assert_rejected(
     arguments: list[str], capsys: pytest.CaptureFixture[str], here: Path, *words: str
 ) -> None:
     """Check that there is one line with these words, status 2, and nothing new in the folder."""
     before = sorted(os.listdir(here))
     assert main(arguments) == 2
-    printed, told = capsys.readouterr()
+    printed, message = capsys.readouterr()
     assert printed == ""
-    assert told.startswith("arrivals: ")
-    assert told.count("\n") == 1
-    assert told.endswith("\n")
+    assert message.startswith("arrivals: ")
+    assert message.count("\n") == 1
+    assert message.endswith("\n")
     for word in words:
-        assert word in told
+        assert word in message
     assert sorted(os.listdir(here)) == before

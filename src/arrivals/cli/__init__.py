@@ -1,1 +1,1 @@
-"""Cli."""
+"""Command line: parser, subcommands, outputs."""

@@ -1,4 +1,4 @@
-"""The command line: track a recording or a stream, list what there is, show it on shipped data."""
+"""Parser of the command line: track, demo, locate, reproduce, list."""
 
 from __future__ import annotations
 
@@ -24,11 +24,17 @@ DEMOS: dict[str, Callable[..., None]] = {"swellex96": demo, "brp2012": infrasoun
 
 
 def run(argv: Sequence[str] | None = None) -> None:
-    """Do what the arguments say; what is wrong with them, or with a file, is raised.
+    """Run the subcommand of the arguments.
+
+    Parameters
+    ----------
+    argv : sequence of str, optional
+        Arguments; those of the process if None.
 
     Raises
     ------
     ValueError, TypeError, OSError
+        If an argument or a file is invalid.
 
     Examples
     --------
@@ -41,7 +47,7 @@ def run(argv: Sequence[str] | None = None) -> None:
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser whose errors are raised: they become one line, like all others."""
+    """Argument parser that raises errors as ValueError."""
 
     def error(self, message: str) -> NoReturn:
         raise ValueError(f"{message} (see {self.prog} -h)")
@@ -78,52 +84,76 @@ def _add_track(commands: Any) -> None:
     option = add.add_argument
     option("file", metavar="FILE", help="recording; - for raw samples from standard input")
     option("--array", required=True, metavar="TOML", help="array file")
-    option("--frequency", type=float, metavar="HZ", help="of the snapshots")
-    option("--frequencies", nargs="+", type=float, metavar="HZ", help="of the bins of each step")
+    option("--frequency", type=float, metavar="HZ", help="frequency of the snapshots")
+    option(
+        "--frequencies",
+        nargs="+",
+        type=float,
+        metavar="HZ",
+        help="frequencies of the bins of each step",
+    )
     option("--band", nargs=2, type=float, metavar=("F1", "F2"),
-           help="Hz: bins that fill it, or the band of a tracker of real samples")  # fmt: skip
+           help="Hz: bins that fill a band, or the band of a tracker of real samples")  # fmt: skip
     option("--snapshots", type=int, default=1, metavar="N",
-           help="successive windows in one step (1)")  # fmt: skip
-    option("--snr", type=float, default=0.0, metavar="DB", help="expected in the band (0)")
-    option("--tracker", default="svalse", metavar="NAME", help="see `arrivals list` (svalse)")
+           help="number of successive windows in one step (1)")  # fmt: skip
+    option(
+        "--snr",
+        type=float,
+        default=0.0,
+        metavar="DB",
+        help="expected signal-to-noise ratio in the band (0)",
+    )
+    option("--tracker", default="svalse", metavar="NAME", help="name in `arrivals list` (svalse)")
     option("--set", action="append", default=[], type=_setting, metavar="NAME=VALUE",
            help="parameter of the tracker, such as motion__p_activate=0.2; repeatable")  # fmt: skip
-    option("--out", metavar="CSV", help="tracks file (standard output)")
+    option("--out", metavar="CSV", help="write the tracks file (standard output)")
     option("--signals", metavar="WAV",
-           help="the separated sources, WAV or npy, of a tracker that tells them")  # fmt: skip
-    option("--plot", metavar="PNG", help="picture of the tracks over the beam power")
-    option("--rate", type=float, metavar="HZ", help="samples per second, if the file has none")
-    option("--window", type=int, metavar="N", help="samples of a snapshot's window")
+           help="write separated source signals (WAV or npy); needs a tracker that "
+                "estimates signals")  # fmt: skip
+    option("--plot", metavar="PNG", help="draw the tracks over the beam power")
+    option(
+        "--rate",
+        type=float,
+        metavar="HZ",
+        help="samples per second, if the file does not contain it",
+    )
+    option("--window", type=int, metavar="N", help="length of a window, samples")
     option("--hop", type=int, metavar="N",
-           help="samples from window to window (the window), or from line to line (1)")  # fmt: skip
-    option("--variable", metavar="NAME", help="array in an npz or mat file")
-    option("--transpose", action="store_true", help="the rows of the file are channels")
-    option("--dtype", choices=tuple(DTYPES), help="samples of standard input (int16)")
-    option("--channels", type=int, metavar="N", help="channels of standard input (the array's)")
-    option("--quiet", action="store_true", help="no progress bar")
+           help="samples between windows (the window), or between output lines of real "
+                "samples (1)")  # fmt: skip
+    option("--variable", metavar="NAME", help="name of the array in an npz or mat file")
+    option("--transpose", action="store_true", help="rows of the file are channels")
+    option("--dtype", choices=tuple(DTYPES), help="sample type of standard input (int16)")
+    option(
+        "--channels",
+        type=int,
+        metavar="N",
+        help="number of channels of standard input (those of the array)",
+    )
+    option("--quiet", action="store_true", help="hide the progress bar")
     add.set_defaults(command=lambda arguments: track(arguments, _bar(_is_quiet(arguments))))
 
 
 def _add_demo(commands: Any) -> None:
-    told = [(inspect.getdoc(show) or "").partition("\n\nParameters")[0] for show in DEMOS.values()]
+    texts = [(inspect.getdoc(show) or "").partition("\n\nParameters")[0] for show in DEMOS.values()]
     add = commands.add_parser(
         "demo",
         help="track shipped data by three methods: a towed source, or recorded infrasound",
-        description="\n\n".join(f"{n}: {text}" for n, text in zip(DEMOS, told, strict=True)),
+        description="\n\n".join(f"{n}: {text}" for n, text in zip(DEMOS, texts, strict=True)),
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
     add.add_argument("name", nargs="?", default="swellex96", choices=tuple(DEMOS),
                      help="(swellex96)")  # fmt: skip
     add.add_argument("--out", default="arrivals-demo", metavar="DIR", help="(arrivals-demo)")
-    add.add_argument("--quiet", action="store_true", help="no progress bar")
+    add.add_argument("--quiet", action="store_true", help="hide the progress bar")
     add.set_defaults(
         command=lambda arguments: DEMOS[arguments.name](arguments.out, _bar(arguments.quiet))
     )
 
 
 def _setting(argument: str) -> tuple[str, Any]:
-    """Return name and value of NAME=VALUE; what is no Python literal is a string.
+    """Return name and value of NAME=VALUE; a value that is not a Python literal is a string.
 
     Examples
     --------
@@ -140,14 +170,14 @@ def _setting(argument: str) -> tuple[str, Any]:
 
 
 def _bar(quiet: bool) -> Callable[..., Any]:
-    """Return tqdm on standard error, silent where nobody looks."""
+    """Return tqdm on standard error, disabled if it is not a terminal."""
     from tqdm import tqdm
 
     return partial(tqdm, file=sys.stderr, disable=quiet or None, unit="step")
 
 
 def _is_quiet(arguments: argparse.Namespace) -> bool:
-    """Tell whether a bar is not wanted, or would come between the lines of a live table."""
+    """Return True without a progress bar: on request, or with a live table on a terminal."""
     live = arguments.file == "-" and arguments.out is None
     return bool(arguments.quiet or (live and sys.stdout.isatty()))
 
@@ -165,7 +195,7 @@ def _list(arguments: argparse.Namespace) -> None:
 
 
 def _summary(find_kind: Callable[[str], type], name: str) -> str:
-    """Return the first line of the docstring, or why somebody's entry point does not load."""
+    """Return the first line of the docstring, or the error of an entry point that fails to load."""
     try:
         return (inspect.getdoc(find_kind(name)) or "").partition("\n")[0]
     except Exception as error:

@@ -1,4 +1,4 @@
-"""Separated sources from recordings: what a tracker of signals is given, and the files it makes."""
+"""Separated sources of recordings: analytic signals, initial models, signal files."""
 
 from __future__ import annotations
 
@@ -20,32 +20,32 @@ from arrivals.trackers.autoregressive import NoiseSettings, RegressionSettings
 from arrivals.typing import Complex
 from arrivals.validation import count, positive
 
-# Sec. 5 and 7 of the specification: what speech wants, with its pauses
+# Specification, sections 5 and 7: settings for speech with pauses
 FOR_SPEECH: dict[str, Any] = {
     "gate": 0.3,
     "regression": RegressionSettings(ar_forgetting=0.99, ridge=5.0),
     "noise": NoiseSettings(adapt_process_noise=False),
 }
-ORDER = 2  # of the AR models that are started from
-QUIET = 0.01  # of the power of a recording: the noise that is started from
+INITIAL_ORDER = 2  # of the AR models
+INITIAL_NOISE = 0.01  # noise variance, relative to the power of the recording
 
 
 def analytic(samples: ArrayLike, rate: float, band: Sequence[float] | None = None) -> Complex:
-    """Return real samples of an array as snapshots, one each: their analytic signals.
+    """Return the analytic signals of real samples: one snapshot per sample.
 
     Parameters
     ----------
     samples : array_like, shape (n_samples, n_sensors)
-        NaN where missing.
+        Real samples; NaN where missing.
     rate : float
-        Hz.
+        Samples per second, Hz.
     band : (float, float), optional
-        Edges in Hz of what is kept; all if None.
+        Edges of the pass band, Hz; all frequencies if None.
 
     Returns
     -------
     ndarray, shape (n_samples, n_sensors)
-        Their real parts are the samples, as far as they lie in the band.
+        The real parts are the samples within the band.
 
     Raises
     ------
@@ -64,33 +64,42 @@ def analytic(samples: ArrayLike, rate: float, band: Sequence[float] | None = Non
         raise ValueError(
             f"band must lie between 0 and half the rate, {rate / 2:g} Hz; got {low:g} and {high:g}"
         )
-    there = np.isfinite(x)
+    valid = np.isfinite(x)
     n = len(x)
     frequency = np.fft.fftfreq(n, 1 / rate)
     weight = np.where((frequency > 0) & (frequency >= low) & (frequency <= high), 2.0, 0.0)
     for edge in {0, n // 2} if n % 2 == 0 else {0}:
         weight[edge] = float(low <= abs(frequency[edge]) <= high)
-    z = np.fft.ifft(weight[:, None] * np.fft.fft(np.where(there, x, 0.0), axis=0), axis=0)
-    return np.where(there, z, complex(np.nan, np.nan))
+    z = np.fft.ifft(weight[:, None] * np.fft.fft(np.where(valid, x, 0.0), axis=0), axis=0)
+    return np.where(valid, z, complex(np.nan, np.nan))
 
 
 def for_recording(
     params: Mapping[str, Any], z: Complex, measurement: ArraySnapshot, real_valued: bool
 ) -> tuple[ArraySnapshot, AutoregressiveSources]:
-    """Return the models to start from on snapshots of unknown power.
+    """Return initial models for snapshots of unknown power.
 
-    Noise is a hundredth of the recording's power; the sources share that equally and have its
-    spectrum, by Yule and Walker's equations of order 2 on one sensor. What is in `params`, by
-    nested names or as `motion`, goes before.
+    The noise variance is a hundredth of the recording's power; the sources have equal shares of
+    that power and its spectrum, by the Yule-Walker equations of order 2 on one sensor. Values in
+    `params`, by nested names or as `motion`, take precedence.
 
     Parameters
     ----------
     params : mapping
         Parameters of the tracker.
     z : ndarray, shape (n_steps, n_sensors)
+        Snapshots.
     measurement : ArraySnapshot
+        Measurement model.
     real_valued : bool
-        Whether the sources are real-valued.
+        True if the sources are real-valued.
+
+    Returns
+    -------
+    measurement : ArraySnapshot
+        With the initial noise variance.
+    motion : AutoregressiveSources
+        Initial source models.
 
     Examples
     --------
@@ -106,15 +115,15 @@ def for_recording(
     whole = z[np.isfinite(z).all(axis=1)]
     if not np.any(whole):
         raise ValueError(
-            "the recording is silent, or no sample of it is heard by all sensors: leave out those "
-            "that do not work, and their partners, by `missing` in the array file"
+            "the recording is zero, or no sample is valid at all sensors: list faulty sensors, and "
+            "their partners, under `missing` in the array file"
         )
     total = float(np.mean(whole.real**2 if real_valued else np.abs(whole) ** 2))
-    noisy = measurement.replace(noise=QUIET * total * (2 if real_valued else 1))
+    noisy = measurement.replace(noise=INITIAL_NOISE * total * (2 if real_valued else 1))
     if "motion" in params:
         return noisy, params["motion"]
-    heard = whole[:, whole.shape[1] // 2]
-    a, _ = yule_walker(heard.real if real_valued else heard, min(ORDER, len(heard) - 1))
+    middle = whole[:, whole.shape[1] // 2]
+    a, _ = yule_walker(middle.real if real_valued else middle, min(INITIAL_ORDER, len(middle) - 1))
     coefficients = own.get("coefficients", [a.tolist()] * 2)
     own = {"real_valued": real_valued} | own
     motion = AutoregressiveSources(**{"coefficients": coefficients} | own)
@@ -126,7 +135,7 @@ def for_recording(
 def separator(
     params: Mapping[str, Any], z: Complex, measurement: ArraySnapshot, real_samples: bool
 ) -> ARKalmanQRDRLS:
-    """Make the tracker for a recording, with the settings for speech if it holds real samples."""
+    """Return the tracker for a recording, with settings for speech if its samples are real."""
     names = inspect.signature(ARKalmanQRDRLS).parameters
     for name in params:
         if name.partition("__")[0] == "measurement":
@@ -139,14 +148,20 @@ def separator(
     return tracker
 
 
-def thinned(run: Run, every: int) -> Run:
-    """Return every n-th step of a run, the n-th first; its extras stay whole.
+def decimate(run: Run, every: int) -> Run:
+    """Return every n-th step of a run, beginning with the n-th; `extras` do not change.
 
     Parameters
     ----------
     run : Run
+        The run.
     every : int
         n.
+
+    Returns
+    -------
+    Run
+        The selected steps.
     """
     last = slice(count("every", every) - 1, None, every)
     fields = {name: values[last] for name, values in run.fields.items()}
@@ -155,54 +170,54 @@ def thinned(run: Run, every: int) -> Run:
 
 
 def check_suffix(path: str) -> None:
-    """Raise a ValueError if signals cannot be written to a file of such a name.
+    """Raise a ValueError unless the suffix is that of a signal file.
 
     Examples
     --------
     >>> check_suffix("out.mp3")
     Traceback (most recent call last):
-    ValueError: out.mp3: signals are written as .wav or .npy
+    ValueError: out.mp3: signal files must end in .wav or .npy
     """
     if Path(path).suffix.lower() not in (".wav", ".npy"):
-        raise ValueError(f"{path}: signals are written as .wav or .npy")
+        raise ValueError(f"{path}: signal files must end in .wav or .npy")
 
 
 def check_writable(path: str, real_valued: bool, rate: float | None) -> None:
-    """Raise a ValueError if such signals do not go into such a file.
+    """Raise a ValueError if the file format cannot store the signals.
 
     Examples
     --------
     >>> check_writable("out.wav", False, 8000.0)
     Traceback (most recent call last):
-    ValueError: out.wav: a WAV file holds no complex signals: write them as .npy
+    ValueError: out.wav: a WAV file cannot store complex signals: use .npy
     """
     check_suffix(path)
     if Path(path).suffix.lower() == ".npy":
         return
     if not real_valued:
-        raise ValueError(f"{path}: a WAV file holds no complex signals: write them as .npy")
+        raise ValueError(f"{path}: a WAV file cannot store complex signals: use .npy")
     if rate is None:
-        raise ValueError(f"{path}: a WAV file wants the samples per second: pass --rate")
+        raise ValueError(f"{path}: a WAV file requires the samples per second: pass --rate")
 
 
 def write_signals(
     path: str | os.PathLike[str], signals: ArrayLike, rate: float | None = None
 ) -> None:
-    """Write signals, (n_steps, n_sources), one channel a source; the file appears when complete.
+    """Write signals, one channel per source; the file has its name only when complete.
 
     Parameters
     ----------
-    path : path
-        ``.wav``: 32 bit floats, silence where a signal is NaN; ``.npy``: numbers as they are.
-    signals : array_like
+    path : str or path
+        ``.wav``: 32 bit floats, 0 where a signal is NaN; ``.npy``: unchanged numbers.
+    signals : array_like, shape (n_steps, n_sources)
         Real, or complex for ``.npy``.
     rate : float, optional
-        Hz, for ``.wav``.
+        Samples per second, Hz, for ``.wav``.
 
     Raises
     ------
     ValueError
-        If a WAV file is to hold complex numbers, or has no rate.
+        If the format is WAV and the signals are complex or the rate is missing.
     """
     from scipy.io import wavfile
 

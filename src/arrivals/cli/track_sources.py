@@ -1,4 +1,4 @@
-"""The command line's way to separated sources: directions and signals from one recording."""
+"""`arrivals track` with separated sources: directions and signals of a recording."""
 
 from __future__ import annotations
 
@@ -6,14 +6,15 @@ import argparse
 
 import numpy as np
 
+from arrivals.cli.models import model_at
+from arrivals.cli.outputs import Bar, draw, refuse, write_table
 from arrivals.cli.separated_signals import (
     analytic,
     check_writable,
+    decimate,
     separator,
-    thinned,
     write_signals,
 )
-from arrivals.cli.track import Bar, model_at, print_rows, refuse
 from arrivals.measurement_models import SensorArray
 from arrivals.recordings.readers import read
 from arrivals.recordings.recording import Recording
@@ -22,40 +23,41 @@ from arrivals.typing import Complex, Float
 
 
 def separates(arguments: argparse.Namespace) -> bool:
-    """Tell whether the tracker tells signals, and what is heard is a file.
+    """Return True if the tracker estimates source signals and the input is a file.
 
     Raises
     ------
     ValueError
-        If signals are wanted of another tracker, or of a stream.
+        If signals are requested of another tracker, or of a stream.
     """
-    told = issubclass(find(arguments.tracker), ARKalmanQRDRLS)
+    estimates_signals = issubclass(find(arguments.tracker), ARKalmanQRDRLS)
     if arguments.signals and arguments.file == "-":
-        raise ValueError("--signals goes with a file, not with a stream")
-    if arguments.signals and not told:
-        raise ValueError(f"--signals: the tracker {arguments.tracker!r} tells no signals")
-    return told and arguments.file != "-"
+        raise ValueError("--signals requires a file, not a stream")
+    if arguments.signals and not estimates_signals:
+        raise ValueError(f"--signals: the tracker {arguments.tracker!r} estimates no signals")
+    return estimates_signals and arguments.file != "-"
 
 
 def track_sources(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -> None:
-    """Track and separate sources, sample by sample where samples are real and no window is given.
+    """Track and separate sources, sample by sample for real samples without a window.
 
-    The array's response is that at the frequency, or in the middle of the band, for all of it.
+    The array's response at the frequency, or at the middle of the band, is used for the whole band.
 
     Parameters
     ----------
     arguments : argparse.Namespace
-        Those of `arrivals track`.
+        Arguments of `arrivals track`.
     array : SensorArray
+        The array.
     bar : callable
         As in `track`.
     """
-    refuse(arguments, ("dtype", "channels"), "goes with samples from standard input")
+    refuse(arguments, ("dtype", "channels"), "requires samples from standard input")
     if arguments.frequency is None and arguments.band:
         arguments.frequency = sum(arguments.band) / 2
     if arguments.frequency is None:
-        raise ValueError("give --frequency, or --band, of the separated sources")
-    refuse(arguments, ("frequencies",), "goes with other trackers: this one takes --frequency")
+        raise ValueError("pass --frequency, or --band, of the separated sources")
+    refuse(arguments, ("frequencies",), "requires another tracker: this one takes --frequency")
     model = model_at(array, arguments, [arguments.frequency])
     recording = read(arguments.file, rate=arguments.rate, variable=arguments.variable,
                      transpose=arguments.transpose, array=array)  # fmt: skip
@@ -72,25 +74,20 @@ def track_sources(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -
         signals = result.signals.real if real_valued else result.signals
         write_signals(arguments.signals, signals, rate)
     every = arguments.hop if every_sample and arguments.hop else tracker.interval
-    result = thinned(result, every)
-    if arguments.out:
-        result.to_csv(arguments.out)
-    else:
-        print_rows(result)
-    if arguments.plot:
-        from arrivals.plots.bearing_time import plot_bearing_time, save
-
-        save(plot_bearing_time(result, time=None if time is None else result.time), arguments.plot)
+    result = decimate(result, every)
+    write_table(result, arguments.out)
+    draw(arguments.plot, result, time=None if time is None else result.time)
 
 
 def _samples(recording: Recording, arguments: argparse.Namespace) -> tuple[Complex, Float | None]:
     if recording.rate is None:
-        raise ValueError(f"{arguments.file}: the rate is not known: pass --rate")
+        raise ValueError(f"{arguments.file}: the rate is unknown: pass --rate")
     z = analytic(recording.samples, recording.rate, arguments.band)
     return z, np.arange(len(z)) / recording.rate
 
 
 def _snapshots(recording: Recording, arguments: argparse.Namespace) -> tuple[Complex, Float | None]:
-    refuse(arguments, ("band",), "goes with real samples, and not with --window")
-    found = recording.snapshots(arguments.frequency, window=arguments.window, hop=arguments.hop)
-    return found.values, found.time if np.isfinite(found.time).all() else None
+    refuse(arguments, ("band",), "requires real samples, without --window")
+    snapshots = recording.snapshots(arguments.frequency, window=arguments.window, hop=arguments.hop)
+    time = snapshots.time if np.isfinite(snapshots.time).all() else None
+    return snapshots.values, time

@@ -1,4 +1,4 @@
-"""Several looks a step: the frequencies and windows of a recording, or a stream, in groups."""
+"""Frames of several frequencies and windows per step, from recordings and streams."""
 
 from __future__ import annotations
 
@@ -9,31 +9,32 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from arrivals.recordings.recording import Recording, default_window
+from arrivals.recordings.narrowband import check_frequency, default_window
+from arrivals.recordings.recording import Recording
 from arrivals.recordings.stream import live_snapshots
 from arrivals.typing import Complex, Float
-from arrivals.validation import count, positive
+from arrivals.validation import count
 
-MOST_BINS = 16
+MAX_BINS = 16
 
 
 @dataclass(frozen=True, eq=False)
-class Framing:
-    """What was heard in each step.
+class FramedSnapshots:
+    """Snapshots of each step.
 
     Parameters
     ----------
     values : ndarray, shape (n_steps, n_bins, n_snapshots, n_channels)
         Without the axes of length one in the middle, as in `ArraySnapshot.shape`.
     time : ndarray, shape (n_steps,)
-        Middle of each step, s; NaN where the time is not known.
+        Centre of each step, s; NaN if unknown.
     """
 
     values: Complex
     time: Float
 
 
-def looks(
+def frame_recording(
     recording: Recording,
     frequencies: Sequence[float],
     *,
@@ -41,67 +42,81 @@ def looks(
     hop: int | None = None,
     n_snapshots: int = 1,
     stride: int | None = None,
-) -> Framing:
-    """Return the snapshots of a recording at several frequencies, so many windows a step.
+) -> FramedSnapshots:
+    """Return snapshots of a recording at several frequencies, several windows per step.
 
     Parameters
     ----------
     recording : Recording
-        Of real samples; or of complex snapshots, whose one frequency is known already.
+        Real samples, or complex snapshots of one frequency.
     frequencies : sequence of float
-        Hz.
-    window, hop : int, optional
-        As in `Recording.snapshots`; one window for all frequencies, that of the lowest if None.
+        Frequencies, Hz.
+    window : int, optional
+        As in `Recording.snapshots`, for all frequencies; that of the lowest if None.
+    hop : int, optional
+        As in `Recording.snapshots`.
     n_snapshots : int
-        Successive windows in one step.
+        Number of successive windows in one step.
     stride : int, optional
-        Windows from one step to the next; by default steps do not overlap.
+        Windows between steps; by default steps do not overlap.
+
+    Returns
+    -------
+    FramedSnapshots
+        Snapshots and times of the steps.
 
     Raises
     ------
     ValueError
-        If a frequency lies outside the recording's band, or less than one step is left.
+        If a frequency lies outside the recording's band, or the recording is shorter than one step.
 
     Examples
     --------
     >>> t = np.arange(4000) / 1000
     >>> recording = Recording(np.cos(2 * np.pi * 100 * t)[:, None] * np.ones(3), rate=1000.0)
-    >>> heard = looks(recording, [100.0, 120.0], window=500, n_snapshots=4)
-    >>> heard.values.shape, abs(heard.values[0, :, 0, 0]).round(2), heard.time
+    >>> frames = frame_recording(recording, [100.0, 120.0], window=500, n_snapshots=4)
+    >>> frames.values.shape, abs(frames.values[0, :, 0, 0]).round(2), frames.time
     ((2, 2, 4, 3), array([1., 0.]), array([1., 3.]))
     """
     if recording.is_narrowband and len(frequencies) > 1:
-        raise ValueError("the recording holds complex snapshots, at one frequency")
+        raise ValueError("frequencies must be one for a recording of complex snapshots")
     if recording.rate is not None and not recording.is_narrowband and window is None:
-        _in_band(frequencies, recording.rate)
+        for frequency in frequencies:
+            check_frequency(frequency, recording.rate)
         window = default_window(recording.rate, min(frequencies))
-    found = [recording.snapshots(f, window=window, hop=hop) for f in frequencies]
-    values = np.stack([each.values for each in found], axis=1)
+    bins = [recording.snapshots(f, window=window, hop=hop) for f in frequencies]
+    values = np.stack([each.values for each in bins], axis=1)
     n, every = count("n_snapshots", n_snapshots), n_snapshots if stride is None else stride
     n_steps = (len(values) - n) // count("stride", every) + 1
     if n_steps < 1:
-        raise ValueError(f"the recording has {len(values)} snapshots; one step takes {n}")
+        raise ValueError(f"the recording has {len(values)} snapshots; one step requires {n}")
     rows = every * np.arange(n_steps)[:, None] + np.arange(n)
     steps = np.swapaxes(values[rows], 1, 2)  # (n_steps, n_bins, n_snapshots, n_channels)
-    return Framing(_squeezed(steps), np.asarray(found[0].time[rows].mean(axis=1)))
+    return FramedSnapshots(_squeeze(steps), np.asarray(bins[0].time[rows].mean(axis=1)))
 
 
-def _in_band(frequencies: Sequence[float], rate: float) -> None:
-    for frequency in frequencies:
-        if not 0 < positive("frequency", frequency) < rate / 2:
-            raise ValueError(
-                f"frequency must lie below half the rate, {rate / 2:g} Hz; got {frequency:g} Hz"
-            )
-
-
-def _squeezed(steps: Complex) -> Complex:
-    """Leave out the axes of bins and snapshots, (..., F, N, M), where there is one."""
+def _squeeze(steps: Complex) -> Complex:
+    """Remove the axes of bins and snapshots, (..., F, N, M), of length one."""
     single = tuple(axis for axis in (-3, -2) if steps.shape[axis] == 1)
     return np.asarray(np.squeeze(steps, axis=single))
 
 
 def frequencies_in(band: Sequence[float], rate: float, window: int | None = None) -> list[float]:
-    """Return frequencies, Hz, that fill a band: two bins of a Hann window apart, 16 at most.
+    """Return frequencies that fill a band: two bins of a Hann window apart, at most 16.
+
+    Parameters
+    ----------
+    band : (float, float)
+        Lower and upper edge, Hz.
+    rate : float
+        Samples per second, Hz.
+    window : int, optional
+        Length of the window; `default_window` at the lower edge if None.
+
+    Returns
+    -------
+    list of float
+        Frequencies, Hz.
 
     Raises
     ------
@@ -118,12 +133,14 @@ def frequencies_in(band: Sequence[float], rate: float, window: int | None = None
         raise ValueError(
             f"band must lie between 0 and half the rate, {rate / 2:g} Hz; got {low:g} and {high:g}"
         )
-    apart = 2 * rate / (default_window(rate, low) if window is None else count("window", window, 2))
-    n = min(int((high - low) / apart) + 1, MOST_BINS)
+    spacing = (
+        2 * rate / (default_window(rate, low) if window is None else count("window", window, 2))
+    )
+    n = min(int((high - low) / spacing) + 1, MAX_BINS)
     return [(low + high) / 2] if n == 1 else np.linspace(low, high, n).tolist()
 
 
-def live_looks(
+def frame_stream(
     source: BinaryIO,
     n_channels: int,
     frequencies: Sequence[float],
@@ -131,37 +148,39 @@ def live_looks(
     n_snapshots: int = 1,
     **live: Any,
 ) -> Iterator[tuple[float, Complex]]:
-    """Yield the looks of each step of a stream, as soon as it is complete.
+    """Yield the snapshots of each step of a stream as soon as it is complete.
 
     Parameters
     ----------
-    source, n_channels
+    source : binary file
+        As in `live_snapshots`.
+    n_channels : int
         As in `live_snapshots`.
     frequencies : sequence of float
-        Hz.
+        Frequencies, Hz.
     n_snapshots : int
-        Successive windows in one step; a part of a step at the end is dropped.
-    **live
+        Number of successive windows in one step; an incomplete last step is dropped.
+    **live : object
         Other arguments of `live_snapshots`.
 
     Yields
     ------
     float
-        Middle of the step, s.
+        Centre of the step, s.
     ndarray, shape (n_bins, n_snapshots, n_channels)
-        Without the first two axes where they have length one.
+        Snapshots, without the first two axes where they have length one.
     """
     if len(frequencies) > 1 and np.dtype(live.get("dtype", "int16")).kind == "c":
-        raise ValueError("complex frames are snapshots already, at one frequency")
+        raise ValueError("frequencies must be one for a stream of complex frames")
     steps: list[tuple[float, Complex]] = []
     complete = False
     for time, z in live_snapshots(source, n_channels, frequency=list(frequencies), **live):
         steps.append((time, z.reshape(len(frequencies), n_channels)))
         if len(steps) == count("n_snapshots", n_snapshots):
             values: NDArray[Any] = np.stack([each for _, each in steps], axis=1)
-            yield float(np.mean([at for at, _ in steps])), _squeezed(values[None])[0]
+            yield float(np.mean([at for at, _ in steps])), _squeeze(values[None])[0]
             steps, complete = [], True
     if not complete:
         raise ValueError(
-            f"the stream ended after {len(steps)} windows; one step takes {n_snapshots}"
+            f"the stream ended after {len(steps)} windows; one step requires {n_snapshots}"
         )

@@ -1,4 +1,4 @@
-"""Trackers that take real samples one by one, on recordings and on streams."""
+"""Real samples of recordings and streams, and trackers of single samples."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from arrivals.validation import count, one_of, positive
 def band_samples(
     array: SensorArray, rate: float, band: Sequence[float], snr_db: float = 0.0
 ) -> ArraySamples:
-    """Return the model of a source that fills a band, its edges in Hz.
+    """Return the measurement model of a source that fills a band.
 
     Parameters
     ----------
@@ -30,6 +30,12 @@ def band_samples(
     band : (float, float)
         Lower and upper edge, Hz.
     snr_db : float
+        Signal-to-noise ratio, dB.
+
+    Returns
+    -------
+    ArraySamples
+        The model.
 
     Raises
     ------
@@ -54,24 +60,31 @@ def band_samples(
 def track_samples(
     tracker: Tracker, samples: Iterable[ArrayLike], rate: float, every: int = 1
 ) -> Run:
-    """Run a tracker on every sample, and keep every n-th estimate.
+    """Run a tracker on every sample, and record every n-th estimate.
 
     Parameters
     ----------
     tracker : Tracker
+        The tracker.
     samples : array_like, shape (n_samples, n_sensors), or any iterable
+        Real samples.
     rate : float
         Samples per second, Hz.
     every : int
-        n. Times in the run are seconds.
+        n.
+
+    Returns
+    -------
+    Run
+        Recorded estimates; times in s.
 
     Examples
     --------
-    >>> from arrivals.scenarios import create
-    >>> trial = create("interpolation_band").sample(np.random.default_rng(0))
-    >>> run = track_samples(trial.tracker("interpolation_ekf", doa=0.9), trial.measurements, 50, 20)
-    >>> run.time
-    array([0.38, 0.78, 1.18, 1.58, 1.98])
+    >>> from arrivals.trackers import InterpolationEKF
+    >>> array = SensorArray.ula(8, spacing=0.2, speed=1500.0)
+    >>> tracker = InterpolationEKF(band_samples(array, 16000.0, (1000.0, 3000.0)))
+    >>> track_samples(tracker, np.ones((100, 8)), 16000.0, every=40).time
+    array([0.0024375, 0.0049375])
     """
     recorder = RunRecorder(type(tracker.estimate))
     every = count("every", every)
@@ -87,15 +100,21 @@ def track_samples(
 
 
 def live_samples(source: BinaryIO, n_channels: int, *, dtype: str = "int16") -> Iterator[Float]:
-    """Yield the frames of a stream of interleaved real samples, one number a channel.
+    """Yield the frames of a stream of interleaved real samples, one number per channel.
 
     Parameters
     ----------
     source : binary file
-        Little-endian; its `read(n)` waits for n bytes or the end.
+        Little-endian; `read(n)` must wait for n bytes or the end.
     n_channels : int
+        Number of channels.
     dtype : str
         int16 or int32 (scaled to [-1, 1)), float32, float64.
+
+    Yields
+    ------
+    ndarray, shape (n_channels,)
+        A frame.
 
     Examples
     --------

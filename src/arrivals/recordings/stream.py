@@ -1,4 +1,4 @@
-"""A tracker on a stream of samples: each snapshot is used as soon as it is complete."""
+"""Snapshots of a stream of samples, and a tracker on them, step by step."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from arrivals.recordings.recording import default_window, narrowband
+from arrivals.recordings.narrowband import default_window, narrowband
 from arrivals.trackers import Tracker
 from arrivals.trackers.base import is_missing
 from arrivals.trackers.run import header, text
@@ -35,20 +35,25 @@ def live_snapshots(
     window: int | None = None,
     hop: int | None = None,
 ) -> Iterator[tuple[float, Complex]]:
-    """Yield the snapshots of a stream of interleaved samples, each as soon as it is complete.
+    """Yield the snapshots of a stream of interleaved samples as soon as they are complete.
 
     Parameters
     ----------
     source : binary file
-        Frames of one number a channel, little-endian; its `read(n)` waits for n bytes or the end.
+        Frames of one number per channel, little-endian; `read(n)` must wait for n bytes or the end.
     n_channels : int
+        Number of channels.
     dtype : str
-        int16 or int32 (scaled to [-1, 1)), float32, float64; or complex64, complex128: then every
-        frame is a snapshot already.
-    frequency, rate, window, hop
-        As in `Recording.snapshots`, whose numbers these are; of several frequencies the lowest
-        sets the window. For complex frames only `rate`,
-        frames per second, has a meaning.
+        int16 or int32 (scaled to [-1, 1)), float32, float64; or complex64, complex128: every frame
+        is a snapshot.
+    frequency : float or sequence of float, optional
+        Frequencies, Hz; not for complex frames.
+    rate : float, optional
+        Frames per second, Hz.
+    window : int, optional
+        As in `Recording.snapshots`, at the lowest frequency; not for complex frames.
+    hop : int, optional
+        As in `Recording.snapshots`; not for complex frames.
 
     Yields
     ------
@@ -56,13 +61,13 @@ def live_snapshots(
         Centre of the window, s from the first sample; the number of the step for complex frames
         without a rate.
     ndarray, shape (n_channels,) or (n_bins, n_channels)
-        Snapshot, at each of several frequencies; NaN where a channel held no finite number.
+        Snapshot, at each of several frequencies; NaN where a channel has no finite number.
 
     Raises
     ------
     ValueError
-        If the stream ends before one window is full, or holds no finite number; or if an argument
-        is out of range. A part of a frame or of a window at the end is dropped.
+        If the stream ends before one window is complete, or contains no finite number; or if an
+        argument is out of range. An incomplete frame or window at the end is dropped.
 
     Examples
     --------
@@ -75,40 +80,40 @@ def live_snapshots(
     frame = kind.itemsize * count("n_channels", n_channels)
     if kind.kind == "c":
         if window is not None or hop is not None:
-            raise ValueError("complex frames are snapshots already: they take no window or hop")
+            raise ValueError("window and hop must be None for complex frames")
         window, hop, half, rate = 1, 1, 0.0, 1.0 if rate is None else positive("rate", rate)
     else:
         if rate is None or frequency is None:
-            raise ValueError("real samples want a rate and a frequency, Hz")
+            raise ValueError("real samples require a rate and a frequency, Hz")
         lowest = frequency if isinstance(frequency, float | int) else min(frequency)
         for each in [frequency] if isinstance(frequency, float | int) else frequency:
-            narrowband(np.empty((0, 1)), rate, each, 2, 1)  # checks both before it waits
+            narrowband(np.empty((0, 1)), rate, each, 2, 1)  # checks both before the first read
         window = default_window(rate, lowest) if window is None else count("window", window, 2)
         hop, half = window if hop is None else count("hop", hop), window / 2
-    heard = False
+    any_finite = False
     for step, block in enumerate(_windows(source, frame, window, hop)):
         samples = np.frombuffer(block, kind).reshape(window, n_channels)
         z = _snapshot(samples, rate, frequency, step * hop)
-        heard = heard or bool(np.isfinite(z).any())
+        any_finite = any_finite or bool(np.isfinite(z).any())
         yield (step * hop + half) / rate, z
-    if not heard:
+    if not any_finite:
         raise ValueError("no sample of the stream is finite")
 
 
 def _windows(source: BinaryIO, frame: int, window: int, hop: int) -> Iterator[bytes]:
-    """Yield the bytes of each full window; its beginnings are `hop` frames apart."""
+    """Yield the bytes of each complete window; windows are `hop` frames apart."""
     size, step, complete = window * frame, hop * frame, False
-    held = source.read(size)
-    while len(held) == size:
+    buffer = source.read(size)
+    while len(buffer) == size:
         complete = True
-        yield held
+        yield buffer
         source.read(max(0, step - size))
-        held = held[step:]
-        held += source.read(size - len(held))
+        buffer = buffer[step:]
+        buffer += source.read(size - len(buffer))
     if not complete:
         raise ValueError(
-            f"the stream ended after {len(held) // frame} frames of {frame} bytes; "
-            f"one window takes {window}"
+            f"the stream ended after {len(buffer) // frame} frames of {frame} bytes; "
+            f"one window requires {window}"
         )
 
 
@@ -120,7 +125,7 @@ def _snapshot(
 ) -> Complex:
     """Return the snapshot of one window of raw samples."""
     if samples.dtype.kind == "c":
-        with np.errstate(invalid="ignore"):  # signalling NaN, in bytes that are no floats
+        with np.errstate(invalid="ignore"):  # signalling NaN
             z = samples[0].astype(np.complex128)
         return np.where(np.isfinite(z), z, complex(np.nan, np.nan))
     if samples.dtype.kind == "i":
@@ -140,17 +145,18 @@ def track_live(
 ) -> int:
     """Run a tracker and write the lines of the tracks file, those of each step in one call.
 
-    The heading comes with the first snapshot that holds a number.
+    The heading precedes the first snapshot with valid data.
 
     Parameters
     ----------
     tracker : Tracker
+        The tracker.
     snapshots : iterable of (float, ndarray)
         Time, s, and snapshot, (n_sensors,).
     write : callable
-        Takes whole lines, ended by a newline.
+        Receives whole lines, ended by a newline.
     every : int
-        Write every so many steps only.
+        Number of steps per written estimate.
 
     Returns
     -------
@@ -168,16 +174,18 @@ def track_live(
     <BLANKLINE>
     1
     """
-    begun, n_steps = False, 0
+    has_header, n_steps = False, 0
     for n_steps, (time, z) in enumerate(snapshots, start=1):
         tracker.predict()
         tracker.update(z)
         if n_steps % every:
             continue
         estimate = tracker.estimate
-        rows: list[tuple[Any, ...]] = [] if begun or is_missing(z) else [header(type(estimate))]
+        rows: list[tuple[Any, ...]] = (
+            [] if has_header or is_missing(z) else [header(type(estimate))]
+        )
         rows += [(n_steps // every - 1, time, *row) for row in estimate.rows()]
         if rows:
-            begun = True
+            has_header = True
             write("".join(f"{','.join(text(row))}\n" for row in rows))
     return n_steps

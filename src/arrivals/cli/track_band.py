@@ -1,0 +1,60 @@
+"""`arrivals track` with real samples of a band, from files and streams."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from arrivals.cli.models import make_tracker, n_stream_channels
+from arrivals.cli.outputs import Bar, draw, live_output, refuse, write_table
+from arrivals.measurement_models import SensorArray
+from arrivals.recordings.readers import read
+from arrivals.recordings.sample_stream import band_samples, live_samples, track_samples
+from arrivals.recordings.stream import track_live
+from arrivals.trackers import Tracker
+
+
+def track_band(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -> None:
+    """Track by a tracker of single real samples, from a recording or a stream."""
+    refuse(
+        arguments,
+        ("frequency", "frequencies", "window"),
+        "requires snapshots, not a tracker of real samples",
+    )
+    if arguments.snapshots != 1:
+        raise ValueError("--snapshots requires snapshots, not a tracker of real samples")
+    if arguments.file == "-":
+        _track_band_stream(arguments, array, bar)
+        return
+    refuse(arguments, ("dtype", "channels"), "requires samples from standard input")
+    recording = read(arguments.file, rate=arguments.rate, variable=arguments.variable,
+                     transpose=arguments.transpose, array=array)  # fmt: skip
+    if recording.is_narrowband:
+        raise ValueError(f"{arguments.file}: --band requires real samples; got complex ones")
+    tracker, rate = _band_tracker(arguments, array, recording.rate)
+    samples = bar(recording.samples, desc=arguments.tracker)
+    result = track_samples(tracker, samples, rate, every=arguments.hop or 1)
+    write_table(result, arguments.out)
+    draw(arguments.plot, result, time=result.time)
+
+
+def _track_band_stream(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -> None:
+    refuse(arguments, ("plot", "variable", "transpose"), "requires a file, not a stream")
+    tracker, rate = _band_tracker(arguments, array, arguments.rate)
+    n_channels = n_stream_channels(arguments.channels, array)
+    frames = live_samples(sys.stdin.buffer, n_channels, dtype=arguments.dtype or "int16")
+    steps = ((k / rate, array.select(z)) for k, z in enumerate(frames))
+    with live_output(arguments.out) as write:
+        bars = bar(steps, desc=arguments.tracker)
+        if track_live(tracker, bars, write, every=arguments.hop or 1) == 0:
+            raise ValueError("the stream ended before one sample of every channel")
+
+
+def _band_tracker(
+    arguments: argparse.Namespace, array: SensorArray, rate: float | None
+) -> tuple[Tracker, float]:
+    """Return the tracker of a source that fills the band, and the rate."""
+    if rate is None:
+        raise ValueError("--band requires the samples per second: pass --rate")
+    measurement = band_samples(array, rate, arguments.band, arguments.snr)
+    return make_tracker(arguments.tracker, measurement, dict(arguments.set)), rate
