@@ -64,8 +64,7 @@ class ArraySnapshot(SingleSourceSnapshot):
     -----
     Shapes: `shape` is that of one measurement, (n_bins, n_snapshots, n_sensors), where axes of
     length one are left out; complex, any leading axes. Directions (..., n_sources), rad.
-    Missing data: a bin or snapshot without valid data is left out, then every sensor that is NaN
-    in any other bin or snapshot of the step.
+    A bin or snapshot without valid data is left out, then every sensor with a NaN in the others.
 
     Examples
     --------
@@ -296,6 +295,6 @@ class ArraySnapshot(SingleSourceSnapshot):
     def for_likelihood(self, names: Sequence[str]) -> MeasurementModel:
         """Return this model for `log_likelihood` at states with these names.
 
-        The direction is needed; the amplitudes are integrated out if the state has none.
+        The amplitudes are integrated out if the state has none.
         """
         return self if tuple(names) in ((), ("doa",)) else of_state(self, names)

@@ -25,6 +25,21 @@ class MeasurementModel(FrozenModel, ABC):
     -----
     Shapes: states (..., dim_x), measurements (..., dim_z), any leading axes. `dim_z`, `R` and
     `needs` may be properties, class attributes or dataclass fields.
+
+    Examples
+    --------
+    The distance of a position from the origin:
+
+    >>> @dataclass(frozen=True, eq=False)
+    ... class Range(MeasurementModel):
+    ...     R: np.ndarray
+    ...     dim_z, needs = 1, ("x", "y")
+    ...     def h(self, x):
+    ...         return np.hypot(x[..., 0], x[..., 1])[..., None]
+    ...     def H(self, x):
+    ...         return np.array([x / np.hypot(*x)])
+    >>> Range(np.eye(1)).for_state(("x", "vx", "y", "vy")).H(np.array([3.0, 0.0, 4.0, 0.0]))
+    array([[0.6, 0. , 0.8, 0. ]])
     """
 
     @property_or_field

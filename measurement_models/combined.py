@@ -21,10 +21,11 @@ class CombinedMeasurement(MeasurementModel):
 
     Parameters
     ----------
-    first, second : MeasurementModel
-        Models of the first and of the second part.
-    *more : MeasurementModel
-        Models of further parts; they are kept as `second`, a `CombinedMeasurement` of the rest.
+    first : MeasurementModel
+        Model of the first part.
+    second : MeasurementModel
+        Model of the second part. More parts may follow: `second` is then a `CombinedMeasurement`
+        of all but the first.
 
     Raises
     ------

@@ -17,7 +17,15 @@ from arrivals.typing import Complex
 class DirectionMeasurement(Protocol):
     """Measurements of plane waves whose directions can be estimated, as `ArraySnapshot` has them.
 
-    Models never change, so that what follows from one may be kept.
+    Models never change, so that results derived from one may be cached.
+
+    Examples
+    --------
+    >>> from arrivals.measurement_models import ArraySnapshot, Bearing, SensorArray
+    >>> isinstance(ArraySnapshot(SensorArray.ula(5, 0.5), wavelength=1.0), DirectionMeasurement)
+    True
+    >>> isinstance(Bearing([[0.0, 0.0]], noise=0.01), DirectionMeasurement)
+    False
     """
 
     @property

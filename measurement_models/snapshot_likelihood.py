@@ -15,6 +15,15 @@ from arrivals.typing import Complex, Float
 def composite(z: ArrayLike) -> Float:
     """Return complex vectors (..., n) as real ones (..., 2n): [Re; Im].
 
+    Parameters
+    ----------
+    z : array_like of complex, shape (..., n)
+        Snapshots, say.
+
+    Returns
+    -------
+    ndarray, shape (..., 2n)
+
     Examples
     --------
     >>> composite([1 + 2j, 3 - 4j])

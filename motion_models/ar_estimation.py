@@ -50,13 +50,15 @@ def yule_walker(signal: ArrayLike, order: int) -> tuple[Float, Float]:
     Parameters
     ----------
     signal : array_like, shape (..., n_samples)
+        Samples, real or complex.
     order : int
+        Number of coefficients.
 
     Returns
     -------
     coefficients : ndarray, shape (..., order)
     noise : ndarray, shape (...)
-        Variance of the driving noise.
+        Innovation variance.
 
     Raises
     ------
@@ -116,12 +118,17 @@ def select_order(signal: ArrayLike, highest: int) -> int:
     Parameters
     ----------
     signal : array_like, shape (n_samples,)
+        Samples, real or complex.
     highest : int
         Largest order to consider.
 
+    Returns
+    -------
+    int
+
     Notes
     -----
-    |κ| > 1.96 / √n is what 5 % of the lags of white noise do. Of whole recordings of speech all
+    |κ| > 1.96 / √n holds for 5 % of the lags of white noise. In whole recordings of speech all
     lags are significant.
 
     Examples

@@ -21,6 +21,21 @@ class MotionModel(FrozenModel, ABC):
     -----
     Shapes: states (..., dim_x), any leading axes. Units: the model's own; `dt` in its unit of time.
     `dim_x`, `state_names` and `angles` may be properties, class attributes or dataclass fields.
+
+    Examples
+    --------
+    A position that keeps still:
+
+    >>> class Rest(MotionModel):
+    ...     dim_x, state_names = 2, ("x", "y")
+    ...     def f(self, x, dt=1.0):
+    ...         return np.asarray(x)
+    ...     def F(self, x, dt=1.0):
+    ...         return np.eye(2)
+    ...     def Q(self, dt=1.0):
+    ...         return np.zeros((2, 2))
+    >>> Rest().sample([1.0, 2.0], np.random.default_rng(0))
+    array([1., 2.])
     """
 
     @property_or_field
@@ -62,7 +77,19 @@ class MotionModel(FrozenModel, ABC):
 
 
 class LinearMotionModel(MotionModel):
-    """Motion by a matrix, the same at every state: x' = F x + w, w ~ (0, Q)."""
+    """Motion by a matrix, the same at every state: x' = F x + w, w ~ (0, Q).
+
+    Examples
+    --------
+    >>> class Fading(LinearMotionModel):
+    ...     dim_x = 1
+    ...     def F(self, x=None, dt=1.0):
+    ...         return np.array([[0.5**dt]])
+    ...     def Q(self, dt=1.0):
+    ...         return np.zeros((1, 1))
+    >>> Fading().f([8.0]), Fading().is_linear
+    (array([4.]), True)
+    """
 
     @property
     def is_linear(self) -> bool:

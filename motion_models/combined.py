@@ -20,10 +20,11 @@ class CombinedMotion(MotionModel):
 
     Parameters
     ----------
-    first, second : MotionModel
-        Motions of the first and of the second part.
-    *more : MotionModel
-        Motions of further parts; they are kept as `second`, a `CombinedMotion` of the rest.
+    first : MotionModel
+        Motion of the first part.
+    second : MotionModel
+        Motion of the second part. More parts may follow: `second` is then a `CombinedMotion` of
+        all but the first.
     names : sequence of str, optional
         Names of all entries; those of the parts if None, () for none.
 

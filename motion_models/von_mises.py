@@ -100,7 +100,8 @@ def product(
     >>> product([0.0, 0.0], 3.0, [0.0, np.pi / 2], 4.0)
     (array([0.        , 0.92729522]), array([7., 5.]))
     """
-    eta = _parameter(mu1, kappa1) + _parameter(mu2, kappa2)
+    one, other = (np.exp(1j * np.asarray(mu, dtype=np.float64)) for mu in (mu1, mu2))
+    eta = np.multiply(kappa1, one) + np.multiply(kappa2, other)
     return wrap(np.angle(eta)), np.asarray(np.abs(eta))
 
 
@@ -153,16 +154,11 @@ def mfold_modes(eta: ArrayLike, m: int) -> Complex:
     eta : array_like of complex, shape (...)
         Parameters η = κ exp(jμ).
     m : int
-        Number of modes.
+        Number of modes, at least 1.
 
     Returns
     -------
     ndarray of complex, shape (..., m)
-
-    Raises
-    ------
-    ValueError
-        If `m` is below 1.
 
     References
     ----------
@@ -301,8 +297,3 @@ class VonMisesWalk(MotionModel):
         """Draw angles after one von Mises step, of concentration A⁻¹(A(κ)^dt)."""
         moved = self.f(x, dt)
         return wrap(moved + rng.vonmises(0.0, self.blur(np.inf, dt), moved.shape))
-
-
-def _parameter(mu: ArrayLike, kappa: ArrayLike) -> Complex:
-    """Return η = κ exp(jμ)."""
-    return np.asarray(np.multiply(kappa, np.exp(1j * np.asarray(mu, dtype=np.float64))))

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from arrivals.measurement_models.arrays.uniform_grid import grid_spacing
 from arrivals.parameters import FrozenModel
 from arrivals.typing import Complex, Float, Int
 from arrivals.validation import count, positive, real
@@ -63,34 +64,6 @@ def steering_vector(positions: ArrayLike, doa: ArrayLike, wavelength: ArrayLike)
     path = direction(doa, positions.shape[1]) @ positions.T
     waves = path / np.asarray(wavelength, dtype=np.float64)[..., None]
     return np.asarray(np.exp(2j * np.pi * waves))
-
-
-def grid_spacing(coordinates: ArrayLike, tolerance: float = 1e-3) -> float | None:
-    """Return the largest spacing of a uniform grid that holds all coordinates, or None.
-
-    A coordinate may lie off the grid by `tolerance` of its spacing, or the nth part of that if
-    the smallest gap has n spacings: a fine enough grid fits anything. Grids of more than 4096
-    points are not searched.
-
-    Examples
-    --------
-    >>> grid_spacing([0.0, 1.5, 3.5]), grid_spacing([0.0, 1.0, 2.7183]), grid_spacing([0.0])
-    (0.5, None, None)
-    """
-    places = np.unique(np.asarray(coordinates, dtype=np.float64))
-    places = places - places[0]
-    gaps = sorted(np.diff(places).tolist())
-    finest = int(4096 * gaps[0] / places[-1]) if gaps else 0
-    for parts in range(1, finest + 1):
-        spacing, span, n_points = gaps[0] / parts, 0.0, 0
-        for gap in gaps:  # larger gaps count more points and make the spacing more exact
-            n_points += round(gap / spacing)
-            span += gap
-            spacing = span / n_points
-        off = np.abs(places - spacing * np.rint(places / spacing)).max()
-        if off <= tolerance / parts * spacing:
-            return float(spacing)
-    return None
 
 
 @dataclass(frozen=True, eq=False)

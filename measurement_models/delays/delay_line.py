@@ -75,10 +75,7 @@ class SourceAtCentre(MeasurementModel):
         return ("delay", *self.source_names)
 
     def for_state(self, names: Sequence[str]) -> MeasurementModel:
-        """Return this model for states with these names.
-
-        Itself where the delay comes first and the source's elements last.
-        """
+        """Return this model; itself if the delay comes first and the source's elements last."""
         in_place = (*names[:1], *names[-self.dim_source :]) == self.needs
         return self if in_place else super().for_state(names)
 

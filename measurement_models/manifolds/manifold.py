@@ -19,6 +19,12 @@ class Manifold(Protocol):
     (n_nuisance, n_bins, n_sensors, n_harmonics). A tracker that uses this protocol needs no
     positions, wavelengths or signs. Manifolds never change, so that what follows from one may be
     cached.
+
+    Examples
+    --------
+    >>> from arrivals.measurement_models import ArraySnapshot, SensorArray
+    >>> ArraySnapshot(SensorArray.ula(5, 0.5), wavelength=1.0).manifold().harmonics
+    array([-2, -1,  0,  1,  2])
     """
 
     def __hash__(self) -> int:

@@ -18,7 +18,12 @@ def db_to_neper(level_db: ArrayLike) -> Float:
     Parameters
     ----------
     level_db : array_like
-        dB.
+        Levels, dB.
+
+    Returns
+    -------
+    ndarray
+        Np.
 
     References
     ----------
@@ -35,6 +40,16 @@ def db_to_neper(level_db: ArrayLike) -> Float:
 def neper_to_db(level: ArrayLike) -> Float:
     """Return levels in dB of levels in neper.
 
+    Parameters
+    ----------
+    level : array_like
+        Levels, Np.
+
+    Returns
+    -------
+    ndarray
+        dB.
+
     Examples
     --------
     >>> float(neper_to_db(np.log(100.0)))
@@ -45,6 +60,16 @@ def neper_to_db(level: ArrayLike) -> Float:
 
 def dbm_to_neper(level_dbm: ArrayLike) -> Float:
     """Return log amplitudes in neper, over that of 1 mW, of power levels in dBm.
+
+    Parameters
+    ----------
+    level_dbm : array_like
+        Power levels, dBm.
+
+    Returns
+    -------
+    ndarray
+        Np.
 
     Examples
     --------

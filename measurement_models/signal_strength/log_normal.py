@@ -11,18 +11,16 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.base import MeasurementModel, default_position, locate
 from arrivals.measurement_models.signal_strength.arguments import (
+    check_unit,
     entries,
     gains,
     moments,
     per_sensor,
 )
-from arrivals.measurement_models.signal_strength.decibels import neper_to_db
 from arrivals.measurement_models.signal_strength.envelope import sample_log_envelope
 from arrivals.measurement_models.signal_strength.path_loss import Levels, PropagationModel, slopes
 from arrivals.typing import Float
 from arrivals.validation import constant, count, number, positive, real
-
-FARTHEST = 40.0  # Np, 347 dB: values beyond are in another unit
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -166,16 +164,11 @@ class LogNormalRSS(MeasurementModel):
         Parameters
         ----------
         names : sequence of str
-            `state_names` of the motion model of one source.
+            `state_names` of the motion model of one source; a TypeError if x or y is missing.
 
         Returns
         -------
         LogNormalRSS
-
-        Raises
-        ------
-        TypeError
-            If the state has no x or no y.
         """
         if not names or self.position is not None:
             return self
@@ -261,19 +254,7 @@ class LogNormalRSS(MeasurementModel):
         if z.ndim == 0 or z.shape[-1] != self.dim_z:
             raise ValueError(f"readings must have shape (..., {self.dim_z}); got {z.shape}")
         xi = z - self.offsets - self._bias
-        low, high = (np.nan, np.nan) if np.isnan(z).all() else (np.nanmin(z), np.nanmax(z))
-        worst = low if low < -FARTHEST else high
-        if low < -FARTHEST or high > FARTHEST:
-            raise ValueError(
-                f"readings are in neper, within ±{FARTHEST:g}; got {worst:g}: "
-                "convert dB and dBm by db_to_neper"
-            )
-        floor = np.max(self._noise) - 5 * np.sqrt(self._variance.max()) - 5.0
-        if np.nanmin(xi, initial=np.inf) < floor:
-            raise ValueError(
-                f"a reading lies {neper_to_db(np.max(self._noise) - np.nanmin(xi)):.0f} dB below "
-                "the noise: readings are in neper, convert dB and dBm by db_to_neper"
-            )
+        check_unit(z, xi, np.max(self._noise), np.sqrt(self._variance.max()))
         return np.asarray(xi)
 
     def sources(self, x: ArrayLike) -> tuple[Float, Float]:

@@ -64,7 +64,7 @@ def test_track_frequency_above_nyquist_is_refused(
 @pytest.mark.parametrize(
     ("toml", "words"),
     [
-        (ARRAY.replace("n_sensors = 8", "n_sensors = 6"), ("6 channels", "recording has 8")),
+        (ARRAY.replace("n_sensors = 8", "n_sensors = 6"), ("6 channels", "got 8")),
         (ARRAY.replace("spacing = 0.17\n", ""), ("needs the key 'spacing'",)),
         (ARRAY.replace("speed = 343.0\n", ""), ("'speed' is missing",)),
         (ARRAY.replace('kind = "ula"\n', ""), ("'kind' is missing",)),
