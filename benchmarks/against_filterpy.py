@@ -1,6 +1,6 @@
-"""CPU time beside filterpy's and Stone Soup's, in one run, taking turns. Prints ratios, versions.
+"""CPU time of filters compared with filterpy and Stone Soup, interleaved in one run.
 
-Stone Soup is measured where it is installed: `pip install "arrivals[bench]"`.
+Prints ratios and versions. Stone Soup needs `pip install "arrivals[bench]"`.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ Step = Callable[[], object]
 WALK = ConstantVelocity(q=0.1)
 F, Q, H = WALK.F(), WALK.Q(), np.eye(4)[::2]
 X, P = np.array([5.0, 0.1, 4.0, -0.1]), np.eye(4)
-SEEN = LinearMeasurement(H, np.eye(2))
+POSITION = LinearMeasurement(H, np.eye(2))
 BEARING = Bearing([[0.0, 0.0], [10.0, 0.0]], noise=0.01)
 Z, ANGLES = np.array([5.0, 4.0]), BEARING.h(X)
 
@@ -41,7 +41,7 @@ def theirs(q: float = 1.0) -> KalmanFilter:
 
 
 def ours(q: float = 1.0) -> Kalman:
-    return Kalman(LinearMotion(F, q * Q), SEEN, X, P)
+    return Kalman(LinearMotion(F, q * Q), POSITION, X, P)
 
 
 def kalman() -> tuple[Step, Step]:
@@ -57,7 +57,7 @@ def kalman() -> tuple[Step, Step]:
 
 
 def ekf() -> tuple[Step, Step]:
-    """Bearings of two sensors; ours with the likelihood, filterpy's without, same h and H."""
+    """Bearings of two sensors, same h and H; with the likelihood, filterpy without it."""
     filter_ = ExtendedKalmanFilter(4, 2)
     filter_.x, filter_.P, filter_.F, filter_.Q, filter_.R = X, P, F, Q, BEARING.R
     tracker = EKF(WALK, BEARING, X, P)
@@ -94,7 +94,7 @@ def recording() -> tuple[Step, Step]:
 
 
 def batch(n_filters: int = 100, n_steps: int = 20) -> tuple[Step, Step]:
-    """Run 100 filters over 20 steps: theirs one by one, ours as one batch."""
+    """Run 100 filters over 20 steps: filterpy one by one, this library as one batch."""
     tracker = ours()
     zs = np.random.default_rng(0).normal(Z, 1.0, (n_filters, n_steps, 2))
 
@@ -109,10 +109,10 @@ def batch(n_filters: int = 100, n_steps: int = 20) -> tuple[Step, Step]:
 
 
 def soup(ekf: bool) -> Step:
-    """Stone Soup's predict and update, of the Kalman filter or of the EKF on two bearings.
+    """Predict and update of Stone Soup's Kalman filter, or of its EKF on two bearings.
 
-    Its likelihood is not asked for; its EKF finds Jacobians by differences. Each step starts from
-    the update before, because it caches by object.
+    Without the likelihood; the EKF computes Jacobians by differences. Each step starts from the
+    update before, because Stone Soup caches by object.
     """
     from stonesoup.models.measurement.linear import LinearGaussian
     from stonesoup.models.measurement.nonlinear import (
@@ -128,22 +128,26 @@ def soup(ekf: bool) -> Step:
     from stonesoup.updater.kalman import ExtendedKalmanUpdater, KalmanUpdater
 
     walk = LinearGaussianTimeInvariantTransitionModel(transition_matrix=F, covariance_matrix=Q)
-    seen: Any = LinearGaussian(ndim_state=4, mapping=(0, 2), noise_covar=np.eye(2))
-    predictor, updater, z = KalmanPredictor(walk), KalmanUpdater(seen, use_joseph_cov=True), Z
+    position: Any = LinearGaussian(ndim_state=4, mapping=(0, 2), noise_covar=np.eye(2))
+    predictor, updater, z = KalmanPredictor(walk), KalmanUpdater(position, use_joseph_cov=True), Z
     if ekf:
         bearings = [
             Cartesian2DToBearing(4, (0, 2), noise_covar=[[0.01]], translation_offset=place[:, None])
             for place in BEARING.sensor_positions
         ]
-        seen = CombinedReversibleGaussianMeasurementModel(bearings)
-        predictor, updater, z = ExtendedKalmanPredictor(walk), ExtendedKalmanUpdater(seen), ANGLES
+        position = CombinedReversibleGaussianMeasurementModel(bearings)
+        predictor, updater, z = (
+            ExtendedKalmanPredictor(walk),
+            ExtendedKalmanUpdater(position),
+            ANGLES,
+        )
     state = GaussianState(StateVector(X), P)
-    detection = Detection(StateVector(z), measurement_model=seen)
+    detection = Detection(StateVector(z), measurement_model=position)
 
     def step() -> None:
         nonlocal state
         state = updater.update(SingleHypothesis(predictor.predict(state), detection))
-        state.hypothesis = None  # or the whole past hangs on it
+        state.hypothesis = None  # otherwise it references all past states
 
     return step
 
@@ -168,24 +172,24 @@ def main() -> None:
     has_soup = find_spec("stonesoup") is not None
     rows: list[tuple[str, tuple[Step, Step], int, float]] = [
         ("kalman, with log-likelihood", kalman(), 500, 0.5),
-        ("ekf on bearings, ours with likelihood", ekf(), 500, 1.6),
+        ("ekf on bearings, arrivals with likelihood", ekf(), 500, 1.6),
         ("imm of two", imm(), 200, 0.6),
         ("recording a step", recording(), 200, 0.3),
         ("100 filters, 20 steps, as a batch", batch(), 1, 0.1),
     ]
     soups = {rows[0][0]: soup(ekf=False), rows[1][0]: soup(ekf=True)} if has_soup else {}
     names = ("numpy", "filterpy", "stonesoup") if has_soup else ("numpy", "filterpy")
-    print(f"CPU time of one core; {', '.join(f'{name} {version(name)}' for name in names)}\n")
-    print("| what | whose | us | ratio to filterpy | wanted |\n|---|---|---|---|---|")
-    for what, pair, repeats, wanted in rows:
-        steps = [*pair, *([soups[what]] if what in soups else [])]
+    print(f"CPU time of one core; {', '.join(f'{each} {version(each)}' for each in names)}\n")
+    print("| step | library | us | ratio to filterpy | limit |\n|---|---|---|---|---|")
+    for name, pair, repeats, limit in rows:
+        steps = [*pair, *([soups[name]] if name in soups else [])]
         (theirs_s, ours_s, *soup_s), (_, ratio, *soup_ratio) = compare(steps, repeats)
-        print(f"| {what} | filterpy | {1e6 * theirs_s:.1f} | 1 | |")
-        print(f"| | ours | {1e6 * ours_s:.1f} | {ratio:.3f} | {wanted} |")
+        print(f"| {name} | filterpy | {1e6 * theirs_s:.1f} | 1 | |")
+        print(f"| | arrivals | {1e6 * ours_s:.1f} | {ratio:.3f} | {limit} |")
         for seconds, times in zip(soup_s, soup_ratio, strict=True):
             print(f"| | Stone Soup | {1e6 * seconds:.1f} | {times:.3f} | |")
     if not has_soup:
-        print('\nStone Soup is not installed, its rows are left out: pip install "arrivals[bench]"')
+        print('\nStone Soup is not installed; its rows are left out: pip install "arrivals[bench]"')
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Filters of ours and of filterpy on one system, for the tests of the contract."""
+"""Filters of this library and of filterpy on one system, for the tests of the contract."""
 
 from typing import Any
 
@@ -20,7 +20,7 @@ X = np.array([8.0, 0.3, 6.0, -0.2])
 P = np.diag([1.0, 0.1, 1.0, 0.1])
 WALK = ConstantVelocity(q=0.05)
 BEARING = Bearing(PLACES, noise=1e-3)
-SEEN = LinearMeasurement(np.eye(4)[::2], [[0.5, 0.1], [0.1, 0.3]])
+POSITION = LinearMeasurement(np.eye(4)[::2], [[0.5, 0.1], [0.1, 0.3]])
 M = np.array([[0.9, 0.1], [0.2, 0.8]])
 
 
@@ -49,14 +49,14 @@ def assert_twins(ours: Any, theirs: Any, tolerance: float = 1e-12, names: str = 
 
 
 def plain(q: float = 0.05, kind: type[GaussianFilter] = Kalman) -> GaussianFilter:
-    return kind(ConstantVelocity(q), SEEN, X, P)
+    return kind(ConstantVelocity(q), POSITION, X, P)
 
 
 def theirs(q: float = 0.05, column: bool = False) -> Any:
     kf = KalmanFilter(4, 2)
     kf.x, kf.P = X.reshape(4, 1) if column else X, P
     walk = ConstantVelocity(q)
-    kf.F, kf.Q, kf.H, kf.R = walk.F(), walk.Q(), SEEN.H(), SEEN.R
+    kf.F, kf.Q, kf.H, kf.R = walk.F(), walk.Q(), POSITION.H(), POSITION.R
     return kf
 
 

@@ -156,7 +156,7 @@ def control_effect(u: ArrayLike, B: ArrayLike | None) -> Float:
     """
     if B is None:
         cure = "take LinearMotion(..., control=B)"
-        raise ValueError(f"motion must have a control matrix where u is given; got none: {cure}")
+        raise ValueError(f"motion must have a control matrix where u is not zero; got none: {cure}")
     B, u = np.asarray(B, dtype=np.float64), real("u", u).ravel()
     if u.shape != (B.shape[1],):
         raise ValueError(f"u must have shape ({B.shape[1]},); got {u.shape}")
@@ -164,7 +164,7 @@ def control_effect(u: ArrayLike, B: ArrayLike | None) -> Float:
 
 
 def per_step_values(name: str, values: PerStep, n_steps: int) -> Sequence[Any] | Float:
-    """Return one value for each step, None where none are given.
+    """Return one value for each step, None where values is None.
 
     Examples
     --------

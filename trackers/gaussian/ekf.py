@@ -1,4 +1,4 @@
-"""The extended Kalman filter."""
+"""Extended Kalman filter."""
 
 from __future__ import annotations
 
@@ -10,20 +10,22 @@ from arrivals.typing import Float
 
 @register("ekf")
 class EKF(GaussianFilter):
-    """The extended Kalman filter: the models' tangents at the mean.
+    """Extended Kalman filter: models linearized by their Jacobians at the mean.
 
     Parameters
     ----------
     motion : MotionModel
+        Motion of the state.
     measurement : MeasurementModel
+        Measurement of a state of that motion.
     x : array_like, shape (n,) or (n, 1)
-        Mean.
+        Initial mean.
     P : array_like, shape (n, n)
-        Covariance.
+        Initial covariance.
 
     Notes
     -----
-    Everything else is that of `GaussianFilter`.
+    Attributes and methods are those of `GaussianFilter`.
 
     References
     ----------
@@ -33,10 +35,10 @@ class EKF(GaussianFilter):
     --------
     >>> from arrivals.measurement_models import Bearing
     >>> from arrivals.motion_models import RandomWalk
-    >>> seen = Bearing([[0.0, 0.0], [10.0, 0.0]], noise=1e-4, position=(0, 1))
-    >>> tracker = EKF(RandomWalk(q=0.01), seen, x=[4.0, 6.0], P=[[1, 0], [0, 1]])
+    >>> bearings = Bearing([[0.0, 0.0], [10.0, 0.0]], noise=1e-4)
+    >>> tracker = EKF(RandomWalk(q=0.01), bearings, x=[4.0, 6.0], P=[[1, 0], [0, 1]])
     >>> tracker.predict()
-    >>> tracker.update(seen.h([5.0, 5.0]))
+    >>> tracker.update(bearings.h([5.0, 5.0]))
     >>> tracker.x.round(1)
     array([5., 5.])
     """

@@ -1,4 +1,4 @@
-"""The Kalman filter."""
+"""Kalman filter."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ ArrayFunction = Callable[[Float], Float]
 
 @register("kalman")
 class Kalman(GaussianFilter):
-    """The Kalman filter, for models that are matrices.
+    """Kalman filter, for linear models.
 
     Parameters
     ----------
     motion : MotionModel
-        Linear; one with a `control` matrix uses the control input.
+        Linear motion of the state; one with a `control` matrix uses the control input.
     measurement : MeasurementModel
-        Linear.
+        Linear measurement of a state of that motion.
     x : array_like, shape (n,) or (n, 1)
-        Mean.
+        Initial mean.
     P : array_like, shape (n, n)
-        Covariance.
+        Initial covariance.
 
     Raises
     ------
@@ -44,7 +44,7 @@ class Kalman(GaussianFilter):
 
     Notes
     -----
-    Everything else is that of `GaussianFilter`. Results equal those of
+    Attributes and methods are those of `GaussianFilter`. Results equal those of
     `filterpy.kalman.KalmanFilter`.
 
     References

@@ -1,4 +1,4 @@
-"""The particle filter."""
+"""Particle filter."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ from arrivals.validation import count, covariance, instance, probability, real, 
 
 
 def systematic_resample(weights: ArrayLike, rng: np.random.Generator) -> Int:
-    """Draw as many indices as there are weights, each about n times its weight often.
+    """Draw n indices, index i with a number of copies within 1 of n times its weight.
 
     Parameters
     ----------
     weights : array_like, shape (n,)
-        Not negative, of sum 1.
+        Weights, not negative, of sum 1.
     rng : numpy.random.Generator
-        One number is drawn.
+        Random generator; one number is drawn.
 
     Returns
     -------
     ndarray of int, shape (n,)
-        In rising order.
+        Indices in rising order.
 
     References
     ----------
@@ -55,44 +55,47 @@ def systematic_resample(weights: ArrayLike, rng: np.random.Generator) -> Int:
 
 @register("particle")
 class Particle(Tracker):
-    """The bootstrap particle filter: states drawn by the motion, weighed by the measurement.
+    """Bootstrap particle filter: states drawn by the motion, weighted by the measurement.
 
     Parameters
     ----------
     motion : MotionModel
-        Its `sample` moves the particles.
+        Motion of the state; its `sample` predicts the particles.
     measurement : MeasurementModel
-        Real measurements are weighed by its Gaussian face; complex snapshots by its exact
-        `log_likelihood(z, states)`, as `ArraySnapshot` has it for states that are directions.
+        Measurement of the state. Real measurements have its Gaussian likelihood; complex snapshots
+        its exact `log_likelihood(z, states)`, as in `ArraySnapshot` for states that are directions.
     x : array_like, shape (n,)
-        Mean of the particles at first.
+        Initial mean.
     P : array_like, shape (n, n)
-        Their covariance.
+        Initial covariance.
     n_particles : int
+        Number of particles.
     rng : int or numpy.random.Generator
-        Source of chance, or its seed. A configuration file needs a seed.
+        Random generator, or its seed. A configuration file needs a seed.
     resample_below : float
-        Particles are drawn anew where fewer than this share of them count, 1/Σw².
+        Particles are resampled where their effective number, 1/Σw², is below this fraction.
 
     Attributes
     ----------
     particles : ndarray, shape (n_particles, n)
         States; drawn at the first step after `x` or `P` were assigned.
     weights : ndarray, shape (n_particles,)
-        Their weights.
+        Weights of the particles, of sum 1.
     log_likelihood, likelihood : float
-        Of the last measurement; 0 and 1 if it was missed.
+        Log likelihood and likelihood of the last measurement; 0 and 1 if it was missing.
 
     Raises
     ------
     TypeError
-        If a part is no model, or complex measurements meet a model without `log_likelihood`.
+        If a part is not a model, the measurement reads an entry that the state lacks, or a
+        measurement is complex and its model has no `log_likelihood`.
     ValueError
-        If `x`, `P` or a measurement does not fit, or no particle explains a measurement.
+        If `x`, `P` or a measurement does not fit, or all particles have likelihood 0.
 
     Notes
     -----
-    The mean of an angle is the direction of the mean vector; `P` is of the shorter ways round.
+    The mean of an angle is the direction of the mean vector; `P` is that of differences in
+    [-π, π).
 
     References
     ----------
@@ -101,13 +104,13 @@ class Particle(Tracker):
 
     Examples
     --------
-    Raw snapshots, and a von Mises walk:
+    Direction of a von Mises walk from complex snapshots:
 
     >>> from arrivals.measurement_models import ArraySnapshot, SensorArray
     >>> from arrivals.motion_models import VonMisesWalk
-    >>> heard = ArraySnapshot(SensorArray.ula(8, spacing=0.5), wavelength=1.0, noise=0.1)
-    >>> tracker = Particle(VonMisesWalk(500.0), heard, [0.0], [[0.2]], n_particles=500, rng=1)
-    >>> run = tracker.run(heard.array.steering_vector(np.full(5, 0.3), 1.0))
+    >>> line = ArraySnapshot(SensorArray.ula(8, spacing=0.5), wavelength=1.0, noise=0.1)
+    >>> tracker = Particle(VonMisesWalk(500.0), line, [0.0], [[0.2]], n_particles=500, rng=1)
+    >>> run = tracker.run(line.array.steering_vector(np.full(5, 0.3), 1.0))
     >>> run.x[-1].round(1)
     array([0.3])
     """
@@ -126,18 +129,18 @@ class Particle(Tracker):
         self.motion = instance("motion", motion, MotionModel)  # type: ignore[type-abstract]  # any
         instance("measurement", measurement, MeasurementModel)  # type: ignore[type-abstract]  # any
         self.measurement = measurement.for_likelihood(motion.state_names)
-        self.x, self.P = self._checked(x, P)
+        self.x, self.P = self._check_belief(x, P)
         self.n_particles = count("n_particles", n_particles)
         self.resample_below = probability("resample_below", resample_below)
         self.rng = rng
         self.particles = np.tile(self.x, (n_particles, 1))
         self.weights = np.full(n_particles, 1 / n_particles)
-        self._x, self._P = self.x.copy(), self.P.copy()  # not those of the particles: draw them
+        self._x, self._P = self.x.copy(), self.P.copy()  # so that the first step draws particles
         self.log_likelihood = 0.0
 
     @property
     def rng(self) -> int | np.random.Generator:
-        """Seed or generator, as given; assigning another starts anew from that."""
+        """Seed or generator, as passed; assigning another restarts the random numbers."""
         return self._rng
 
     @rng.setter
@@ -147,31 +150,35 @@ class Particle(Tracker):
             self._rng = rng
 
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
-        """Move each particle by a draw from the motion; `u` must be None or 0."""
+        """Draw each particle from the motion model; `u` must be None or 0."""
         if u is not None and np.any(u):
-            raise ValueError("the particle filter takes no control input: put it into the motion")
-        particles, weights = self._cloud()
-        self._hold(self.motion.sample(particles, self._generator, dt), weights)
+            raise ValueError(f"u must be None or 0; got {u}: add the control to the motion model")
+        particles, weights = self._draw_if_assigned()
+        self._set_particles(self.motion.sample(particles, self._generator, dt), weights)
 
     def update(self, z: ArrayLike | None) -> None:
-        """Weigh the particles by a measurement, (m,) or a complex snapshot; NaN is left out."""
+        """Weight the particles by a measurement, (m,) or a complex snapshot; NaN is left out."""
         if is_missing(z):
             self.log_likelihood = 0.0
             return
         before = self._generator.bit_generator.state
         try:
-            particles, weights = self._cloud()
+            particles, weights = self._draw_if_assigned()
+            # log w_i = log w_i + log p(z | x_i), normalized
             log_weights = _log(weights) + self._log_likelihood(np.asarray(z), particles)
             top = log_weights.max()
             if not np.isfinite(top):
-                raise ValueError("no particle explains the measurement: take more of them")
+                raise ValueError(
+                    "z must have a positive likelihood; got 0 for all particles: increase "
+                    "n_particles"
+                )
         except (ValueError, TypeError):
             self._generator.bit_generator.state = before
             raise
         weights = np.exp(log_weights - top)
         total = weights.sum()
         self.log_likelihood = float(top + np.log(total))
-        self._hold(particles, weights / total)
+        self._set_particles(particles, weights / total)
         self._resample()
 
     def _log_likelihood(self, z: ArrayLike, particles: Float) -> Float:
@@ -179,37 +186,36 @@ class Particle(Tracker):
         if exact is not None and (np.iscomplexobj(z) or self.motion.state_names):
             return np.asarray(exact(z, particles))
         if np.iscomplexobj(z):
-            raise TypeError(
-                f"complex measurements need a model with log_likelihood; got {self.measurement}"
-            )
+            name = type(self.measurement).__name__
+            raise TypeError(f"measurement must have log_likelihood where z is complex; got {name}")
         z = measurement_vector(z, self.measurement.dim_z)
-        heard = ~np.isnan(z)
+        valid = ~np.isnan(z)
         y = self.measurement.residual(z, self.measurement.h(particles))
-        return log_normal(y[:, heard], self.measurement.R[np.ix_(heard, heard)])
+        return log_normal(y[:, valid], self.measurement.R[np.ix_(valid, valid)])
 
     def _resample(self) -> None:
-        """Draw particles anew where few of them count; the mean stays that of the weighted ones."""
+        """Resample where the effective number of particles is low; `x` and `P` do not change."""
         if 1 / np.sum(self.weights**2) < self.resample_below * self.n_particles:
             self.particles = self.particles[systematic_resample(self.weights, self._generator)]
             self.weights = np.full(self.n_particles, 1 / self.n_particles)
 
-    def _cloud(self) -> tuple[Float, Float]:
-        """Return particles and weights, drawn now if `x`, `P` or their number was assigned."""
+    def _draw_if_assigned(self) -> tuple[Float, Float]:
+        """Return particles and weights, drawn if `x`, `P` or `n_particles` was assigned."""
         n = self.n_particles
         if self.x is self._x and self.P is self._P and len(self.weights) == n:
             return self.particles, self.weights
-        x, P = self._checked(self.x, self.P)
-        drawn = x + gaussian(P, (n,), self._generator)
-        return wrapped(drawn, self.motion.angles), np.full(n, 1 / n)
+        x, P = self._check_belief(self.x, self.P)
+        particles = x + gaussian(P, (n,), self._generator)
+        return wrapped(particles, self.motion.angles), np.full(n, 1 / n)
 
-    def _checked(self, x: ArrayLike, P: ArrayLike) -> tuple[Float, Float]:
+    def _check_belief(self, x: ArrayLike, P: ArrayLike) -> tuple[Float, Float]:
         n = self.motion.dim_x
         mean = shaped("x", x, n)
         if not np.isfinite(mean).all():
             raise ValueError(f"x must be finite; got {mean.tolist()}")
         return mean, covariance("P", P, n)
 
-    def _hold(self, particles: Float, weights: Float) -> None:
+    def _set_particles(self, particles: Float, weights: Float) -> None:
         angles = self.motion.angles
         self.particles, self.weights = particles, weights
         self.x = self._x = circular_mean(particles, weights, angles)

@@ -1,4 +1,4 @@
-"""The unscented Kalman filter."""
+"""Unscented Kalman filter."""
 
 from __future__ import annotations
 
@@ -37,34 +37,37 @@ def merwe_weights(n: int, alpha: float, beta: float, kappa: float) -> tuple[Floa
 
 @register("ukf")
 class UKF(GaussianFilter):
-    """The unscented Kalman filter: the models' regressions over Merwe's sigma points.
+    """Unscented Kalman filter: models linearized by regression over Merwe's sigma points.
 
     Parameters
     ----------
     motion : MotionModel
+        Motion of the state.
     measurement : MeasurementModel
+        Measurement of a state of that motion.
     x : array_like, shape (n,) or (n, 1)
-        Mean.
+        Initial mean.
     P : array_like, shape (n, n)
-        Covariance.
+        Initial covariance.
     alpha : float
-        Distance of the sigma points from the mean, against √(n + κ) standard deviations.
+        Distance of the sigma points from the mean, relative to √(n + κ) standard deviations.
     beta : float
-        2 is best for Gaussian beliefs.
+        Weight of the mean's sigma point in covariances; 2 is best for Gaussian beliefs.
     kappa : float
-        Above -n.
+        Second scale of the sigma points, above -n.
 
     Raises
     ------
     ValueError
-        If `alpha` is not positive or `kappa` not above -n; else as in `GaussianFilter`.
+        If `alpha` is not positive or `kappa` not above -n; otherwise as in `GaussianFilter`.
 
     Notes
     -----
-    Everything else is that of `GaussianFilter`. Every `update` draws sigma points from the belief
-    of that moment, the second after a `predict` too. Means are taken in the tangent space at the
-    middle sigma point, where angles are differences. A sigma-point step is a Kalman step with the
-    regression of the function on the state for a matrix, and its residue for more noise.
+    Attributes and methods are those of `GaussianFilter`. Every `update` draws sigma points from
+    the present belief, also a second one after the same `predict`. Means are taken by differences
+    from the middle sigma point, so that angles are averaged on the circle. A sigma-point step is a
+    Kalman step in which the regression of the function on the state replaces the matrix, and the
+    covariance of its residual is added to the noise.
 
     References
     ----------
@@ -76,10 +79,10 @@ class UKF(GaussianFilter):
     --------
     >>> from arrivals.measurement_models import Bearing
     >>> from arrivals.motion_models import RandomWalk
-    >>> seen = Bearing([[0.0, 0.0], [10.0, 0.0]], noise=1e-4, position=(0, 1))
-    >>> tracker = UKF(RandomWalk(q=0.01), seen, x=[4.0, 6.0], P=np.eye(2))
+    >>> bearings = Bearing([[0.0, 0.0], [10.0, 0.0]], noise=1e-4)
+    >>> tracker = UKF(RandomWalk(q=0.01), bearings, x=[4.0, 6.0], P=np.eye(2))
     >>> tracker.predict()
-    >>> tracker.update(seen.h([5.0, 5.0]))
+    >>> tracker.update(bearings.h([5.0, 5.0]))
     >>> tracker.x.round(1)
     array([5., 5.])
     """
@@ -103,13 +106,13 @@ class UKF(GaussianFilter):
     def linearize_motion(self, x: Float, P: Float, dt: float) -> Linearization:
         """Return the regression of f over the sigma points."""
         angles = self.motion.angles
-        near = self._regression(
+        motion = self._regression(
             x,
             P,
             lambda points: self.motion.f(points, dt),
             lambda a, b: difference(a, b, angles),
         )
-        return near._replace(mean=wrapped(near.mean, angles))
+        return motion._replace(mean=wrapped(motion.mean, angles))
 
     def linearize_measurement(self, x: Float, P: Float) -> Linearization:
         """Return the regression of h over the sigma points."""
@@ -122,21 +125,26 @@ class UKF(GaussianFilter):
         function: Callable[[Float], Float],
         subtract: Callable[[Float, Float], Float],
     ) -> Linearization:
-        mean, covariance, scale = merwe_weights(self.dim_x, self.alpha, self.beta, self.kappa)
+        mean_weights, weights, scale = merwe_weights(self.dim_x, self.alpha, self.beta, self.kappa)
         P, L, jittered = cholesky(P)
-        steps = self._steps(np.sqrt(scale) * L)
+        # X_i = x + d_i,  d_i = 0, columns of sqrt(scale) L, and their negatives
+        steps = _sigma_steps(np.sqrt(scale) * L)
+        # Y_i = f(X_i),  y = Σ w_i Y_i, by differences from Y_0
         images = function(x[..., None, :] + steps)
         middle = images[..., :1, :]
-        moved = subtract(images, middle)
-        shift = apply(moved.swapaxes(-1, -2), mean)
-        rest = moved - shift[..., None, :]
-        cross = (covariance[:, None] * steps).swapaxes(-1, -2) @ rest
+        offsets = subtract(images, middle)
+        shift = apply(offsets.swapaxes(-1, -2), mean_weights)
+        residuals = offsets - shift[..., None, :]
+        # P_xy = Σ w_i d_i (Y_i - y)'
+        cross = (weights[:, None] * steps).swapaxes(-1, -2) @ residuals
+        # F = P_xy' P^-1
         jacobian = np.asarray(np.linalg.solve(P, cross), np.float64).swapaxes(-1, -2)
-        extra_noise = weighted_covariance(rest, covariance) - jacobian @ cross
+        # P_yy - F P_xy
+        extra_noise = weighted_covariance(residuals, weights) - jacobian @ cross
         return Linearization(middle[..., 0, :] + shift, jacobian, extra_noise, jittered)
 
-    @staticmethod
-    def _steps(L: Float) -> Float:
-        """Return the way from the mean to each sigma point, (..., 2n+1, n)."""
-        U = L.swapaxes(-1, -2)
-        return np.concatenate([np.zeros_like(U[..., :1, :]), U, -U], axis=-2)
+
+def _sigma_steps(L: Float) -> Float:
+    """Return the differences of the sigma points from the mean, (..., 2n+1, n)."""
+    U = L.swapaxes(-1, -2)
+    return np.concatenate([np.zeros_like(U[..., :1, :]), U, -U], axis=-2)

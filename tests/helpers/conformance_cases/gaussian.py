@@ -1,4 +1,4 @@
-"""The Kalman-type trackers, the particle filter and the IMM, for `test_conformance`."""
+"""Gaussian filters, particle filter and IMM, for `test_conformance`."""
 
 import numpy as np
 
@@ -14,11 +14,11 @@ from arrivals.trackers import EKF, IMM, UKF, Kalman, Particle
 from arrivals.trackers.conformance import MakeTracker, Measurements
 
 X, P = np.array([5.0, 0.1, 4.0, -0.1]), np.diag([1.0, 0.1, 1.0, 0.1])
-MOVES = ConstantVelocity(q=0.01)
-SEEN = LinearMeasurement(np.eye(4)[::2], [[0.2, 0.05], [0.05, 0.1]])
-FADES = LinearMotion([[0.9]], [[0.19]], control=[[1.0]])
+MOTION = ConstantVelocity(q=0.01)
+POSITION = LinearMeasurement(np.eye(4)[::2], [[0.2, 0.05], [0.05, 0.1]])
+DECAY = LinearMotion([[0.9]], [[0.19]], control=[[1.0]])
 BEARING = Bearing([[0.0, 0.0], [10.0, 0.0], [3.0, 9.0]], noise=1e-3)
-NEAR = Bearing([[0.0, 0.0], [10.0, 0.0]], noise=1e-3, position=(0, 1))
+BEARINGS_XY = Bearing([[0.0, 0.0], [10.0, 0.0]], noise=1e-3, position=(0, 1))
 ANGLE = LinearMeasurement([[1.0]], [[0.01]])
 LINE = ArraySnapshot(SensorArray.ula(6, spacing=0.5), wavelength=1.0, noise=0.05)
 
@@ -41,7 +41,7 @@ def snapshots() -> Measurements:
 
 
 def imm() -> IMM:
-    turning = EKF(RandomWalk(0.1), NEAR, X[::2], np.eye(2))
+    turning = EKF(RandomWalk(0.1), BEARINGS_XY, X[::2], np.eye(2))
     return IMM([Kalman(RandomWalk(0.01), POINT, X[::2], np.eye(2)), turning], [0.6, 0.4], MARKOV)
 
 
@@ -49,21 +49,21 @@ POINT = LinearMeasurement(np.eye(2), 1e-2 * np.eye(2))
 MARKOV = np.array([[0.9, 0.1], [0.2, 0.8]])
 
 TRACKERS: list[tuple[str, MakeTracker, Measurements]] = [
-    ("kalman", lambda: Kalman(MOVES, SEEN, X, P), positions()),
-    ("kalman", lambda: Kalman(FADES, ANGLE, [1.0], [[1.0]]), np.array([[0.5], [0.4], [0.6]])),
-    ("ekf", lambda: EKF(MOVES, BEARING, X, P), bearings(BEARING)),
+    ("kalman", lambda: Kalman(MOTION, POSITION, X, P), positions()),
+    ("kalman", lambda: Kalman(DECAY, ANGLE, [1.0], [[1.0]]), np.array([[0.5], [0.4], [0.6]])),
+    ("ekf", lambda: EKF(MOTION, BEARING, X, P), bearings(BEARING)),
     (
         "ekf",
         lambda: EKF(CoordinatedTurn(0.01, 0.01), BEARING, [*X, 0.1], np.eye(5)),
         bearings(BEARING),
     ),
     ("ekf", lambda: EKF(VonMisesWalk(50.0), ANGLE, [3.1], [[0.1]]), np.array([[3.1], [-3.1]])),
-    ("ukf", lambda: UKF(RandomWalk(0.01), NEAR, X[::2], np.eye(2)), bearings(NEAR)),
+    ("ukf", lambda: UKF(RandomWalk(0.01), BEARINGS_XY, X[::2], np.eye(2)), bearings(BEARINGS_XY)),
     ("ukf", lambda: UKF(VonMisesWalk(50.0), ANGLE, [3.1], [[0.1]]), np.array([[3.1], [-3.1]])),
     (
         "particle",
-        lambda: Particle(RandomWalk(0.1), NEAR, X[::2], np.eye(2), n_particles=200, rng=1),
-        bearings(NEAR),
+        lambda: Particle(RandomWalk(0.1), BEARINGS_XY, X[::2], np.eye(2), n_particles=200, rng=1),
+        bearings(BEARINGS_XY),
     ),
     (
         "particle",

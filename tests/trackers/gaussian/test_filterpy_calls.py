@@ -1,4 +1,4 @@
-"""The contract with filterpy 2.0.0, D1 to D6 and D12: calls, attributes and copies."""
+"""The filterpy contract, D1 to D6 and D12: calls, attributes and copies."""
 
 import copy
 import pickle
@@ -11,7 +11,7 @@ import pytest
 from filterpy.common import Saver
 from filterpy_twins import (
     BEARING,
-    SEEN,
+    POSITION,
     WALK,
     M,
     P,
@@ -34,7 +34,7 @@ from arrivals.trackers import EKF, IMM, UKF, GaussianFilter, Kalman, Particle
 
 
 @pytest.mark.parametrize("shape", [(3,), (3, 1)])
-def test_d1_belief_may_be_assigned_between_any_two_calls(shape: tuple[int, ...]) -> None:
+def test_d1_assigned_belief_is_used_by_the_next_call(shape: tuple[int, ...]) -> None:
     tracker, kf = twins(0, column=len(shape) == 2)
     for z in np.ones((3, 2)):
         for step in ("predict", "update"):
@@ -46,7 +46,7 @@ def test_d1_belief_may_be_assigned_between_any_two_calls(shape: tuple[int, ...])
 
 
 @pytest.mark.parametrize("kind", [Kalman, EKF, UKF])
-def test_d1_x_keeps_the_axes_it_is_given_later(kind: type[GaussianFilter]) -> None:
+def test_d1_assigned_x_keeps_its_number_of_axes(kind: type[GaussianFilter]) -> None:
     tracker = plain(kind=kind)
     tracker.x = X.reshape(4, 1)
     tracker.predict()
@@ -58,7 +58,7 @@ def test_d1_x_keeps_the_axes_it_is_given_later(kind: type[GaussianFilter]) -> No
 # D2
 
 
-def test_d2_predict_takes_the_control_first_and_none_or_zero_for_none() -> None:
+def test_d2_predict_first_argument_is_the_control_input() -> None:
     tracker, kf = twins(1)
     for u in (None, 0, 0.0, [0.0], [1.5], 2.0):
         tracker.predict(u)
@@ -71,7 +71,7 @@ def test_d2_predict_takes_the_control_first_and_none_or_zero_for_none() -> None:
 # D3
 
 
-def test_d3_update_takes_every_shape_of_measurement() -> None:
+def test_d3_update_accepts_every_shape_of_measurement() -> None:
     for z in ([1.0, 2.0], (1, 2), np.array([1.0, 2.0]), np.array([[1.0], [2.0]])):
         tracker = plain()
         tracker.update(z)
@@ -84,7 +84,7 @@ def test_d3_update_takes_every_shape_of_measurement() -> None:
 
 
 @pytest.mark.parametrize("kind", [Kalman, EKF, UKF])
-def test_d3_update_takes_r_and_h_for_once(kind: type[GaussianFilter]) -> None:
+def test_d3_update_r_and_h_replace_the_model_once(kind: type[GaussianFilter]) -> None:
     tracker, kf = plain(kind=kind), theirs()
     H = np.array([[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
     for R, once in ((2.0, None), (np.diag([1.0, 4.0]), None), (None, H), (0.5, H)):
@@ -100,7 +100,7 @@ def test_d3_update_takes_r_and_h_for_once(kind: type[GaussianFilter]) -> None:
 
 @pytest.mark.parametrize("column", [False, True])
 @pytest.mark.parametrize("missing", [None, np.nan, [np.nan, np.nan]])
-def test_d4_missed_measurement(column: bool, missing: Any) -> None:
+def test_d4_missing_measurement_sets_the_record(column: bool, missing: Any) -> None:
     tracker, _ = twins(2, column=column)
     tracker.update(np.ones(2))
     tracker.predict()
@@ -146,10 +146,10 @@ NAMES = [
 
 @pytest.mark.parametrize("column", [False, True])
 @pytest.mark.parametrize("kind", [Kalman, EKF, UKF])
-def test_d5_attributes_have_their_final_shapes_from_the_start(
+def test_d5_attributes_have_their_final_shapes_after_construction(
     kind: type[GaussianFilter], column: bool
 ) -> None:
-    tracker = kind(WALK, SEEN, X.reshape(4, 1) if column else X, P)
+    tracker = kind(WALK, POSITION, X.reshape(4, 1) if column else X, P)
     shapes = {name: np.shape(getattr(tracker, name)) for name in NAMES}
     for z in (None, [8.0, 6.0], [8.0, np.nan]):
         tracker.predict()
@@ -159,14 +159,14 @@ def test_d5_attributes_have_their_final_shapes_from_the_start(
     assert shapes["K"] == (4, 2)
 
 
-def test_d5_likelihood_never_falls_to_zero() -> None:
+def test_d5_likelihood_is_always_positive() -> None:
     tracker = plain()
     tracker.update([1e6, 1e6])
     assert tracker.likelihood == sys.float_info.min
     assert tracker.log_likelihood < -1e9
 
 
-def test_d5_nonlinear_filters_publish_the_present_jacobians() -> None:
+def test_d5_nonlinear_filters_have_the_present_jacobians() -> None:
     tracker = EKF(CoordinatedTurn(0.1, 0.1), BEARING, [*X, 0.1], np.eye(5))
     tracker.predict(dt=0.5)
     np.testing.assert_array_equal(tracker.F, tracker.motion.F(tracker.x, 0.5))
@@ -179,7 +179,7 @@ def test_d5_nonlinear_filters_publish_the_present_jacobians() -> None:
 @pytest.mark.parametrize("column", [False, True])
 @pytest.mark.parametrize("kind", [Kalman, EKF, UKF])
 def test_d6_saver_makes_arrays(kind: type[GaussianFilter], column: bool) -> None:
-    tracker = kind(WALK, SEEN, X.reshape(4, 1) if column else X, P)
+    tracker = kind(WALK, POSITION, X.reshape(4, 1) if column else X, P)
     saver = Saver(tracker, save_current=True)
     for z in (*track(3), None, [1.0, np.nan]):
         tracker.predict()
@@ -192,10 +192,10 @@ def test_d6_saver_makes_arrays(kind: type[GaussianFilter], column: bool) -> None
     assert {"F", "Q", "H", "R"} <= set(saver.keys)
 
 
-def test_d6_saver_takes_imm_and_particle() -> None:
+def test_d6_saver_saves_imm_and_particle() -> None:
     for tracker in (
         IMM([plain(), plain(1.0)], [0.5, 0.5], M),
-        Particle(WALK, SEEN, X, P, n_particles=20, rng=0),
+        Particle(WALK, POSITION, X, P, n_particles=20, rng=0),
     ):
         saver = Saver(tracker, save_current=True)
         for z in track(3):
@@ -210,7 +210,7 @@ def test_d6_saver_takes_imm_and_particle() -> None:
 
 
 @pytest.mark.parametrize("kind", [Kalman, EKF, UKF])
-def test_d12_copies_and_pickles_go_on(kind: type[GaussianFilter]) -> None:
+def test_d12_copies_and_pickles_continue_equally(kind: type[GaussianFilter]) -> None:
     tracker = plain(kind=kind)
     tracker.run(track(3))
     three = (tracker, copy.deepcopy(tracker), pickle.loads(pickle.dumps(tracker)))
@@ -220,7 +220,7 @@ def test_d12_copies_and_pickles_go_on(kind: type[GaussianFilter]) -> None:
         assert_twins(tracker, f, 0, "x P K log_likelihood")
 
 
-def test_d12_filterpy_and_scipy_are_imported_only_where_they_are_used() -> None:
+def test_d12_import_loads_neither_filterpy_nor_scipy() -> None:
     code = (
         "import sys, arrivals.trackers; "
         "print([name for name in ('filterpy', 'scipy', 'matplotlib') if name in sys.modules])"

@@ -1,7 +1,5 @@
-"""The contract with filterpy 2.0.0, D7 to D11 and D13: parts of either inside the other."""
+"""The filterpy contract, D7, D9 to D11 and D13: filters of each library inside the other."""
 
-import copy
-import pickle
 from collections.abc import Callable
 from typing import Any
 
@@ -9,18 +7,13 @@ import numpy as np
 import pytest
 from filterpy.common import Saver
 from filterpy.kalman import (
-    CubatureKalmanFilter,
     EnsembleKalmanFilter,
-    ExtendedKalmanFilter,
     IMMEstimator,
     KalmanFilter,
-    MerweScaledSigmaPoints,
     MMAEFilterBank,
-    UnscentedKalmanFilter,
 )
 from filterpy_twins import (
-    BEARING,
-    SEEN,
+    POSITION,
     WALK,
     M,
     P,
@@ -33,22 +26,19 @@ from filterpy_twins import (
     twins,
 )
 
-from arrivals.measurement_models import LinearMeasurement, MeasurementModel
+from arrivals.measurement_models import LinearMeasurement
 from arrivals.motion_models import (
     ConstantVelocity,
-    CoordinatedTurn,
     LinearMotion,
-    MotionModel,
     VonMisesWalk,
 )
 from arrivals.trackers import EKF, IMM, UKF, Filter, Kalman, Particle, as_filterpy
-from arrivals.typing import Float
 
 # D7
 
 
 @pytest.mark.parametrize("mixed", [False, True])
-def test_d7_works_inside_their_imm(mixed: bool) -> None:
+def test_d7_tracker_works_inside_filterpy_imm(mixed: bool) -> None:
     bank = IMMEstimator([plain(), theirs(2.0) if mixed else plain(2.0)], [0.5, 0.5], M)
     right = IMMEstimator([theirs(), theirs(2.0)], [0.5, 0.5], M)
     for z in track():
@@ -59,7 +49,7 @@ def test_d7_works_inside_their_imm(mixed: bool) -> None:
 
 
 @pytest.mark.parametrize("mixed", [False, True])
-def test_d7_works_inside_their_mmae(mixed: bool) -> None:
+def test_d7_tracker_works_inside_filterpy_mmae(mixed: bool) -> None:
     bank = MMAEFilterBank([plain(), theirs(2.0) if mixed else plain(2.0)], [0.5, 0.5], 4)
     right = MMAEFilterBank([theirs(), theirs(2.0)], [0.5, 0.5], 4)
     for z in track():
@@ -69,123 +59,12 @@ def test_d7_works_inside_their_mmae(mixed: bool) -> None:
         assert_twins(bank, right, names="x P p")
 
 
-# D8
-
-
-def ready(made: Any, motion: MotionModel, measurement: MeasurementModel, x: Float, P: Float) -> Any:
-    made.x, made.P, made.Q, made.R = x.copy(), P.copy(), motion.Q(), measurement.R
-    return made
-
-
-def test_d8_models_in_their_ekf() -> None:
-    ekf = ready(ExtendedKalmanFilter(4, 3), WALK, BEARING, X, P)
-    ekf.F = WALK.F()
-    tracker = EKF(WALK, BEARING, X, P)
-    for seed in range(10):
-        z = BEARING.sample(X, np.random.default_rng(seed))
-        ekf.predict()
-        ekf.update(z, BEARING.H, BEARING.h, residual=BEARING.residual)
-        tracker.predict()
-        tracker.update(z)
-        assert_twins(tracker, ekf, 1e-12, "x P K S y log_likelihood mahalanobis")
-
-
-@pytest.mark.parametrize(
-    ("motion", "x"), [(WALK, X), (CoordinatedTurn(0.05, 0.01), np.array([*X, 0.05]))]
-)
-def test_d8_models_in_their_ukf(motion: MotionModel, x: Float) -> None:
-    points = MerweScaledSigmaPoints(len(x), alpha=0.5, beta=2.0, kappa=0.0)
-    made = UnscentedKalmanFilter(len(x), 3, 1.0, BEARING.h, motion.f, points)
-    ukf = ready(made, motion, BEARING, x, np.eye(len(x)) * 0.1)
-    tracker = UKF(motion, BEARING, x, np.eye(len(x)) * 0.1)
-    for seed in range(10):
-        z = BEARING.sample(x, np.random.default_rng(seed))
-        ukf.predict()
-        ukf.update(z)
-        tracker.predict()
-        tracker.update(z)
-        assert_twins(tracker, ukf, 1e-9, "x P K S y log_likelihood")
-
-
-def test_d8_models_in_their_ckf() -> None:
-    made = CubatureKalmanFilter(4, 3, 1.0, BEARING.h, WALK.f)
-    ckf, tracker = ready(made, WALK, BEARING, X, P), EKF(WALK, BEARING, X, P)
-    for seed in range(5):
-        z = BEARING.sample(X, np.random.default_rng(seed))
-        ckf.predict()
-        ckf.update(z[:, None])  # it wants columns
-        tracker.predict()
-        tracker.update(z)
-    np.testing.assert_allclose(ckf.x.ravel(), tracker.x, atol=0.1)
-
-
-def test_d8_models_in_their_enkf() -> None:
-    np.random.seed(0)  # noqa: NPY002  # filterpy draws from the global generator
-    made = EnsembleKalmanFilter(X, P, 3, 1.0, 500, BEARING.h, WALK.f)
-    made.Q, made.R = WALK.Q(), BEARING.R
-    tracker = EKF(WALK, BEARING, X, P)
-    for seed in range(5):
-        for f in (made, tracker):
-            f.predict()
-            f.update(BEARING.sample(X, np.random.default_rng(seed)))
-    np.testing.assert_allclose(made.x, tracker.x, atol=0.3)
-
-
-def test_d8_arguments_are_not_modified_and_columns_are_refused_with_the_cure() -> None:
-    x = X.copy()
-    for call in (WALK.f, WALK.F, BEARING.h, BEARING.H, SEEN.h, SEEN.H):
-        call(x)
-        np.testing.assert_array_equal(x, X)
-    for refuses in (WALK.f, BEARING.h, BEARING.H, SEEN.h):
-        with pytest.raises(ValueError, match=r"column \(4, 1\): pass x.ravel\(\)"):
-            refuses(X.reshape(4, 1))
-
-
-@pytest.mark.parametrize("kind", ["ekf", "ukf", "ckf", "enkf"])
-def test_d8_as_filterpy_is_ready_to_run(kind: Any) -> None:
-    np.random.seed(1)  # noqa: NPY002
-    f = as_filterpy(WALK, BEARING, kind, x=X, P=P, n_members=400)
-    tracker = EKF(WALK, BEARING, X, P)
-    for seed in range(5):
-        z = BEARING.sample(X, np.random.default_rng(seed))
-        for each in (f, tracker):
-            each.predict()
-            each.update(z)
-    tolerance = 1e-12 if kind == "ekf" else 0.3
-    np.testing.assert_allclose(np.ravel(f.x), tracker.x, atol=tolerance)
-    again = copy.deepcopy(f)
-    again.update(z)
-    np.testing.assert_allclose(np.ravel(f.x), tracker.x, atol=tolerance)
-
-
-def test_d8_as_filterpy_makes_their_kalman_filter() -> None:
-    kf = as_filterpy(WALK, SEEN, "kf", x=X, P=P, dt=0.5)
-    tracker = plain()
-    for z in track():
-        kf.predict()
-        kf.update(z)
-        tracker.predict(dt=0.5)
-        tracker.update(z)
-    assert_twins(tracker, kf)
-
-
-def test_d8_as_filterpy_ekf_follows_a_turn() -> None:
-    turn = CoordinatedTurn(0.05, 0.01)
-    ekf = as_filterpy(turn, BEARING, "ekf", x=[*X, 0.3], P=np.eye(5))
-    tracker = EKF(turn, BEARING, [*X, 0.3], np.eye(5))
-    ekf = pickle.loads(pickle.dumps(ekf))
-    for f in (ekf, tracker):
-        f.predict()
-        f.update([0.6, 2.7, -1.2])
-    assert_twins(tracker, ekf, names="x P")
-
-
 # D9
 
 
 @pytest.mark.parametrize("column", [False, True])
 @pytest.mark.parametrize("update_first", [False, True])
-def test_d9_batch_filter_and_smoother_are_filterpys(column: bool, update_first: bool) -> None:
+def test_d9_batch_filter_and_smoother_equal_filterpy(column: bool, update_first: bool) -> None:
     tracker, kf = twins(3, column=column)
     rng = np.random.default_rng(5)
     zs: list[Any] = list(rng.normal(size=(8, 2, 1) if column else (8, 2)))
@@ -193,8 +72,8 @@ def test_d9_batch_filter_and_smoother_are_filterpys(column: bool, update_first: 
     systems = [stable_system(rng, 3, 2) for _ in zs]
     Fs, Bs, Hs, Qs, Rs, _ = (list(matrices) for matrices in zip(*systems, strict=True))
     us = list(rng.normal(size=(8, 1, 1) if column else (8, 1)))
-    given: dict[str, Any] = {"Fs": Fs, "Qs": Qs, "Hs": Hs, "Rs": Rs, "Bs": Bs, "us": us}
-    for chosen in ({"us": us}, {"Fs": Fs, "Qs": Qs, "us": us}, given):
+    matrices: dict[str, Any] = {"Fs": Fs, "Qs": Qs, "Hs": Hs, "Rs": Rs, "Bs": Bs, "us": us}
+    for chosen in ({"us": us}, {"Fs": Fs, "Qs": Qs, "us": us}, matrices):
         ours = tracker.batch_filter(zs, update_first=update_first, **chosen)
         for a, b in zip(
             ours, kf.batch_filter(zs, update_first=update_first, **chosen), strict=True
@@ -208,7 +87,7 @@ def test_d9_batch_filter_and_smoother_are_filterpys(column: bool, update_first: 
             np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-9)
 
 
-def test_d9_saver_in_batch_filter() -> None:
+def test_d9_batch_filter_calls_the_saver() -> None:
     tracker = plain()
     saver = Saver(tracker)
     means = tracker.batch_filter(track(5), saver=saver)[0]
@@ -221,7 +100,7 @@ def test_d9_saver_in_batch_filter() -> None:
 
 @pytest.mark.parametrize("column", [False, True])
 @pytest.mark.parametrize("seed", range(10))
-def test_d10_kalman_is_their_kalman_filter(seed: int, column: bool) -> None:
+def test_d10_kalman_equals_filterpy_kalman_filter(seed: int, column: bool) -> None:
     tracker, kf = twins(seed, n=2 + seed % 3, m=1 + seed % 2, column=column)
     rng = np.random.default_rng(100 + seed)
     m = tracker.dim_z
@@ -237,8 +116,8 @@ def test_d10_kalman_is_their_kalman_filter(seed: int, column: bool) -> None:
             assert_twins(tracker, kf, 1e-10, "y S SI K log_likelihood mahalanobis")
 
 
-def test_d10_filterpys_own_scenario_of_a_manoeuvre_runs_with_our_class() -> None:
-    """Bar-Shalom's turn of filterpy's IMM test: velocity, then acceleration, in two dimensions."""
+def test_d10_filterpy_manoeuvre_scenario_runs_with_kalman() -> None:
+    """Manoeuvre of filterpy's IMM test (Bar-Shalom): velocity, then acceleration, in 2-D."""
     F_cv = np.kron(np.eye(2), [[1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]])
     F_ca = np.kron(np.eye(2), [[1.0, 1.0, 0.5], [0.0, 1.0, 1.0], [0.0, 0.0, 1.0]])
     H, x = np.eye(6)[::3], np.array([[2000.0], [0], [0], [1e4], [-15], [0]])
@@ -278,7 +157,7 @@ def test_d10_filterpys_own_scenario_of_a_manoeuvre_runs_with_our_class() -> None
 
 
 class Constant:
-    """The least that serves."""
+    """A filter with the five names of `Filter` alone."""
 
     def __init__(self, value: float) -> None:
         self.x, self.P, self.likelihood = np.array([value]), np.eye(1), 1.0
@@ -290,8 +169,8 @@ class Constant:
         self.likelihood = float(np.exp(-0.5 * (z - self.x[0]) ** 2))
 
 
-def test_d11_anything_with_the_five_names_serves_inside_our_imm() -> None:
-    for member in (Constant(0.0), plain(), theirs(), Particle(WALK, SEEN, X, P, rng=0)):
+def test_d11_imm_accepts_any_object_with_the_five_names() -> None:
+    for member in (Constant(0.0), plain(), theirs(), Particle(WALK, POSITION, X, P, rng=0)):
         assert isinstance(member, Filter)
     bank = IMM([Constant(0.0), Constant(1.0)], [0.5, 0.5], np.eye(2))
     bank.predict()
@@ -301,8 +180,8 @@ def test_d11_anything_with_the_five_names_serves_inside_our_imm() -> None:
         IMM([EnsembleKalmanFilter(X, P, 2, 1.0, 5, None, None)] * 2, [0.5, 0.5], M)
 
 
-def test_d11_filterpys_filters_inside_our_imm() -> None:
-    ukf = as_filterpy(WALK, SEEN, "ukf", x=X, P=P)
+def test_d11_imm_accepts_filters_of_filterpy() -> None:
+    ukf = as_filterpy(WALK, POSITION, "ukf", x=X, P=P)
     mixed = IMM([theirs(), ukf, plain(1.0)], np.ones(3), np.full((3, 3), 1 / 3))
     right = IMM([plain(), plain(), plain(1.0)], np.ones(3) / 3, np.full((3, 3), 1 / 3))
     for z in track():
@@ -318,9 +197,9 @@ def test_d11_filterpys_filters_inside_our_imm() -> None:
 
 
 @pytest.mark.parametrize("column", [False, True])
-def test_d13_imm_is_theirs_where_that_is_right(column: bool) -> None:
+def test_d13_imm_equals_filterpy_imm_where_that_is_right(column: bool) -> None:
     x = X.reshape(4, 1) if column else X
-    ours = IMM([Kalman(ConstantVelocity(q), SEEN, x, P) for q in (0.05, 2.0)], [0.6, 0.4], M)
+    ours = IMM([Kalman(ConstantVelocity(q), POSITION, x, P) for q in (0.05, 2.0)], [0.6, 0.4], M)
     other = IMMEstimator([theirs(0.05, column), theirs(2.0, column)], [0.6, 0.4], M)
     for z in track(30):
         for bank in (ours, other):
@@ -329,12 +208,12 @@ def test_d13_imm_is_theirs_where_that_is_right(column: bool) -> None:
         assert_twins(ours, other, 1e-12, "x P x_post P_post mu likelihood")
 
 
-def test_d13_nonlinear_members_and_angles_on_the_circle() -> None:
-    seen = LinearMeasurement([[1.0]], [[0.01]])
+def test_d13_imm_averages_angles_of_nonlinear_filters_on_the_circle() -> None:
+    position = LinearMeasurement([[1.0]], [[0.01]])
     bank = IMM(
         [
-            EKF(VonMisesWalk(50.0), seen, [np.pi - 0.05], [[0.01]]),
-            UKF(VonMisesWalk(50.0), seen, [-np.pi + 0.05], [[0.01]]),
+            EKF(VonMisesWalk(50.0), position, [np.pi - 0.05], [[0.01]]),
+            UKF(VonMisesWalk(50.0), position, [-np.pi + 0.05], [[0.01]]),
         ],
         [0.5, 0.5],
         M,
@@ -346,7 +225,7 @@ def test_d13_nonlinear_members_and_angles_on_the_circle() -> None:
     assert abs(bank.x[0]) > 3.0
 
 
-def test_d13_weights_survive_measurements_that_both_models_deem_impossible() -> None:
+def test_d13_probabilities_are_finite_for_impossible_measurements() -> None:
     ours = IMM([plain(1e-6), plain(1.0)], [0.5, 0.5], np.eye(2))
     other = IMMEstimator([theirs(1e-6), theirs(1.0)], [0.5, 0.5], np.eye(2))
     for bank in (ours, other):
@@ -354,14 +233,3 @@ def test_d13_weights_survive_measurements_that_both_models_deem_impossible() -> 
         bank.update([300.0, 300.0])
     np.testing.assert_allclose(other.mu, [0.5, 0.5])  # both likelihoods are at their floor
     assert ours.mu[1] > 1 - 1e-12
-
-
-def test_d12_as_filterpy_ekf_is_copied_and_pickled() -> None:
-    ekf = as_filterpy(WALK, BEARING, "ekf", x=X, P=P)
-    copies = copy.deepcopy(ekf), pickle.loads(pickle.dumps(ekf))
-    for each in (ekf, *copies):
-        each.predict()
-        each.update(BEARING.h(X))
-    for each in copies:
-        assert isinstance(each, ExtendedKalmanFilter)
-        np.testing.assert_array_equal(each.x, ekf.x)

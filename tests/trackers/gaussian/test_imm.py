@@ -14,12 +14,12 @@ from arrivals.trackers import EKF, IMM, UKF, Kalman, Particle, create
 from arrivals.trackers.conformance import difference
 from arrivals.trackers.gaussian.circular import mixture
 
-SEEN = LinearMeasurement([[1.0]], [[0.04]])
+POSITION = LinearMeasurement([[1.0]], [[0.04]])
 M = np.array([[0.9, 0.1], [0.2, 0.8]])
 
 
 def member(q: float, x: float = 0.0) -> Kalman:
-    return Kalman(RandomWalk(q, 1), SEEN, [x], [[1.0]])
+    return Kalman(RandomWalk(q, 1), POSITION, [x], [[1.0]])
 
 
 def two(**changes: Any) -> IMM:
@@ -28,7 +28,7 @@ def two(**changes: Any) -> IMM:
 
 
 @given(st.integers(0, 10_000))
-def test_mixture_has_the_moments_of_its_draws(seed: int) -> None:
+def test_mixture_has_the_moments_of_its_components(seed: int) -> None:
     rng = np.random.default_rng(seed)
     means, A = rng.normal(size=(3, 2)), rng.normal(size=(3, 2, 2))
     covariances, weights = A @ A.swapaxes(1, 2), rng.dirichlet(np.ones(3), size=4)
@@ -39,7 +39,7 @@ def test_mixture_has_the_moments_of_its_draws(seed: int) -> None:
 
 
 @given(st.floats(-10, 10), st.floats(0.01, 0.99))
-def test_turning_a_mixture_turns_its_mean(turn: float, weight: float) -> None:
+def test_rotated_mixture_rotates_the_mean(turn: float, weight: float) -> None:
     weights, covariances = np.array([weight, 1 - weight]), np.ones((2, 1, 1))
     (x, P), (y, V) = (
         mixture(np.array([[0.4], [-0.7]]) + t, covariances, weights, (0,)) for t in (0.0, turn)
@@ -50,7 +50,7 @@ def test_turning_a_mixture_turns_its_mean(turn: float, weight: float) -> None:
 
 @pytest.mark.parametrize("kind", [EKF, UKF])
 @pytest.mark.parametrize("turned", [False, True])
-def test_imm_over_a_combined_circular_state_averages_on_the_circle(kind: Any, turned: bool) -> None:
+def test_imm_combined_circular_state_averages_on_the_circle(kind: Any, turned: bool) -> None:
     walks = RandomWalk(0.1, 1), VonMisesWalk(50.0)
     motion, angle = CombinedMotion(*walks[::-1] if turned else walks), 0 if turned else 1
     position = LinearMeasurement(np.eye(2), np.eye(2))
@@ -63,7 +63,7 @@ def test_imm_over_a_combined_circular_state_averages_on_the_circle(kind: Any, tu
     assert abs(bank.x[angle]) == pytest.approx(np.pi)
 
 
-def test_equal_members_are_one_filter() -> None:
+def test_imm_of_equal_filters_equals_one_filter() -> None:
     bank, alone = two(filters=[member(0.1), member(0.1)]), member(0.1)
     for z in ([0.3], None, [0.1], [np.nan], [-0.2]):
         for f in (bank, alone):
@@ -74,8 +74,8 @@ def test_equal_members_are_one_filter() -> None:
         assert bank.log_likelihood == pytest.approx(alone.log_likelihood)
 
 
-def test_probabilities_are_bayes_over_all_histories_of_models() -> None:
-    """Models that never switch: p(i | z) ∝ μᵢ Π p(zₜ | i), by independent filters."""
+def test_imm_probabilities_equal_bayes_over_all_model_histories() -> None:
+    """Without switching: p(i | z) ∝ μᵢ Π p(zₜ | i), by independent filters."""
     zs = np.random.default_rng(0).normal(size=(6, 1))
     bank = two(M=np.eye(2), mu=[0.3, 0.7])
     bank.run(zs)
@@ -89,7 +89,7 @@ def test_probabilities_are_bayes_over_all_histories_of_models() -> None:
     np.testing.assert_allclose(bank.mu, np.exp(log - np.logaddexp(*log)), rtol=1e-10)
 
 
-def test_a_missed_measurement_leaves_the_predicted_probabilities() -> None:
+def test_imm_missing_measurement_keeps_predicted_probabilities() -> None:
     bank = two()
     bank.predict()
     assert bank.mu == pytest.approx([0.55, 0.45])
@@ -98,7 +98,7 @@ def test_a_missed_measurement_leaves_the_predicted_probabilities() -> None:
     np.testing.assert_array_equal(bank.likelihood, 1.0)
 
 
-def test_a_second_update_is_no_second_transition() -> None:
+def test_imm_second_update_does_not_apply_the_transition_again() -> None:
     apart = two()
     apart.predict()
     log = [np.log(apart.mu)]
@@ -109,13 +109,13 @@ def test_a_second_update_is_no_second_transition() -> None:
     np.testing.assert_allclose(np.log(apart.mu[0] / apart.mu[1]), odds[0] - odds[1])
 
 
-def test_any_of_our_trackers_may_be_mixed() -> None:
+def test_imm_accepts_different_trackers() -> None:
     walk = VonMisesWalk(30.0)
     bank = IMM(
         [
-            EKF(walk, SEEN, [3.0], [[0.1]]),
-            UKF(walk, SEEN, [3.0], [[0.1]]),
-            Particle(walk, SEEN, [3.0], [[0.1]], 500, rng=0),
+            EKF(walk, POSITION, [3.0], [[0.1]]),
+            UKF(walk, POSITION, [3.0], [[0.1]]),
+            Particle(walk, POSITION, [3.0], [[0.1]], 500, rng=0),
         ],
         np.ones(3) / 3,
         np.full((3, 3), 1 / 3),
@@ -124,10 +124,10 @@ def test_any_of_our_trackers_may_be_mixed() -> None:
     assert run.x[-1] == pytest.approx(3.05, abs=0.1)
 
 
-def test_it_notices_a_turn_and_is_made_by_name() -> None:
-    seen = LinearMeasurement(np.eye(4)[::2], np.eye(2))
+def test_imm_detects_a_turn() -> None:
+    position = LinearMeasurement(np.eye(4)[::2], np.eye(2))
     filters = [
-        Kalman(ConstantVelocity(q), seen, [0.0, 5.0, 0.0, 0.0], np.eye(4)) for q in (1e-4, 4.0)
+        Kalman(ConstantVelocity(q), position, [0.0, 5.0, 0.0, 0.0], np.eye(4)) for q in (1e-4, 4.0)
     ]
     bank = create("imm", filters=filters, mu=[0.5, 0.5], M=[[0.97, 0.03], [0.03, 0.97]])
     t = np.arange(20)
@@ -140,7 +140,7 @@ def test_it_notices_a_turn_and_is_made_by_name() -> None:
 
 
 @pytest.mark.parametrize("call", ["update", "predict"])
-def test_a_member_that_fails_leaves_all_as_they_were(call: str) -> None:
+def test_imm_filter_that_raises_leaves_all_unchanged(call: str) -> None:
     class Faulty(Kalman):
         def update(self, *args: Any, **kwargs: Any) -> None:
             raise RuntimeError("sensor on fire")
@@ -148,7 +148,7 @@ def test_a_member_that_fails_leaves_all_as_they_were(call: str) -> None:
         def predict(self, *args: Any, **kwargs: Any) -> None:
             raise RuntimeError("sensor on fire")
 
-    bank = two(filters=[member(0.1), Faulty(RandomWalk(1.0, 1), SEEN, [0.0], [[1.0]])])
+    bank = two(filters=[member(0.1), Faulty(RandomWalk(1.0, 1), POSITION, [0.0], [[1.0]])])
     before = copy.deepcopy(vars(bank))
     with pytest.raises(RuntimeError, match="on fire"):
         getattr(bank, call)(*([[1.0]] if call == "update" else []))
@@ -174,18 +174,18 @@ def test_a_member_that_fails_leaves_all_as_they_were(call: str) -> None:
         ({"M": np.eye(3)}, ValueError, r"M must have shape \(2, 2\)"),
         ({"M": np.ones((2, 2))}, ValueError, r"M must have rows of sum 1; got \[2.0, 2.0\]"),
         (
-            {"filters": [member(1.0), Kalman(RandomWalk(1.0, 1), SEEN, [[0.0]], [[1.0]])]},
+            {"filters": [member(1.0), Kalman(RandomWalk(1.0, 1), POSITION, [[0.0]], [[1.0]])]},
             ValueError,
             r"filters must have x of one shape; got \[\(1,\), \(1, 1\)\]",
         ),
     ],
 )
-def test_bad_parameters_are_refused(
+def test_invalid_parameters_raise(
     changes: dict[str, Any], error: type[Exception], message: str
 ) -> None:
     with pytest.raises(error, match=message):
         two(**changes)
 
 
-def test_probabilities_are_brought_to_sum_one() -> None:
+def test_imm_probabilities_are_normalized() -> None:
     np.testing.assert_allclose(two(mu=[1, 3]).mu, [0.25, 0.75])

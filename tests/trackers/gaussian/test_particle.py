@@ -1,4 +1,4 @@
-"""The particle filter against grids and the Kalman filter; resampling; chance; refusals."""
+"""Particle filter against grids and the Kalman filter; resampling, random numbers, errors."""
 
 import copy
 from collections.abc import Callable
@@ -19,11 +19,11 @@ from arrivals.typing import Float
 
 LINE = ArraySnapshot(SensorArray.ula(4, spacing=0.5), wavelength=1.0, noise=2.0)
 CIRCLE = ArraySnapshot(SensorArray.uca(5, radius=0.3), wavelength=1.0, noise=2.0)
-WALK, SEEN = RandomWalk(0.2, 2), LinearMeasurement(np.eye(2), 0.3 * np.eye(2))
+WALK, POSITION = RandomWalk(0.2, 2), LinearMeasurement(np.eye(2), 0.3 * np.eye(2))
 
 
 def grid_posterior(zs: Any, walk: VonMisesWalk, start: float, variance: float) -> complex:
-    """⟨exp(jβ)⟩ after the last snapshot, on 720 points of the circle."""
+    """Return ⟨exp(jβ)⟩ after the last snapshot, on 720 points of the circle."""
     grid = np.linspace(-np.pi, np.pi, 720, endpoint=False)
     away = (grid - start + np.pi) % (2 * np.pi) - np.pi
     turns = 2 * np.pi * np.arange(-1, 2)[:, None]
@@ -36,7 +36,7 @@ def grid_posterior(zs: Any, walk: VonMisesWalk, start: float, variance: float) -
     return complex(np.sum(p * np.exp(1j * grid)) / p.sum())
 
 
-def test_raw_snapshots_on_a_circle_are_the_grids_posterior() -> None:
+def test_particle_posterior_of_complex_snapshots_equals_grid() -> None:
     walk = VonMisesWalk(40.0)
     zs = CIRCLE.simulate(np.full((4, 1), 3.0), [1.0], np.random.default_rng(1))
     tracker = Particle(walk, CIRCLE, [-3.0], [[0.5]], n_particles=20000, rng=2)
@@ -47,9 +47,9 @@ def test_raw_snapshots_on_a_circle_are_the_grids_posterior() -> None:
     assert abs(np.exp(1j * tracker.x[0]) - expected / abs(expected)) < 0.05
 
 
-def test_linear_gaussian_posterior_is_kalmans() -> None:
-    particle = Particle(WALK, SEEN, [0.0, 1.0], np.eye(2), n_particles=20000, rng=0)
-    kalman = Kalman(WALK, SEEN, [0.0, 1.0], np.eye(2))
+def test_particle_linear_gaussian_posterior_equals_kalman() -> None:
+    particle = Particle(WALK, POSITION, [0.0, 1.0], np.eye(2), n_particles=20000, rng=0)
+    kalman = Kalman(WALK, POSITION, [0.0, 1.0], np.eye(2))
     for z in ([0.5, 1.5], [np.nan, 1.0], None, [1.0, np.nan]):
         for tracker in (particle, kalman):
             tracker.predict()
@@ -60,19 +60,19 @@ def test_linear_gaussian_posterior_is_kalmans() -> None:
 
 
 @given(st.lists(st.floats(0, 1), min_size=1, max_size=40), st.integers(0, 1000))
-def test_each_index_is_drawn_its_share_to_less_than_one(weights: list[float], seed: int) -> None:
+def test_resampled_counts_are_within_one_of_the_weights(weights: list[float], seed: int) -> None:
     if sum(weights) > 0:
         share = np.array(weights) / sum(weights)
-        drawn = systematic_resample(share, np.random.default_rng(seed))
-        assert len(drawn) == len(share)
-        counts = np.bincount(drawn, minlength=len(share))
+        indices = systematic_resample(share, np.random.default_rng(seed))
+        assert len(indices) == len(share)
+        counts = np.bincount(indices, minlength=len(share))
         assert np.abs(counts - len(share) * share).max() < 1 + 1e-9
-        assert (np.diff(drawn) >= 0).all()
+        assert (np.diff(indices) >= 0).all()
 
 
-def test_few_effective_particles_are_drawn_anew() -> None:
+def test_particle_resamples_few_effective_particles() -> None:
     always, never = (
-        Particle(WALK, SEEN, [0.0, 0.0], np.eye(2), 50, rng=0, resample_below=share)
+        Particle(WALK, POSITION, [0.0, 0.0], np.eye(2), 50, rng=0, resample_below=share)
         for share in (1.0, 0.0)
     )
     for tracker in (always, never):
@@ -82,35 +82,35 @@ def test_few_effective_particles_are_drawn_anew() -> None:
     np.testing.assert_array_equal(always.x, never.x)
 
 
-# Chance
+# Random numbers
 
 
-def moved(tracker: Particle) -> Float:
+def run_states(tracker: Particle) -> Float:
     return tracker.run(np.ones((3, 2))).x
 
 
-def test_a_seed_repeats_and_a_generator_goes_on() -> None:
+def test_particle_seed_repeats_and_generator_continues() -> None:
     def make(rng: Any) -> Particle:
-        return Particle(WALK, SEEN, [0.0, 0.0], np.eye(2), 30, rng=rng)
+        return Particle(WALK, POSITION, [0.0, 0.0], np.eye(2), 30, rng=rng)
 
-    np.testing.assert_array_equal(moved(make(3)), moved(make(3)))
-    np.testing.assert_array_equal(moved(make(3)), moved(make(np.random.default_rng(3))))
+    np.testing.assert_array_equal(run_states(make(3)), run_states(make(3)))
+    np.testing.assert_array_equal(run_states(make(3)), run_states(make(np.random.default_rng(3))))
     shared = np.random.default_rng(3)
-    assert not np.array_equal(moved(make(shared)), moved(make(shared)))
+    assert not np.array_equal(run_states(make(shared)), run_states(make(shared)))
 
 
-def test_copies_and_clones_of_one_with_a_generator() -> None:
+def test_particle_copies_and_clones_continue_the_generator() -> None:
     from sklearn.base import clone
 
-    tracker = Particle(WALK, SEEN, [0.0, 0.0], np.eye(2), 30, rng=np.random.default_rng(5))
+    tracker = Particle(WALK, POSITION, [0.0, 0.0], np.eye(2), 30, rng=np.random.default_rng(5))
     copied, cloned = copy.deepcopy(tracker), clone(tracker)
-    expected = moved(Particle(WALK, SEEN, [0.0, 0.0], np.eye(2), 30, rng=5))
+    expected = run_states(Particle(WALK, POSITION, [0.0, 0.0], np.eye(2), 30, rng=5))
     for each in (tracker, copied, cloned):
-        np.testing.assert_array_equal(moved(each), expected)
+        np.testing.assert_array_equal(run_states(each), expected)
 
 
-def test_another_seed_starts_anew_and_the_same_does_not() -> None:
-    tracker = Particle(WALK, SEEN, [0.0, 0.0], np.eye(2), 30, rng=5)
+def test_particle_new_seed_restarts_the_generator() -> None:
+    tracker = Particle(WALK, POSITION, [0.0, 0.0], np.eye(2), 30, rng=5)
     tracker.predict()
     state = tracker._generator.bit_generator.state
     tracker.set_params(rng=5)
@@ -119,8 +119,8 @@ def test_another_seed_starts_anew_and_the_same_does_not() -> None:
     assert tracker._generator.bit_generator.state != state
 
 
-def test_assigned_beliefs_are_drawn_from() -> None:
-    tracker = Particle(WALK, SEEN, [0.0, 0.0], np.eye(2), 5000, rng=5)
+def test_particle_assigned_belief_is_sampled() -> None:
+    tracker = Particle(WALK, POSITION, [0.0, 0.0], np.eye(2), 5000, rng=5)
     tracker.predict()
     tracker.x, tracker.P = np.array([50.0, 60.0]), 4 * np.eye(2)
     tracker.predict()
@@ -128,7 +128,7 @@ def test_assigned_beliefs_are_drawn_from() -> None:
     np.testing.assert_allclose(tracker.P, 4.2 * np.eye(2), atol=0.4)
 
 
-# Refusals
+# Errors
 
 
 @pytest.mark.parametrize(
@@ -143,12 +143,12 @@ def test_assigned_beliefs_are_drawn_from() -> None:
         ({"motion": None}, TypeError, "motion must be a MotionModel"),
     ],
 )
-def test_bad_parameters_are_refused(
+def test_invalid_parameters_raise(
     change: dict[str, Any], error: type[Exception], message: str
 ) -> None:
     params: dict[str, Any] = {
         "motion": WALK,
-        "measurement": SEEN,
+        "measurement": POSITION,
         "x": [0.0, 0.0],
         "P": np.eye(2),
         "rng": 0,
@@ -157,21 +157,25 @@ def test_bad_parameters_are_refused(
         Particle(**(params | change))
 
 
-def test_refused_calls_leave_everything() -> None:
-    tracker = Particle(WALK, SEEN, [0.0, 0.0], np.eye(2), 30, rng=0)
-    refused: list[tuple[Callable[[], object], type[Exception], str]] = [
-        (lambda: tracker.predict(1.0), ValueError, "takes no control input"),
+def test_invalid_calls_leave_the_filter_unchanged() -> None:
+    tracker = Particle(WALK, POSITION, [0.0, 0.0], np.eye(2), 30, rng=0)
+    calls: list[tuple[Callable[[], object], type[Exception], str]] = [
+        (lambda: tracker.predict(1.0), ValueError, "u must be None or 0; got 1.0"),
         (lambda: tracker.update([1.0]), ValueError, r"z must have shape \(2,\)"),
-        (lambda: tracker.update([1j, 1j]), TypeError, "need a model with log_likelihood"),
+        (
+            lambda: tracker.update([1j, 1j]),
+            TypeError,
+            "where z is complex; got Linear",
+        ),
     ]
-    for call, error, message in refused:
+    for call, error, message in calls:
         before = copy.deepcopy(vars(tracker))
         with pytest.raises(error, match=message):
             call()
         assert difference(before, vars(tracker)) is None
 
 
-def test_wrong_snapshots_leave_everything() -> None:
+def test_particle_invalid_snapshot_leaves_it_unchanged() -> None:
     tracker = Particle(VonMisesWalk(9.0), LINE, [0.0], [[1.0]], 30, rng=0)
     before = copy.deepcopy(vars(tracker))
     with pytest.raises(ValueError, match="one number a sensor"):
@@ -179,8 +183,8 @@ def test_wrong_snapshots_leave_everything() -> None:
     assert difference(before, vars(tracker)) is None
 
 
-def test_velocity_states_run_too() -> None:
-    motion, seen = ConstantVelocity(0.1), LinearMeasurement(np.eye(4)[::2], 0.1 * np.eye(2))
-    run = Particle(motion, seen, np.zeros(4), np.eye(4), 500, rng=1).run([[1.0, 1.0], None])
+def test_particle_runs_with_velocity_states() -> None:
+    motion, position = ConstantVelocity(0.1), LinearMeasurement(np.eye(4)[::2], 0.1 * np.eye(2))
+    run = Particle(motion, position, np.zeros(4), np.eye(4), 500, rng=1).run([[1.0, 1.0], None])
     assert run.x.shape == (2, 4)
     np.testing.assert_allclose(run.P, run.P.swapaxes(1, 2))

@@ -56,8 +56,8 @@ def test_located_measurement_survives_set_params_and_configuration() -> None:
     assert copy.measurement == tracker.measurement
 
 
-class Doubling(RandomWalk):
-    """A linear model that does not say so."""
+class Unmarked(RandomWalk):
+    """A linear model whose `is_linear` is False."""
 
     @property
     def is_linear(self) -> bool:
@@ -73,8 +73,8 @@ class Curved(RandomWalk):
         return np.square(x)
 
 
-def test_kalman_evaluates_models_that_do_not_say_whether_they_are_linear() -> None:
+def test_kalman_evaluates_models_whose_is_linear_is_false() -> None:
     position = LinearMeasurement(np.eye(2), np.eye(2))
-    Kalman(Doubling(1.0), position, [0.0, 0.0], np.eye(2)).predict()
+    Kalman(Unmarked(1.0), position, [0.0, 0.0], np.eye(2)).predict()
     with pytest.raises(TypeError, match=r"motion must be linear; got Curved.*: use ekf or ukf"):
         Kalman(Curved(1.0), position, [0.0, 0.0], np.eye(2))
