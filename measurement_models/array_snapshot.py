@@ -180,7 +180,10 @@ class ArraySnapshot(SingleSourceSnapshot):
         ValueError
             If the shape is wrong, or every sensor has a gap in some snapshot.
         """
-        if z is None or np.isnan(z := np.asarray(z)).all():
+        if z is None:
+            return None
+        z = np.asarray(z)
+        if z.dtype.kind in "fc" and z.size and np.isnan(z).all():
             return None
         return ObservedSnapshots.of(self.looks(z), self.manifold(reference))
 

@@ -1,4 +1,4 @@
-"""SVALSE and VALSE on circles, sparse lines, directional elements, and several looks a step."""
+"""SVALSE and VALSE on circles, sparse lines, directional elements, and several snapshots a step."""
 
 import warnings
 from typing import Any
@@ -16,13 +16,15 @@ from arrivals.trackers import CBF, MVDR, SVALSE, VALSE, CoordinateSolver, Newton
 from arrivals.typing import Complex, Float
 
 CIRCLE = ArraySnapshot(SensorArray.uca(8, radius=0.65), wavelength=1.0)
-LOOKS = CIRCLE.replace(wavelength=[1.0, 1.3], n_snapshots=3)
+SEVERAL = CIRCLE.replace(wavelength=[1.0, 1.3], n_snapshots=3)
 MIXTURE = CoordinateSolver(posterior="mixture")
 SLOW = BernoulliVonMises(sigma_doa=np.deg2rad(3.0))
 
 
-def heard(model: ArraySnapshot, doa: ArrayLike, noise: float = 1e-3, seed: int = 0) -> Complex:
-    """Measurements of sources with amplitudes ~ CN(0, 1) kept off zero, in every look."""
+def snapshots_of(
+    model: ArraySnapshot, doa: ArrayLike, noise: float = 1e-3, seed: int = 0
+) -> Complex:
+    """Measurements of sources with amplitudes ~ CN(0, 1) kept off zero, in every snapshot."""
     rng = np.random.default_rng(seed)
     doa = np.atleast_2d(np.asarray(doa, dtype=float))
     shape = (len(doa), *model.shape[:-1], doa.shape[1])
@@ -56,7 +58,7 @@ def test_turning_array_and_sources_turns_every_angle_of_coordinate_ascent(
     places = rng.normal(size=(6, 2)) * 0.6
     R = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
     one, other = (ArraySnapshot(SensorArray(p), 1.0) for p in (places, places @ R.T))
-    z = heard(one, [[0.3, -2.0]] * 3, noise=0.01, seed=seed)
+    z = snapshots_of(one, [[0.3, -2.0]] * 3, noise=0.01, seed=seed)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # some layouts drawn are ambiguous
         a, b = (SVALSE(model, SLOW, engine="coordinate").run(z) for model in (one, other))
@@ -64,18 +66,18 @@ def test_turning_array_and_sources_turns_every_angle_of_coordinate_ascent(
     np.testing.assert_allclose(wrapped(b.doa - a.doa - turn), 0 * a.doa, atol=1e-7)
 
 
-@pytest.mark.parametrize("model", [CIRCLE, LOOKS], ids=["one look", "several"])
+@pytest.mark.parametrize("model", [CIRCLE, SEVERAL], ids=["one snapshot", "several"])
 @pytest.mark.parametrize("factor", [1e-7, 3e6 * np.exp(2j)])
 def test_scale_and_common_phase_change_nothing(model: ArraySnapshot, factor: complex) -> None:
-    z = heard(model, [[0.3, -2.0, 3.1]] * 3, noise=0.02)
+    z = snapshots_of(model, [[0.3, -2.0, 3.1]] * 3, noise=0.02)
     one, other = SVALSE(model, SLOW).run_batch([z, factor * z])
     np.testing.assert_allclose(other.doa, one.doa, atol=1e-8)
     assert other.iterations.tolist() == one.iterations.tolist()
 
 
-@pytest.mark.parametrize("model", [CIRCLE, LOOKS], ids=["one look", "several"])
-def test_a_silent_sensor_equals_the_array_without_it(model: ArraySnapshot) -> None:
-    z = heard(model, [[0.3, -2.0]] * 3, noise=0.02)
+@pytest.mark.parametrize("model", [CIRCLE, SEVERAL], ids=["one snapshot", "several"])
+def test_missing_sensor_equals_the_array_without_it(model: ArraySnapshot) -> None:
+    z = snapshots_of(model, [[0.3, -2.0]] * 3, noise=0.02)
     z[..., 2] = np.nan
     without = model.replace(array=model.array.without([2]))
     one = SVALSE(model, SLOW).run(z)
@@ -85,27 +87,27 @@ def test_a_silent_sensor_equals_the_array_without_it(model: ArraySnapshot) -> No
 
 
 def test_order_of_bins_and_of_snapshots_does_not_matter() -> None:
-    z = heard(LOOKS, [[0.3, -2.0]] * 3, noise=0.05)
-    turned = LOOKS.replace(wavelength=LOOKS.wavelengths[::-1])
-    one, other = SVALSE(LOOKS, SLOW).run(z), SVALSE(turned, SLOW).run(z[:, ::-1, [2, 0, 1]])
+    z = snapshots_of(SEVERAL, [[0.3, -2.0]] * 3, noise=0.05)
+    turned = SEVERAL.replace(wavelength=SEVERAL.wavelengths[::-1])
+    one, other = SVALSE(SEVERAL, SLOW).run(z), SVALSE(turned, SLOW).run(z[:, ::-1, [2, 0, 1]])
     np.testing.assert_allclose(one.doa, other.doa, atol=1e-9)
 
 
-def test_a_silent_bin_and_a_missing_snapshot_equal_the_model_without_them() -> None:
-    z = heard(LOOKS, [[0.3, -2.0]] * 3, noise=0.05)
-    part = LOOKS.replace(wavelength=1.3, n_snapshots=2)
+def test_missing_bin_and_snapshot_equal_the_model_without_them() -> None:
+    z = snapshots_of(SEVERAL, [[0.3, -2.0]] * 3, noise=0.05)
+    part = SEVERAL.replace(wavelength=1.3, n_snapshots=2)
     expected = SVALSE(part, SLOW).run(z[:, 1, 1:])
     gaps = z.copy()
     gaps[:, 0], gaps[:, :, 0] = np.nan, np.nan
-    np.testing.assert_allclose(SVALSE(LOOKS, SLOW).run(gaps).doa, expected.doa, atol=1e-12)
-    silent = z.copy()
-    silent[:, 0], silent[:, :, 0] = 0, np.nan
-    np.testing.assert_allclose(SVALSE(LOOKS, SLOW).run(silent).doa, expected.doa, atol=1e-12)
+    np.testing.assert_allclose(SVALSE(SEVERAL, SLOW).run(gaps).doa, expected.doa, atol=1e-12)
+    damaged = z.copy()
+    damaged[:, 0], damaged[:, :, 0] = 0, np.nan
+    np.testing.assert_allclose(SVALSE(SEVERAL, SLOW).run(damaged).doa, expected.doa, atol=1e-12)
 
 
-def test_many_looks_of_a_temper_as_large_decide_like_one() -> None:
+def test_tempering_by_the_number_of_snapshots_decides_like_one() -> None:
     """The same snapshot ten times over, counted once: equal support and angles."""
-    z = heard(CIRCLE, [[0.3, -2.0]], noise=0.05)
+    z = snapshots_of(CIRCLE, [[0.3, -2.0]], noise=0.05)
     ten = CIRCLE.replace(n_snapshots=10)
     one, other = VALSE(CIRCLE), VALSE(ten, solver=NewtonSolver(tempering=10.0, power_floor=0.0))
     one.update(z[0])
@@ -117,7 +119,7 @@ def test_many_looks_of_a_temper_as_large_decide_like_one() -> None:
 @pytest.mark.parametrize("reference", ["middle", "first"])
 def test_the_direction_form_of_a_line_finds_what_the_electrical_one_does(reference: Any) -> None:
     line = ArraySnapshot(SensorArray.ula(11, 0.5), 1.0)
-    z = heard(line, [[-0.7, 0.1, 0.9]] * 4, noise=1e-3)
+    z = snapshots_of(line, [[-0.7, 0.1, 0.9]] * 4, noise=1e-3)
     motion = BernoulliVonMises(sigma_doa=np.deg2rad(1.5))
     settings: dict[str, Any] = {"engine": "coordinate", "reference": reference}
     one = SVALSE(line, motion, **settings).run(z)
@@ -141,50 +143,50 @@ def test_the_whole_posterior_of_a_line_gives_what_its_von_mises_density_does() -
 def test_amplitudes_rebuild_the_snapshot() -> None:
     array = SensorArray(CIRCLE.array.positions + np.array([3.0, -2.0]))
     model = ArraySnapshot(array, 1.0)
-    z = heard(model, [[0.3, -2.0]], noise=1e-8)[0]
+    z = snapshots_of(model, [[0.3, -2.0]], noise=1e-8)[0]
     tracker = VALSE(model, solver=NewtonSolver(tolerance=1e-8))
     tracker.update(z)
     found = tracker.estimate
     np.testing.assert_allclose(found.amplitude @ model.steering_vector(found.doa), z, atol=1e-3)
 
 
-# -- what is found ------------------------------------------------------------------------------
+# -- detected sources ------------------------------------------------------------------------------
 
 
 def test_one_label_goes_through_the_cut() -> None:
     doa = np.deg2rad(160 + 3 * np.arange(14.0))[:, None]
-    run = SVALSE(CIRCLE, SLOW).run(heard(CIRCLE, doa))
+    run = SVALSE(CIRCLE, SLOW).run(snapshots_of(CIRCLE, doa))
     track = np.where(run.label == 0, run.doa, np.nan)[:, 0]
     np.testing.assert_allclose(wrapped(track - doa[:, 0]), 0, atol=0.05)
     assert track.min() < -2.9 < 2.9 < track.max()
 
 
 def test_two_sources_either_side_of_the_cut_are_merged_if_too_near() -> None:
-    z = heard(CIRCLE, [np.deg2rad([179.6, -179.6])] * 3, noise=1e-7)
+    z = snapshots_of(CIRCLE, [np.deg2rad([179.6, -179.6])] * 3, noise=1e-7)
     near = SVALSE(CIRCLE, SLOW).run(z).doa
     gaps = np.abs(wrapped(near[:, :, None] - near[:, None])) + 9 * np.eye(near.shape[1])
     assert np.nanmin(gaps) >= np.deg2rad(1.5)
 
 
-def test_silence_holds_no_source() -> None:
-    z = heard(LOOKS, [[0.3]] * 4)
+def test_zero_data_give_no_source() -> None:
+    z = snapshots_of(SEVERAL, [[0.3]] * 4)
     z[[0, 2]] = 0
-    run = SVALSE(LOOKS, SLOW).run(z)
+    run = SVALSE(SEVERAL, SLOW).run(z)
     assert run.n_found.tolist() == [0, 1, 0, 1]
 
 
 def test_without_noise_there_is_one_source() -> None:
-    run = SVALSE(LOOKS, SLOW).run(heard(LOOKS, [[0.3]] * 3, noise=1e-30))
+    run = SVALSE(SEVERAL, SLOW).run(snapshots_of(SEVERAL, [[0.3]] * 3, noise=1e-30))
     assert run.n_found.tolist() == [1] * 3
     np.testing.assert_allclose(run.doa, 0.3, atol=1e-5)
 
 
-def test_an_unknown_slowness_is_found_and_carried() -> None:
+def test_unknown_slowness_is_estimated_and_tracked() -> None:
     grid = [0.7, 0.85, 1.0, 1.15]
     truth = CIRCLE.replace(wavelength=[1.0 / 0.85, 1.3 / 0.85], n_snapshots=3)
-    model = LOOKS.replace(slowness=grid)
+    model = SEVERAL.replace(slowness=grid)
     tracker = SVALSE(model, SLOW)
-    run = tracker.run(heard(truth, [[0.3]] * 4, noise=0.05))
+    run = tracker.run(snapshots_of(truth, [[0.3]] * 4, noise=0.05))
     np.testing.assert_allclose(run.doa[:, 0], 0.3, atol=0.03)
     assert np.argmax(tracker.nuisance[0]) == 1
     before = tracker.nuisance[0]
@@ -193,7 +195,7 @@ def test_an_unknown_slowness_is_found_and_carried() -> None:
     np.testing.assert_allclose(tracker.nuisance.sum(axis=1), 1)
 
 
-def test_an_unknown_elevation_is_found() -> None:
+def test_unknown_elevation_is_estimated() -> None:
     array = SensorArray(np.random.default_rng(5).normal(size=(8, 3)) * 0.6)
     model = ArraySnapshot(array, [1.0, 1.3], elevation=[0.0, 0.5, 1.0])
     a = model.waves.steering([0.3])[1, :, :, 0]  # of the second value
@@ -205,7 +207,7 @@ def test_an_unknown_elevation_is_found() -> None:
     assert np.argmax(tracker.nuisance[0]) == 1
 
 
-def test_one_frequency_a_step_is_ambiguous_until_others_are_heard() -> None:
+def test_one_frequency_a_step_is_ambiguous_until_others_follow() -> None:
     """Section 11: hopping; here one source, seen from the tenth step on."""
     forms: dict[str, dict[str, Any]] = {
         "fast": {},
@@ -234,7 +236,7 @@ def test_several_frequencies_end_the_ambiguity_at_once() -> None:
     assert g.total < 0.6
 
 
-def test_the_right_elements_count_sources_right_and_the_wrong_do_not() -> None:
+def test_number_of_sources_needs_the_right_element_responses() -> None:
     counts: dict[bool, list[bool]] = {}
     for known in (True, False):
         trial = create("cardioids", known=known, n_steps=15).sample(np.random.default_rng(0))
@@ -269,10 +271,10 @@ def test_gospa_on_the_circle_at_20_db(numbers: dict[str, Any], svalse: float, va
     assert ours < 0.6 * beam
 
 
-# -- what is refused, and what is told ----------------------------------------------------------
+# -- rejected arguments and warnings -------------------------------------------------------------
 
 
-def test_a_sparse_line_warns_of_the_first_two_directions_alike() -> None:
+def test_sparse_line_warns_of_two_ambiguous_directions() -> None:
     model = ArraySnapshot(SensorArray.ula(8, 2.0), 1.0)
     for kind in (SVALSE, VALSE):
         with pytest.warns(UserWarning, match=r"directions -90\.0 and -30\.0 degrees are ambiguous"):
@@ -301,33 +303,33 @@ def test_a_sparse_line_warns_of_the_first_two_directions_alike() -> None:
         (ArraySnapshot(SensorArray.uca(2, 0.5), 1.0), {}, "at least 3 sensors"),
     ],
 )
-def test_parts_that_do_not_fit_are_refused(
+def test_parts_that_do_not_fit_are_rejected(
     model: ArraySnapshot, params: dict[str, Any], message: str
 ) -> None:
     with pytest.raises(ValueError, match=message):
         SVALSE(model, SLOW, **params)
 
 
-def test_capon_takes_single_looks_only() -> None:
+def test_mvdr_requires_single_snapshots() -> None:
     with pytest.raises(ValueError, match=r"one snapshot a step, .* shape \(2, 3, 8\)"):
-        MVDR(LOOKS)
+        MVDR(SEVERAL)
 
 
-def test_a_refused_measurement_leaves_the_belief_as_it_was() -> None:
-    tracker = SVALSE(LOOKS, SLOW)
-    tracker.run(heard(LOOKS, [[0.3]] * 2))
+def test_rejected_measurement_leaves_the_belief_unchanged() -> None:
+    tracker = SVALSE(SEVERAL, SLOW)
+    tracker.run(snapshots_of(SEVERAL, [[0.3]] * 2))
     before = {name: getattr(tracker, name) for name in ("mu", "bin_noise", "nuisance", "estimate")}
-    turns = heard(LOOKS, [[0.3]])[0]
+    turns = snapshots_of(SEVERAL, [[0.3]])[0]
     turns.reshape(6, 8)[np.arange(8) % 6, np.arange(8)] = np.nan
-    for bad in (np.ones(8), np.ones((3, 2, 8)), np.full(LOOKS.shape, np.inf), turns):
+    for bad in (np.ones(8), np.ones((3, 2, 8)), np.full(SEVERAL.shape, np.inf), turns):
         with pytest.raises(ValueError, match="snapshot"):
             tracker.update(bad)
     assert all(getattr(tracker, name) is value for name, value in before.items())
 
 
-def test_a_step_that_few_sensors_heard_counts_as_missed() -> None:
-    z = heard(LOOKS, [[-0.5, 1.0, 2.5]] * 6)
+def test_step_with_few_valid_sensors_counts_as_missing() -> None:
+    z = snapshots_of(SEVERAL, [[-0.5, 1.0, 2.5]] * 6)
     z[3, ..., 2:] = np.nan
-    run = SVALSE(LOOKS, SLOW).run(z)
+    run = SVALSE(SEVERAL, SLOW).run(z)
     assert run.iterations[3] == 0
     assert set(run.label[5][run.label[5] >= 0]) == {0, 1, 2}

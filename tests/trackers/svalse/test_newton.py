@@ -1,4 +1,4 @@
-"""The fast engine's mathematics: derivatives, monotony, exact gains, agreement in batches."""
+"""The Newton solver's mathematics: derivatives, monotony, exact gains, agreement in batches."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -180,7 +180,7 @@ def test_an_addition_changes_the_evidence_by_exactly_its_gain() -> None:
         assert more.criterion(0.0)[0] - state.criterion(0.0)[0] == pytest.approx(gain[g], abs=1e-6)
 
 
-def test_nothing_is_born_near_what_is_there_and_what_was_removed_comes_back() -> None:
+def test_candidates_keep_the_merge_distance_and_removed_components_return() -> None:
     state, response = scene(0), ExpectedResponse(MODEL.manifold())
     for _ in range(5):
         state = newton_step(response, state, NONE)
@@ -209,7 +209,7 @@ def test_nothing_is_born_near_what_is_there_and_what_was_removed_comes_back() ->
 # -- leading axes -----------------------------------------------------------------------------
 
 
-def test_unused_places_and_other_problems_make_no_difference() -> None:
+def test_unused_slots_and_other_problems_make_no_difference() -> None:
     states = [scene(0, K=5), scene(1, K=3), scene(2, K=4)]
     components = Components.zeros(3, 6)
     for i, state in enumerate(states):
@@ -277,11 +277,11 @@ def test_snapshots_fitted_together_are_those_fitted_alone() -> None:
         age = np.arange(len(mu)) % 2
         known.append(ComponentPrior(mu, kappa, rho, 0.1, age, 15.0 + n) if n % 4 else None)
     Ys[5] = np.zeros((1, 15, 1), dtype=np.complex128)
-    engine = NewtonSolver(merge=MERGE_DISTANCE, snr_db=20.0)  # also without a prior
+    solver = NewtonSolver(merge=MERGE_DISTANCE, snr_db=20.0)  # also without a prior
     manifold = MODEL.manifold()
-    together = engine.solve_batch(Ys, manifold, known)
+    together = solver.solve_batch(Ys, manifold, known)
     for Y, prediction, fit in zip(Ys, known, together, strict=True):
-        alone = engine.solve(Y, manifold, prediction)
+        alone = solver.solve(Y, manifold, prediction)
         np.testing.assert_allclose(fit.theta, alone.theta, atol=1e-9)
         np.testing.assert_allclose(fit.amplitude, alone.amplitude, rtol=1e-8)
         assert fit.age.tolist() == alone.age.tolist()

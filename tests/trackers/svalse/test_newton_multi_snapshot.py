@@ -1,6 +1,5 @@
-"""The fast engine on several bins and snapshots, directional elements and planar arrays."""
+"""The Newton solver on several bins and snapshots, directional elements and planar arrays."""
 
-import copy
 from typing import Any
 
 import numpy as np
@@ -9,12 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from newton_states import MODEL, active_components, evaluation_of, prior_of
 from newton_states import scene as of_a_line
+from svalse_scenes import CIRCLE, ELEMENTS, MODELS, NAMES, SEVERAL, SPARSE
 
-from arrivals.measurement_models import ArraySnapshot, ElementResponse, SensorArray
-from arrivals.motion_models import BernoulliVonMises
+from arrivals.measurement_models import ArraySnapshot
 from arrivals.motion_models.bessel import log_i0
-from arrivals.scenarios import create, mean_gospa
-from arrivals.trackers import SVALSE, VALSE
+from arrivals.scenarios import create
+from arrivals.trackers import SVALSE
 from arrivals.trackers.svalse.components import MERGE_DISTANCE, ComponentPosterior, ComponentPrior
 from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver
 from arrivals.trackers.svalse.newton.candidates import (
@@ -35,20 +34,8 @@ from arrivals.trackers.svalse.newton.step import (
     update_variances,
     weights,
 )
-from arrivals.trackers.svalse.noise_initialization import noise_from_eigenvalues
-from arrivals.typing import Complex, Float
+from arrivals.typing import Complex
 
-CIRCLE = ArraySnapshot(SensorArray.uca(8, radius=0.65), wavelength=1.0)
-LOOKS = CIRCLE.replace(wavelength=[1.0, 1.25, 1.6], n_snapshots=4)
-FACING = 2 * np.pi * np.arange(8) / 8
-OMNI = np.array([0.5, 1.0, 0.7, 1.0, 0.5, 0.5, 1.0, 1.0])
-MIXED = ElementResponse.first_order(FACING, OMNI)
-ELEMENTS = LOOKS.replace(response=MIXED)  # ‖a(θ)‖² changes with the angle
-SPARSE = ArraySnapshot(SensorArray(2.0 * np.arange(8.0)), [1.0, 1.1, 1.3])
-LINE = ArraySnapshot(SensorArray.ula(15, 0.5), wavelength=1.0, n_snapshots=3)
-MODELS = [CIRCLE, LOOKS, ELEMENTS, SPARSE, LINE]
-NAMES = ["circle", "looks", "elements", "sparse line", "snapshots of a line"]
-SLOW = BernoulliVonMises(sigma_doa=np.deg2rad(3.0))
 every_model = pytest.mark.parametrize("model", MODELS, ids=NAMES)
 DOA = np.array([-1.1, -0.1, 0.7])
 
@@ -166,9 +153,9 @@ def test_an_addition_changes_the_evidence_by_exactly_its_gain(model: ArraySnapsh
         assert change == pytest.approx(gain[g], rel=1e-6, abs=1e-6)
 
 
-def test_what_learning_the_noise_again_gives_back_is_never_negative() -> None:
+def test_relearning_gains_are_not_negative() -> None:
     for seed in range(4):
-        response, state = scene(LOOKS, seed)
+        response, state = scene(SEVERAL, seed)
         assert (relearning_gains(response, state) >= 0).all()
 
 
@@ -181,7 +168,7 @@ def test_what_learning_the_noise_again_gives_back_is_never_negative() -> None:
         (SPARSE, [1.40, 0.4, -1.40], -1),
     ],
 )
-def test_the_nearest_are_found_across_the_cut_and_in_the_mirror(
+def test_first_duplicate_across_the_cut_and_in_the_mirror(
     model: ArraySnapshot, doa: list[float], nearest: int
 ) -> None:
     response, state = scene(model)
@@ -212,7 +199,7 @@ def test_the_objective_never_falls_in_a_newton_step(
     assert F[-1] > F[0]
 
 
-def test_a_step_that_no_shorter_one_mends_takes_the_variances_along_gradually() -> None:
+def test_backtracking_shortens_the_step_of_the_variances() -> None:
     """Far from the top, the variances' fixed point alone made F fall: the step was refused."""
     rng, response = np.random.default_rng(70147), ExpectedResponse(MODEL.manifold())
     state = of_a_line(70147)
@@ -241,7 +228,7 @@ def wrapped_normal_bound(
 
 @pytest.mark.parametrize("numbers", [{"n_bins": 5}, {"n_snapshots": 5}], ids=["bins", "snapshots"])
 def test_the_bound_is_no_lower_than_that_of_coordinate_ascent(numbers: dict[str, int]) -> None:
-    """From the same carried components, in at least nine of ten steps; half KL charged."""
+    """From the same tracked components, in at least nine of ten steps; half KL charged."""
     gain: list[float] = []
     for seed in range(2):
         trial = create("circle", snr_db=15.0, n_steps=16, **numbers).sample(
@@ -262,185 +249,3 @@ def test_the_bound_is_no_lower_than_that_of_coordinate_ascent(numbers: dict[str,
                 gain.append(bounds[0] - bounds[1])
             tracker.update(z)
     assert np.mean(np.array(gain) > -0.05) >= 0.9
-
-
-# -- laws of the trackers -----------------------------------------------------------------------
-
-
-def heard(model: ArraySnapshot, doa: Any, seed: int = 0, noise: float = 0.01) -> Complex:
-    rng = np.random.default_rng(seed)
-    doa = np.atleast_2d(np.asarray(doa, dtype=float))
-    shape = (len(doa), *model.shape[:-1], doa.shape[1])
-    w = np.exp(2j * np.pi * rng.random(shape)) * rng.uniform(0.7, 1.3, shape)
-    return model.replace(noise=noise).simulate(doa, w, rng)
-
-
-def wrapped(angle: Float) -> Float:
-    return np.asarray((angle + np.pi) % (2 * np.pi) - np.pi)
-
-
-@pytest.mark.parametrize("model", [CIRCLE, LOOKS, ELEMENTS], ids=NAMES[:3])
-def test_a_circle_turned_by_some_of_its_births_turns_every_angle(model: ArraySnapshot) -> None:
-    """By whole steps of the grid on which components are born; see the next for others."""
-    n = len(support_search(NewtonSolver(), model.manifold(), 1, MERGE_DISTANCE).grid.theta)
-    turn, doa = 2 * np.pi * 5 / n, np.array([[0.3, -2.0, 1.6]] * 4)
-    other, z = turned(model, turn), heard(model, doa)
-    a, b = SVALSE(model, SLOW).run(z), SVALSE(other, SLOW).run(z)
-    assert a.iterations.tolist() == b.iterations.tolist()
-    np.testing.assert_allclose(wrapped(b.doa - a.doa - turn), 0 * a.doa, atol=1e-7)
-
-
-def turned(model: ArraySnapshot, turn: float) -> ArraySnapshot:
-    R = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
-    response = None if model.response is None else ElementResponse.first_order(FACING + turn, OMNI)
-    return model.replace(array=SensorArray(model.array.positions @ R.T), response=response)
-
-
-def test_a_circle_turned_by_anything_turns_what_is_found() -> None:
-    """To where Newton's steps rest; another start decides otherwise in some of 100 steps."""
-    trial = create("circle", n_bins=3, n_steps=25).sample(np.random.default_rng(0))
-    tracker = trial.tracker("svalse")
-    assert isinstance(tracker, SVALSE)
-    assert isinstance(tracker.measurement, ArraySnapshot)
-    other = SVALSE(turned(tracker.measurement, 1.234), tracker.motion)
-    a, b = tracker.run(trial.measurements), other.run(trial.measurements)
-    same = a.n_found == b.n_found
-    assert np.mean(same) >= 0.9
-    for x, y, std in zip(a.doa[same], b.doa[same], a.std[same], strict=True):
-        x, y = x[~np.isnan(x)], y[~np.isnan(y)]
-        apart = np.abs(wrapped(x[:, None] + 1.234 - y)).min(axis=1, initial=9.0)
-        assert (apart < 0.2 * np.nanmin(std)).all()
-
-
-@every_model
-def test_scale_and_common_phase_change_nothing(model: ArraySnapshot) -> None:
-    z = heard(model, [[0.3, -0.9]] * 3)
-    one, other = SVALSE(model, SLOW).run(z), SVALSE(model, SLOW).run(-3e5j * z)
-    assert one.iterations.tolist() == other.iterations.tolist()
-    np.testing.assert_allclose(one.doa, other.doa, atol=1e-9)
-    np.testing.assert_allclose(other.noise, 9e10 * one.noise, rtol=1e-7)
-
-
-@pytest.mark.parametrize("model", [LOOKS, ELEMENTS], ids=["looks", "elements"])
-def test_a_silent_sensor_equals_the_array_without_it(model: ArraySnapshot) -> None:
-    z = heard(model, [[0.3, -2.0]] * 3)
-    gone = np.delete(np.arange(8), 3)
-    response = None
-    if model.response is not None:
-        response = ElementResponse(model.response.gains[..., gone])
-    fewer = model.replace(array=SensorArray(model.array.positions[gone]), response=response)
-    silent = z.copy()
-    silent[..., 3] = np.nan
-    a, b = SVALSE(model, SLOW).run(silent), SVALSE(fewer, SLOW).run(z[..., gone])
-    assert a.n_found.tolist() == b.n_found.tolist()
-    np.testing.assert_allclose(a.doa[:, :2], b.doa[:, :2], atol=1e-9)
-
-
-def test_a_batch_is_its_runs() -> None:
-    """Missing sensors, missed measurements, silence, and sequences of unequal length."""
-    draws = [
-        create("circle", n_bins=3, n_snapshots=2, n_steps=6).sample(np.random.default_rng(seed))
-        for seed in range(5)
-    ]
-    data: list[list[Any]] = [list(trial.measurements) for trial in draws]
-    data[0][3] = None
-    data[1][2] = np.where(np.arange(8) == 6, np.nan, data[1][2])
-    data[2][4] = np.zeros_like(data[2][4])
-    data[3] = data[3][:4]
-    for name in ("svalse", "valse"):
-        tracker = draws[0].tracker(name)
-        for z, run in zip(data, tracker.run_batch(data), strict=True):
-            alone = copy.deepcopy(tracker).run(z)
-            assert alone.n_found.tolist() == run.n_found.tolist()
-            assert alone.iterations.tolist() == run.iterations.tolist()
-            np.testing.assert_allclose(run.doa, alone.doa, atol=1e-9)
-            np.testing.assert_allclose(run.noise, alone.noise, rtol=1e-8)
-
-
-def test_a_mirrored_angle_is_reported_and_carried_in_front() -> None:
-    """A source that goes through endfire and comes back."""
-    doa = np.deg2rad([[80.0], [84.0], [88.0], [89.0], [86.0], [82.0], [78.0]])
-    model = SPARSE.replace(array=SensorArray(0.45 * np.arange(8.0)))
-    tracker = SVALSE(model, SLOW)
-    run = tracker.run(heard(model, doa, noise=1e-3))
-    assert (run.n_found == 1).all()
-    np.testing.assert_allclose(np.rad2deg(run.doa[:, 0]), np.rad2deg(doa[:, 0]), atol=4.0)
-    assert np.nanmax(np.abs(tracker.mu)) <= np.pi / 2
-
-
-def test_the_floor_of_the_power_and_of_the_noise_hold() -> None:
-    z = heard(LOOKS, [[0.3, -2.0]], noise=1e-4)[0]
-    tracker = VALSE(LOOKS, solver=NewtonSolver(max_snr_db=10.0))
-    tracker.update(z)
-    power = (np.abs(z) ** 2).mean(axis=(1, 2))
-    assert (tracker.bin_noise >= 0.1 * power * (1 - 1e-9)).all()
-    weak = heard(LOOKS, [[0.3]], noise=3.0, seed=1)[0]
-    for floor, found in ((0.0, True), (1e3, False)):
-        tracker = VALSE(LOOKS, solver=NewtonSolver(power_floor=floor))
-        tracker.update(weak)
-        assert (tracker.estimate.n_found > 0) is found
-
-
-def test_noise_of_many_snapshots_is_that_of_the_small_eigenvalues() -> None:
-    rng = np.random.default_rng(0)
-    for noise in (0.01, 1.0):
-        model = CIRCLE.replace(n_snapshots=400, noise=noise)
-        Y = model.looks(model.simulate([0.3, -2.0], rng.standard_normal((400, 2)) + 0j, rng))
-        assert noise_from_eigenvalues(Y)[0] == pytest.approx(noise, rel=0.3)
-
-
-# -- figures, small versions of benchmarks/any_array.py -----------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("scenario", "numbers", "limit"),
-    [
-        ("circle", {"n_bins": 10, "snr_db": 10.0}, 4.8),
-        ("circle", {"n_bins": 10, "snr_db": 0.0}, 12.0),
-        ("circle", {"n_snapshots": 10, "snr_db": 10.0}, 4.8),
-        ("grating", {"n_bins": 5, "n_sources": 2}, 0.34),
-        ("grating", {"n_bins": 10, "hopping": True, "n_sources": 2}, 6.28),
-    ],
-)
-def test_gospa_of_the_specification(scenario: str, numbers: dict[str, Any], limit: float) -> None:
-    """Over six seeds 4.3, 10.7, 4.3, 0.20 and 2.0; the last limit is of whole posteriors."""
-    draws = [create(scenario, **numbers).sample(np.random.default_rng(n)) for n in range(4)]
-    runs = draws[0].tracker("svalse").run_batch([trial.measurements for trial in draws])
-    found = [
-        mean_gospa(np.rad2deg(t.truth), np.rad2deg(run.doa), c=10.0, period=360.0).total
-        for t, run in zip(draws, runs, strict=True)
-    ]
-    assert np.mean(found) < limit
-
-
-# -- what is remembered, and what is left of an array ---------------------------------------------
-
-
-def test_one_sensor_hears_noise_and_no_direction() -> None:
-    model = ArraySnapshot(SensorArray.uca(8, radius=0.65), [1.0, 1.25], n_snapshots=3)
-    rng = np.random.default_rng(0)
-    z = rng.standard_normal((2, 3, 8)) + 1j * rng.standard_normal((2, 3, 8))
-    z[:, :, 1:] = np.nan
-    tracker = SVALSE(model)
-    tracker.update(z)
-    power = (np.abs(z[:, :, 0]) ** 2).mean(axis=1)
-    assert tracker.estimate.doa.size == 0
-    np.testing.assert_allclose(tracker.bin_noise, power)
-    assert tracker.noise == pytest.approx(power.mean())
-
-
-def test_what_is_made_of_an_array_is_made_once_for_each_set_of_sensors() -> None:
-    for array in (SensorArray.ula(8, 0.5), SensorArray.uca(8, radius=0.65)):
-        model = ArraySnapshot(array, 1.0, noise=0.01)
-        z = model.simulate([0.3], np.ones((6, 1)), np.random.default_rng(0))
-        z[:, 3] = np.nan
-        support_search.cache_clear()
-        SVALSE(model).run(z)
-        assert support_search.cache_info().misses == 1
-
-
-@pytest.mark.parametrize("name", ["max_components", "power_floor", "max_snr_db"])
-def test_numbers_are_kept_as_numbers(name: str) -> None:
-    model = ArraySnapshot(SensorArray.ula(8, 0.5), 1.0)
-    tracker = SVALSE(model).set_params(**{f"solver__{name}": np.int64(3)})
-    assert type(getattr(tracker.solver, name)) is (int if name == "max_components" else float)

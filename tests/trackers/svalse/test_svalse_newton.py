@@ -1,4 +1,4 @@
-"""What the trackers promise with the fast engine, which is the default."""
+"""SVALSE and VALSE with the Newton solver, the default."""
 
 import copy
 import time
@@ -123,7 +123,7 @@ def test_gospa_from_0_to_40_db(name: str, snr_db: float, limit: float) -> None:
 
 
 def test_a_leap_of_40_db_is_a_transient_of_some_steps() -> None:
-    """The noise start is carried: the note has 11.7° in the first five steps, 2.1° after ten."""
+    """The start of the noise is kept: 11.7° in the first five steps in the note, 2.1° after ten."""
     early, late = [], []
     for seed in (1, 2):
         rng = np.random.default_rng(seed)
@@ -166,7 +166,7 @@ def bound(y: Complex, manifold: Any, known: ComponentPrior, fit: ComponentPoster
 
 
 def test_the_bound_is_no_lower_than_that_of_coordinate_ascent() -> None:
-    """From the same carried components; the note has 94 to 100 % of the steps, 0.64 nats each."""
+    """From the same tracked components; the note has 94 to 100 % of the steps, 0.64 nats each."""
     gain: list[float] = []
     for name in FIGURES:
         trial = trials(name, range(1, 2), n_steps=10)[0]
@@ -188,7 +188,7 @@ def test_the_bound_is_no_lower_than_that_of_coordinate_ascent() -> None:
 
 
 def test_a_batch_is_its_runs() -> None:
-    """Missing sensors, missed measurements, silence, and sequences of unequal length."""
+    """Missing sensors, missing measurements, zero data, and sequences of unequal length."""
     draws = trials("svalse_fig5", range(1, 6), n_steps=12)
     data: list[list[Any]] = [list(trial.measurements) for trial in draws]
     data[0][3] = None
@@ -219,10 +219,10 @@ def test_a_batch_goes_on_from_the_present_belief_and_leaves_it() -> None:
     assert tracker.run_batch([]) == []
 
 
-# -- what is carried ----------------------------------------------------------------------------
+# -- tracked components --------------------------------------------------------------------------
 
 
-def test_a_source_is_remembered_for_three_steps() -> None:
+def test_inactive_source_is_tracked_for_three_steps() -> None:
     for pause, remembered in ((3, True), (5, False)):
         on = np.r_[np.ones(4), np.zeros(pause), np.ones(3)] > 0
         doa = np.stack([np.where(on, 0.3, np.nan), np.full(len(on), -0.5)], axis=1)
@@ -233,7 +233,7 @@ def test_a_source_is_remembered_for_three_steps() -> None:
         assert (before == after) is remembered
 
 
-def test_silence_ages_what_is_carried() -> None:
+def test_zero_data_age_the_tracked_components() -> None:
     z = tone([[0.3]] * 9, noise=1e-3)
     z[4:6] = 0
     tracker = SVALSE(LINE)
@@ -289,14 +289,14 @@ def test_share_of_the_divergence_trades_missed_for_false() -> None:
     assert found[0] > found[1] > found[2]
 
 
-def test_existence_of_what_is_detected_is_above_one_half() -> None:
+def test_existence_of_detected_components_is_above_one_half() -> None:
     """It stays only while it gains."""
     data = [trial.measurements for trial in trials("svalse_scenario2", range(1, 4), 5.0)]
     for run in SVALSE(LINE).run_batch(data):
         assert np.nanmin(run.existence) > 0.5
 
 
-def test_what_the_engine_finds_is_what_is_detected() -> None:
+def test_active_components_are_detected() -> None:
     y = tone([[-0.5, 0.4]], noise=1e-3)[0]
     manifold = LINE.manifold()
     fit = NewtonSolver(merge=0.0, snr_db=None).solve(y[None, :, None], manifold, None)
