@@ -1,4 +1,4 @@
-"""The interpolation-delay filters' accuracy beside the specification's, and their speed.
+"""Accuracy of the interpolation-delay filters against the specification, and their speed.
 
 Accuracy: 100 trials; RMSE may differ by 15 %, means by three standard errors. A row that does not
 agree is marked; where the specification's own figure stems from 100 trials, one in twenty may be.
@@ -25,7 +25,7 @@ from arrivals.scenarios.reproduce.interpolation.table_1 import table1
 from arrivals.scenarios.reproduce.interpolation.trials import draws, filter_directions, rms, tracker
 from arrivals.scenarios.simulations.sampled_source import InterpolationTone
 from arrivals.trackers import InterpolationEKF
-from arrivals.trackers.interpolation.updates import move
+from arrivals.trackers.interpolation.updates import predict, transition
 from arrivals.typing import Float
 
 # 9.1: mean (variance) at 15, 30, 45, 60, 75 degrees
@@ -103,7 +103,7 @@ Line = tuple[str, float, float, bool]
 
 
 def close(ours: float, known: float) -> bool:
-    """Tell whether an RMSE agrees within 15 %, or the digits that the known one has."""
+    """Return True if an RMSE agrees within 15 %."""
     return abs(ours - known) <= 0.15 * known
 
 
@@ -132,8 +132,8 @@ def convergence_lines(runs: int) -> Iterator[Line]:
     rows = convergence(runs, 0).rows
     for (doa, method), known in CONVERGENCE.items():
         ours = [row for row in rows if (row[0], row[2]) == (doa, method)]
-        for row, wanted in zip(ours, np.reshape(numbers(known), (-1, 3)), strict=True):
-            for n, value, figure in zip((30, 100, 300), row[3:6], wanted, strict=True):
+        for row, expected in zip(ours, np.reshape(numbers(known), (-1, 3)), strict=True):
+            for n, value, figure in zip((30, 100, 300), row[3:6], expected, strict=True):
                 what = f"9.2 {doa:g}° {row[1]:g} dB {method} after {n}"
                 yield what, value, figure, close(value, figure)
 
@@ -169,21 +169,21 @@ def accuracy(runs: int) -> None:
 
 
 def capture(runs: int) -> None:
-    """Print how often a filter that starts far away ends at the source."""
+    """Print how often a filter with a large initial error converges to the source."""
     scenario = InterpolationTone(doa_deg=60.0)
     samples = draws(scenario, runs, 0)
     print(f"\n{runs} trials of a tone at 60 degrees and {scenario.snr_db:g} dB; share that ends "
           "within 3 degrees:\n\n| variant | coefficients at every | from 0 degrees | from 20 |"
           "\n|---|---|---|---|")  # fmt: skip
     for method in ("B", "D", "C"):
-        for each_sensor in (False, True):
+        for sequential in (False, True):
             shares = []
             for start in (0.0, 20.0):
-                last = filter_directions(scenario, samples, method, start, each_sensor=each_sensor)[
-                    :, -1
-                ]
+                last = filter_directions(
+                    scenario, samples, method, start, variant__sequential_update=sequential
+                )[:, -1]
                 shares.append(f"{100 * np.mean(np.abs(last - 60.0) < 3.0):.0f} %")
-            form = "sensor" if each_sensor else "snapshot"
+            form = "sensor" if sequential else "snapshot"
             print(f"| {method} | {form} | {' | '.join(shares)} |", flush=True)
 
 
@@ -211,7 +211,7 @@ def speed(runs: int = 100) -> None:
     samples = draws(scenario, runs, 0)
     truth, model = 60.0, scenario.measurement
     made = tracker(model, "B", 50.0, scenario.n_steps)
-    look = made._parts.last.looks[0]  # type: ignore[union-attr]  # not a joint filter
+    baseline = made.assembly.final.baseline_models[0]  # type: ignore[union-attr]  # not joint
     frames = model.frame(samples)
     few = 20
     timed: dict[str, tuple[float, float]] = {}
@@ -227,7 +227,7 @@ def speed(runs: int = 100) -> None:
     x0, P0 = float(made.x[0]), float(made.P[0, 0])
 
     def theirs() -> list[float]:
-        return [filterpy_doa(look, frame, x0, P0) for frame in frames[:few]]
+        return [filterpy_doa(baseline, frame, x0, P0) for frame in frames[:few]]
 
     def one_by_one() -> list[float]:
         return [run_once(made, z) for z in samples[:few]]
@@ -236,9 +236,9 @@ def speed(runs: int = 100) -> None:
         return made.trajectory(samples)[0][:, -1, 0]
 
     clock("filterpy's EKF, one vector update a snapshot", few, theirs)
-    for each_sensor in (False, True):
-        made.set_params(each_sensor=each_sensor)
-        form = f"ours, coefficients at every {'sensor' if each_sensor else 'snapshot'}"
+    for sequential in (False, True):
+        made.set_params(variant__sequential_update=sequential)
+        form = f"ours, coefficients at every {'sensor' if sequential else 'snapshot'}"
         clock(f"{form}, one trial after the other", few, one_by_one)
         clock(f"{form}, a batch of {runs}", runs, batch)
     reference = timed["filterpy's EKF, one vector update a snapshot"][0]
@@ -246,9 +246,9 @@ def speed(runs: int = 100) -> None:
           "times faster than filterpy | RMSE |\n|---|---|---|---|")  # fmt: skip
     for name, (ms, error) in timed.items():
         print(f"| {name} | {ms:.2f} | {reference / ms:.1f} | {error:.2f} |")
-    for each_sensor in (False, True):
-        made.set_params(each_sensor=each_sensor)
-        form = "sensor" if each_sensor else "snapshot"
+    for sequential in (False, True):
+        made.set_params(variant__sequential_update=sequential)
+        form = "sensor" if sequential else "snapshot"
         calls = array_calls(made, samples)
         print(f"\nArray calls a snapshot, coefficients at every {form}: {calls}, for any batch.")
 
@@ -277,16 +277,18 @@ def array_calls(made: InterpolationEKF, samples: Float) -> int:
             calls += 1
             return super().__array_function__(func, types, args, kwargs)
 
-    lead, n, parts = samples.shape[:1], made.dim_x, made._parts
-    F, Q = parts.motion.F(np.zeros(n)), parts.motion.Q()
+    lead, n, assembly = samples.shape[:1], made.dim_x, made.assembly
+    F, Q = transition(assembly.motion, 1.0)
+    scale = made.measurement.power, made.measurement.noise_ratio
     x: Float = np.broadcast_to(made.x, (*lead, n)).copy().view(Counting)
     P: Float = np.broadcast_to(made.P, (*lead, n, n)).copy().view(Counting)
-    heard = made.heard.copies(lead)
-    heard = replace(heard, frames=heard.frames.copy().view(Counting))
+    buffer = made.buffer.broadcast(lead)
+    buffer = replace(buffer, frames=buffer.frames.copy().view(Counting))
     for k in range(3):
         calls = 0
-        heard = heard.then(samples[:, k].view(Counting))
-        x, P = parts.update(*move(x, P, F, Q), made._frames(heard), heard.n_snapshots)
+        buffer = buffer.append(samples[:, k].view(Counting))
+        frames = buffer.scaled(*scale)
+        x, P = assembly.update(*predict(x, P, F, Q), frames, buffer.n_snapshots)
     return calls
 
 

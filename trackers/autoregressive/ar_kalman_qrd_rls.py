@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -106,6 +107,16 @@ class ARKalmanQRDRLS(BlockProcessor):
     >>> bool(abs(np.rad2deg(run.doa[-1]) - [-35, 5, 40]).max() < 1), run.signals.shape
     (True, (3000, 3))
     """
+
+    renamed: ClassVar[dict[str, str]] = {
+        "adapt_drive": "noise__adapt_process_noise",
+        "adapt_noise": "noise__adapt_measurement_noise",
+        "r_start": "noise__r_start",
+        "tau": "noise__tau",
+    } | {
+        name: f"regression__{name}"
+        for name in ("forgetting", "ar_forgetting", "ridge", "ar_ridge", "correction")
+    }
 
     def __init__(
         self,

@@ -1,202 +1,278 @@
-"""How one snapshot corrects what is known of a delay: from neighbour to neighbour, or all at once.
+"""Updates of a delay by one snapshot: pairwise along the array, or by all sensors at once.
 
-Both work on beliefs x (..., dim_x), P (..., dim_x, dim_x) with the delay Δ as element 0, and on
-any leading axes: many independent filters are one array program. What was not heard is NaN.
+Beliefs x (..., dim_x), P (..., dim_x, dim_x) have the delay Δ as element 0 and any leading axes:
+many independent filters are one array program. Missing samples are NaN.
+
+References
+----------
+Radhakrishnan, Unnikrishnan and Balakrishnan, (11) and (18)-(23).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import lru_cache
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from arrivals.measurement_models.delays.delay_line import SourceAtCentre
 from arrivals.measurement_models.delays.interpolation import InterpolationDelay
-from arrivals.trackers.gaussian.linalg import symmetric
+from arrivals.motion_models.base import MotionModel
+from arrivals.parameters import FrozenModel
+from arrivals.trackers.gaussian.equations import joseph, predict_gaussian, update_scalar
+from arrivals.trackers.gaussian.linalg import apply, symmetric
 from arrivals.typing import Bool, Float
 
-
-def move(x: Float, P: Float, F: Float, Q: Float) -> tuple[Float, Float]:
-    """Predict beliefs: F x and F P Fᵀ + Q, kept symmetric to the last bit.
-
-    Examples
-    --------
-    >>> move(np.ones(1), np.eye(1), np.full((1, 1), 2.0), np.eye(1))
-    (array([2.]), array([[5.]]))
-    """
-    return (F @ x[..., None])[..., 0], symmetric(F @ P @ F.T + Q)
-
-
-def fuse(x: Float, P: Float, e: Float, H: Float, R: Float) -> tuple[Float, Float]:
-    """Correct beliefs by residuals e, (..., n), that see element 0 alone, with slopes H.
-
-    The n residuals are independent, of one variance R (...); together they are one scalar
-    measurement of the information i = Σ H²/R:
-
-        K = P₀ / (1 + i P₀₀),    x ← x + K Σ He/R,    P ← P - i K P₀ᵀ
-
-    Examples
-    --------
-    >>> x, P = fuse(np.zeros(1), np.eye(1), np.array([1.0]), np.array([1.0]), np.array(1.0))
-    >>> x, P
-    (array([0.5]), array([[0.5]]))
-    """
-    i = (H * H).sum(axis=-1) / R
-    gradient = (H * e).sum(axis=-1) / R
-    K = P[..., 0] / (1 + i * P[..., 0, 0])[..., None]
-    x = x + K * gradient[..., None]
-    return x, P - (i[..., None] * K)[..., :, None] * P[..., None, 0, :]
-
-
-def kept(e: Float, variance: Float, gate: float | None) -> Bool:
-    """Tell which residuals to use: those that are there, and within `gate` standard deviations.
-
-    Examples
-    --------
-    >>> kept(np.array([0.1, np.nan, 5.0]), np.ones(3), gate=3.0)
-    array([ True, False, False])
-    """
-    inside = np.isfinite(e)
-    return inside if gate is None else inside & (e * e <= gate**2 * variance)
+MAX_INITIAL_STD = 0.12  # over κ: standard deviation of the delay at the start of a joint filter
+MAX_PHASE_STD = 0.35  # rad: of the phase of a baseline longer than 1, so that no cycle is lost
 
 
 class DelayObservation(NamedTuple):
-    """What a snapshot says of a state, to first order: one residual y = H d + v for each sensor."""
+    """Residuals of a snapshot, linearized: y = H d + v, one for each sensor."""
 
-    y: Float  # (..., n_sensors), 0 where a sensor says nothing
+    y: Float  # (..., n_sensors), 0 for a sensor without a residual
     H: Float  # (..., n_sensors, dim_x), 0 there too
     R: Float  # variances of v, (..., n_sensors)
 
 
-@dataclass(frozen=True)
-class PairwiseUpdate:
-    """Corrections along the array: each sensor is foretold from one `baseline` away.
+@lru_cache(maxsize=128)
+def transition(motion: MotionModel, dt: float) -> tuple[Float, Float]:
+    """Return F and Q of a linear motion."""
+    return motion.F(np.zeros(motion.dim_x), dt), motion.Q(dt)
+
+
+def predict(x: Float, P: Float, F: Float, Q: Float) -> tuple[Float, Float]:
+    """Predict beliefs; the covariance is symmetric to the last bit.
+
+    Examples
+    --------
+    >>> predict(np.ones(1), np.eye(1), np.full((1, 1), 2.0), np.eye(1))
+    (array([2.]), array([[5.]]))
+    """
+    # x = F x   (18),   P = F P F' + Q   (19)
+    return apply(F, x), symmetric(predict_gaussian(P, F, Q))
+
+
+def is_used(e: Float, variance: Float, gate: float | None) -> Bool:
+    """Return True for residuals that exist and are within `gate` standard deviations.
+
+    Examples
+    --------
+    >>> is_used(np.array([0.1, np.nan, 5.0]), np.ones(3), gate=3.0)
+    array([ True, False, False])
+    """
+    finite = np.isfinite(e)
+    return finite if gate is None else finite & (e * e <= gate**2 * variance)
+
+
+@dataclass(frozen=True, eq=False)
+class PairwiseUpdate(FrozenModel):
+    """Updates along the array: each sensor is interpolated from one `baseline` away.
 
     Parameters
     ----------
-    looks : sequence of InterpolationDelay
+    baseline_models : sequence of InterpolationDelay
         Used one after the other, each at the newest snapshot for which it has all taps.
     kappa : float
         The delay is clipped to ±κ.
-    highest : float
+    max_frequency : float
         Highest frequency of the source, cycles per sample.
-    each_sensor : bool
-        Coefficients are taken at the newest delay for every sensor, as in the specification's
-        reference recursion; if false, once for all sensors of a look (a vector update, in which
-        e - H (Δ - Δ₀) is the linear correction).
-    aligned : bool
-        All looks treat the same snapshot, that of the longest latency.
+    sequential, aligned : bool
+        `sequential_update` and `aligned` of `Variant`. A vector update is linear in the delay:
+        e - H (Δ - Δ₀).
     gate : float, optional
         Standard deviations beyond which a residual is dropped.
     """
 
-    looks: tuple[InterpolationDelay, ...]
+    baseline_models: tuple[InterpolationDelay, ...]
     kappa: float
-    highest: float
-    each_sensor: bool = False
+    max_frequency: float
+    sequential: bool = False
     aligned: bool = False
     gate: float | None = None
-    phase_limit: float = 0.35
+
+    source: ClassVar[None] = None  # the source is not in the state
 
     @property
     def latency(self) -> int:
         """Snapshots by which the estimate may lag."""
-        return max(look.latency for look in self.looks)
+        return max(model.latency for model in self.baseline_models)
 
     @property
     def span(self) -> int:
-        """Snapshots that must be kept."""
-        return self.latency + 1 + max(look.memory for look in self.looks)
+        """Number of snapshots to buffer."""
+        return self.latency + 1 + max(model.memory for model in self.baseline_models)
 
     def update(self, x: Float, P: Float, frames: Float) -> tuple[Float, Float]:
-        """Correct beliefs by the newest of `frames`, (..., span or more, n_sensors)."""
-        newest = frames.shape[-2] - 1
-        for look in self.looks:
-            z, X = look.split(frames, newest - (self.latency if self.aligned else look.latency))
-            step = 1 if self.each_sensor else look.dim_z
-            for first in range(0, look.dim_z, step):
-                sensors = slice(first, first + step)
-                x, P = fuse(x, P, *self._residuals(x, P, look, z[..., sensors], X[..., sensors, :]))
+        """Update beliefs by the newest of `frames`, (..., span or more, n_sensors)."""
+        for model in self.baseline_models:
+            z, X = self._split(model, frames)
+            n = 1 if self.sequential else model.dim_z
+            for first in range(0, model.dim_z, n):
+                sensors = slice(first, first + n)
+                # e = y_j - c'X, H = m c''X, R   (11)
+                e, H, R = self._residuals(x, P, model, z[..., sensors], X[..., sensors, :])
+                # K = P H' (H P H' + R)^-1, x = x + K e, P = P - K H P   (20)-(23)
+                x, P = update_scalar(x, P, e, H, R)
                 x[..., 0] = np.clip(x[..., 0], -self.kappa, self.kappa)
         return x, P
 
-    def linearise(self, x: Float, P: Float, frames: Float) -> DelayObservation:
-        """Return what the newest of `frames` says near beliefs, all looks of a sensor as one.
+    def linearize(self, x: Float, P: Float, frames: Float) -> DelayObservation:
+        """Return the residuals of the newest of `frames`, all baselines of a sensor combined.
 
-        The looks l of a sensor have residuals e, slopes h and variances r. Of the delay they say
-        as much as one residual y with the slope H and the variance R of the first look, where
+        Baselines l of a sensor have residuals e, slopes h and variances r. They are equivalent to
+        one residual y with the slope H and the variance R of the first baseline, where
         H² / R = Σ h² / r and H y / R = Σ h e / r.
         """
-        newest = frames.shape[-2] - 1
         information, gradient, sign = np.zeros((3, *frames.shape[:-2], frames.shape[-1]))
-        R = self.looks[0].linearise(x[..., 0])[1][..., None]
-        for look in self.looks:
-            z, X = look.split(frames, newest - (self.latency if self.aligned else look.latency))
-            e, h, r = self._residuals(x, P, look, z, X)
-            sensors = slice(max(look.baseline, 0), max(look.baseline, 0) + look.dim_z)
+        R = self.baseline_models[0].linearise(x[..., 0])[1][..., None]
+        for model in self.baseline_models:
+            e, h, r = self._residuals(x, P, model, *self._split(model, frames))
+            first = max(model.baseline, 0)
+            sensors = slice(first, first + model.dim_z)
             information[..., sensors] += h * h / r[..., None]
             gradient[..., sensors] += h * e / r[..., None]
             sign[..., sensors] += (sign[..., sensors] == 0) * np.sign(h)
         slope = sign * np.sqrt(information * R)
-        heard = slope != 0
-        y = np.where(heard, gradient * R / np.where(heard, slope, 1.0), 0.0)
+        observed = slope != 0
+        y = np.where(observed, gradient * R / np.where(observed, slope, 1.0), 0.0)
         H = np.zeros((*slope.shape, x.shape[-1]))
         H[..., 0] = slope
         return DelayObservation(y, H, R + np.zeros_like(y))
 
+    def _split(self, model: InterpolationDelay, frames: Float) -> tuple[Float, Float]:
+        """Return the samples and taps of the snapshot that a baseline uses."""
+        latency = self.latency if self.aligned else model.latency
+        return model.split(frames, frames.shape[-2] - 1 - latency)
+
     def _residuals(
-        self, x: Float, P: Float, look: InterpolationDelay, z: Float, X: Float
+        self, x: Float, P: Float, model: InterpolationDelay, z: Float, X: Float
     ) -> tuple[Float, Float, Float]:
-        """Return residuals, slopes and variance of a look; 0 where one is not used."""
-        taps, R = look.linearise(x[..., 0])
-        foretold = taps @ np.swapaxes(X, -1, -2)  # X c and X c', (..., 2, n)
-        e, H = z - foretold[..., 0, :], look.baseline * foretold[..., 1, :]
-        used = kept(e, H * H * P[..., :1, 0] + R[..., None], self.gate)
-        used &= self._unambiguous(look.baseline, P)[..., None]
+        """Return residuals, slopes and variance of a baseline; 0 where one is not used."""
+        # c(mΔ), c'(mΔ) (4), R(mΔ)
+        taps, R = model.linearise(x[..., 0])
+        predicted = taps @ np.swapaxes(X, -1, -2)  # c'X and c''X, (..., 2, n)
+        e, H = z - predicted[..., 0, :], model.baseline * predicted[..., 1, :]
+        used = is_used(e, H * H * P[..., :1, 0] + R[..., None], self.gate)
+        if abs(model.baseline) > 1:
+            used &= self._is_unambiguous(model.baseline, P)[..., None]
         return np.where(used, e, 0.0), np.where(used, H, 0.0), R
 
-    def _unambiguous(self, baseline: int, P: Float) -> Bool:
-        """Tell where a longer baseline's phase is known well enough to be no cycle off."""
-        if abs(baseline) == 1:
-            return np.ones(P.shape[:-2], dtype=np.bool_)
-        phase_std = 2 * np.pi * self.highest * abs(baseline) * np.sqrt(P[..., 0, 0])
-        return np.asarray(phase_std < self.phase_limit)
+    def _is_unambiguous(self, baseline: int, P: Float) -> Bool:
+        """Return True where the phase of a baseline is known to a fraction of a cycle."""
+        phase_std = 2 * np.pi * self.max_frequency * abs(baseline) * np.sqrt(P[..., 0, 0])
+        return np.asarray(phase_std < MAX_PHASE_STD)
 
 
-@dataclass(frozen=True)
-class JointUpdate:
-    """One vector correction by all sensors, the source's waveform being part of the state.
+@dataclass(frozen=True, eq=False)
+class JointUpdate(FrozenModel):
+    """One vector update by all sensors, with the waveform of the source in the state.
 
     Parameters
     ----------
-    line : SourceAtCentre
+    source : SourceAtCentre
+        Model of all sensors.
     kappa, gate
         As in `PairwiseUpdate`.
     """
 
-    line: SourceAtCentre
+    source: SourceAtCentre
     kappa: float
     gate: float | None = None
 
-    latency = 0
-    span = 1
+    latency: ClassVar[int] = 0  # snapshots by which the estimate may lag
+    span: ClassVar[int] = 1  # number of snapshots to buffer
 
     def update(self, x: Float, P: Float, frames: Float) -> tuple[Float, Float]:
-        """Correct beliefs by the newest of `frames`, (..., span or more, n_sensors)."""
-        e, H, R = self.linearise(x, P, frames)
+        """Update beliefs by the newest of `frames`, (..., span or more, n_sensors)."""
+        e, H, R = self.linearize(x, P, frames)
+        R = R[..., None] * np.eye(R.shape[-1])
+        # K = P H' (H P H' + R)^-1, x = x + K e   (20)-(22)
         HP = H @ P
-        S = HP @ np.swapaxes(H, -1, -2) + R[..., None] * np.eye(R.shape[-1])
-        K = np.swapaxes(np.linalg.solve(S, HP), -1, -2)
-        x = x + (K @ e[..., None])[..., 0]
-        I_KH = np.eye(x.shape[-1]) - K @ H
-        P = I_KH @ P @ np.swapaxes(I_KH, -1, -2) + (K * R[..., None, :]) @ np.swapaxes(K, -1, -2)
+        K = np.swapaxes(np.linalg.solve(HP @ np.swapaxes(H, -1, -2) + R, HP), -1, -2)
+        x = x + apply(K, e)
         x[..., 0] = np.clip(x[..., 0], -self.kappa, self.kappa)
-        return x, symmetric(P)
+        # P = (I - K H) P (I - K H)' + K R K'   (23), in Joseph's form
+        return x, joseph(P, K, H, R)
 
-    def linearise(self, x: Float, P: Float, frames: Float) -> DelayObservation:
-        """Return what the newest of `frames` says near beliefs."""
-        h, H, R = self.line.linearise(x)
+    def linearize(self, x: Float, P: Float, frames: Float) -> DelayObservation:
+        """Return the residuals of the newest of `frames`."""
+        h, H, R = self.source.linearise(x)
         e = frames[..., -1, :] - h
-        used = kept(e, ((H @ P) * H).sum(axis=-1) + R, self.gate)
+        used = is_used(e, ((H @ P) * H).sum(axis=-1) + R, self.gate)
         return DelayObservation(np.where(used, e, 0.0), np.where(used[..., None], H, 0.0), R)
+
+
+@dataclass(frozen=True, eq=False)
+class FilterAssembly(FrozenModel):
+    """Models and updates of a variant for one array, source and motion.
+
+    Parameters
+    ----------
+    motion : MotionModel
+        Motion of the whole state.
+    acquire : PairwiseUpdate or None
+        Update of the first `acquisition` snapshots, if it differs from `final`.
+    final : PairwiseUpdate or JointUpdate
+        Update of the other snapshots.
+    kappa : float
+    n_places : int
+        Grid points of the line.
+    acquisition : int
+    """
+
+    motion: MotionModel
+    acquire: PairwiseUpdate | None
+    final: PairwiseUpdate | JointUpdate
+    kappa: float
+    n_places: int
+    acquisition: int
+
+    @property
+    def source(self) -> SourceAtCentre | None:
+        """Model of all sensors, None for pairwise variants."""
+        return self.final.source
+
+    @property
+    def n_delay(self) -> int:
+        """Number of elements of the state before those of the source."""
+        return self.motion.dim_x - (0 if self.source is None else self.source.dim_source)
+
+    @property
+    def span(self) -> int:
+        """Number of snapshots to buffer."""
+        return self.final.span if self.acquire is None else max(self.acquire.span, self.acquisition)
+
+    def stage(self, n: int) -> PairwiseUpdate | JointUpdate:
+        """Return the update of the n-th snapshot."""
+        return self.acquire if self.acquire is not None and n <= self.acquisition else self.final
+
+    def initial_belief(self, delay: float, variance: float, rate_std: float) -> tuple[Float, Float]:
+        """Return the belief before the first snapshot."""
+        x, P = np.zeros(self.motion.dim_x), np.zeros((self.motion.dim_x, self.motion.dim_x))
+        P[np.diag_indices(self.n_delay)] = (self.kappa * rate_std) ** 2
+        x[0], P[0, 0] = delay, variance
+        if self.source is not None:
+            P[self.n_delay :, self.n_delay :] = self.source.covariance
+        return x, P
+
+    def update(self, x: Float, P: Float, frames: Float, n: int) -> tuple[Float, Float]:
+        """Update beliefs by the n-th snapshot, the newest of `frames`, (..., span, n_places)."""
+        x, P = self.stage(n).update(x, P, frames)
+        if self.acquire is not None and n == self.acquisition:
+            return self._replay(x, P, frames[..., -n:, :])
+        return x, P
+
+    def _replay(self, x: Float, P: Float, frames: Float) -> tuple[Float, Float]:
+        """Start the joint filter at the acquired delay, and process `frames` again."""
+        n = self.n_delay
+        x0, P0 = self.initial_belief(0.0, 0.0, 0.0)
+        x0, P0 = np.zeros_like(x) + x0, np.zeros_like(P) + P0
+        x0[..., :n], P0[..., :n, :n] = x[..., :n], P[..., :n, :n]
+        P0[..., 0, 0] = np.minimum(2 * P[..., 0, 0], (MAX_INITIAL_STD * self.kappa) ** 2)
+        x, P = x0, P0
+        F, Q = transition(self.motion, 1.0)
+        for k in range(frames.shape[-2]):
+            x, P = self.final.update(*predict(x, P, F, Q), frames[..., k : k + 1, :])
+        return x, P

@@ -1,7 +1,9 @@
-"""What the variants of the interpolation-delay filter are made of."""
+"""Variants of the interpolation-delay filter, assembled from their models."""
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal, TypeAlias
@@ -19,160 +21,201 @@ from arrivals.measurement_models.delays.source_correlation import SourceCorrelat
 from arrivals.motion_models.base import MotionModel
 from arrivals.motion_models.combined import CombinedMotion
 from arrivals.motion_models.linear import LinearMotion
-from arrivals.trackers.interpolation.updates import JointUpdate, PairwiseUpdate, move
-from arrivals.typing import Float
-from arrivals.validation import not_negative
+from arrivals.parameters import FrozenModel
+from arrivals.trackers.interpolation.updates import (
+    MAX_INITIAL_STD,
+    FilterAssembly,
+    JointUpdate,
+    PairwiseUpdate,
+)
+from arrivals.validation import not_negative, one_of, positive
 
 VariantName: TypeAlias = Literal["B", "Bw", "C", "D", "E", "E2", "phasor"]
-LOBE = 0.12  # of κ: the largest standard deviation of a delay that the joint filters start from
 
 
-@dataclass(frozen=True)
-class Variant:
-    """What a variant is made of; None leaves the choice to the source and the array."""
-
-    offsets: tuple[int, ...] | None = None
-    loading: float | None = None
-    baselines: tuple[int, ...] = (1,)
-    both_ways: bool = False
-    joint: Literal["delay_line", "phasor"] | None = None
-    acquire: bool = False
-    each_sensor: bool = False
-
-
-VARIANTS: dict[str, Variant] = {
-    "B": Variant(offsets=(0, 1), loading=0.0, each_sensor=True),
-    "Bw": Variant(offsets=(0, 1), each_sensor=True),
-    "C": Variant(both_ways=True),
-    "D": Variant(baselines=(1, 2, 4, 7), each_sensor=True),
-    "E": Variant(joint="delay_line"),
-    "E2": Variant(both_ways=True, joint="delay_line", acquire=True),
-    "phasor": Variant(joint="phasor"),
+RENAMED = {  # former parameters of InterpolationEKF
+    **{f: f"variant__{f}" for f in ("offsets", "loading", "baselines", "aligned", "extrapolate")},
+    "both_ways": "variant__bidirectional",
+    "each_sensor": "variant__sequential_update",
+    "drive": "variant__process_noise",
 }
 
 
 @dataclass(frozen=True)
-class FilterAssembly:
-    """The models that a recipe makes of a source, an array and a motion, and what they do."""
+class Variant(FrozenModel):
+    """Settings that define a variant of `InterpolationEKF`.
 
-    motion: MotionModel
-    acquire: PairwiseUpdate | None
-    last: PairwiseUpdate | JointUpdate
-    kappa: float
-    n_places: int
-    acquisition: int
+    Parameters
+    ----------
+    offsets : sequence of int, optional
+        Taps of baseline 1, samples; a window that covers ±κ if None.
+    loading : float, optional
+        ε_c, noise over source power in the taps; the true ratio if None.
+    baselines : sequence of int
+        Distances, in sensors, between which samples are interpolated.
+    bidirectional : bool
+        Interpolate backwards along the array too.
+    sequential_update : bool
+        Update sensor by sensor, with new coefficients at each one, as in the specification; else
+        by all sensors of a baseline at once. It makes four times the array calls and acquires the
+        source from larger initial errors; see the notes of `InterpolationEKF`.
+    aligned : bool
+        All baselines use the same snapshot, that of the longest latency.
+    extrapolate : bool
+        Allow taps that do not reach the largest delay: the paper's form where it is biased.
+    joint : str, optional
+        Update by all sensors at once, with the source waveform in the state: "delay_line", or
+        "phasor" in closed form for one tone.
+    acquire : bool
+        Acquire the source by the pairwise update before a joint one.
+    process_noise : float, optional
+        q_s of `DelayLine` or `Phasor`; their own if None.
 
-    @property
-    def joint(self) -> SourceAtCentre | None:
-        """The model of all sensors, None for variants that go from neighbour to neighbour."""
-        return self.last.line if isinstance(self.last, JointUpdate) else None
+    Raises
+    ------
+    ValueError
+        If a number is out of range.
 
-    @property
-    def n_delay(self) -> int:
-        """Elements of the state that come before the source's."""
-        return self.motion.dim_x - (0 if self.joint is None else self.joint.dim_source)
+    Examples
+    --------
+    >>> VARIANTS["D"].baselines, VARIANTS["C"].replace(bidirectional=False).bidirectional
+    ((1, 2, 4, 7), False)
+    """
 
-    @property
-    def span(self) -> int:
-        """Snapshots that must be kept."""
-        return self.last.span if self.acquire is None else max(self.acquire.span, self.acquisition)
+    offsets: Sequence[int] | None = None
+    loading: float | None = None
+    baselines: Sequence[int] = (1,)
+    bidirectional: bool = False
+    sequential_update: bool = False
+    aligned: bool = False
+    extrapolate: bool = False
+    joint: str | None = None
+    acquire: bool = False
+    process_noise: float | None = None
 
-    def stage(self, n: int) -> PairwiseUpdate | JointUpdate:
-        """Return what treats the n-th snapshot."""
-        return self.acquire if self.acquire is not None and n <= self.acquisition else self.last
-
-    def start(self, delay: float, variance: float, rate_std: float) -> tuple[Float, Float]:
-        """Return the belief before anything is heard."""
-        x, P = np.zeros(self.motion.dim_x), np.zeros((self.motion.dim_x, self.motion.dim_x))
-        P[np.diag_indices(self.n_delay)] = (self.kappa * rate_std) ** 2
-        x[0], P[0, 0] = delay, variance
+    def __post_init__(self) -> None:
+        if self.offsets is not None:
+            object.__setattr__(self, "offsets", tuple(self.offsets))
+        object.__setattr__(self, "baselines", tuple(self.baselines))
+        if self.loading is not None:
+            not_negative("loading", self.loading)
         if self.joint is not None:
-            P[self.n_delay :, self.n_delay :] = self.joint.covariance
-        return x, P
+            one_of("joint", self.joint, ("delay_line", "phasor"))
+        if self.process_noise is not None:
+            positive("process_noise", self.process_noise)
 
-    def update(self, x: Float, P: Float, frames: Float, n: int) -> tuple[Float, Float]:
-        """Correct beliefs by the n-th snapshot, the newest of `frames`, (..., span, n_places)."""
-        x, P = self.stage(n).update(x, P, frames)
-        if self.acquire is not None and n == self.acquisition:
-            return self._replayed(x, P, frames[..., -n:, :])
-        return x, P
 
-    def _replayed(self, x: Float, P: Float, frames: Float) -> tuple[Float, Float]:
-        """Start the joint filter where acquisition ended, and let it hear `frames` again."""
-        n = self.n_delay
-        fresh, prior = self.start(0.0, 0.0, 0.0)
-        fresh, prior = np.zeros_like(x) + fresh, np.zeros_like(P) + prior
-        fresh[..., :n], prior[..., :n, :n] = x[..., :n], P[..., :n, :n]
-        prior[..., 0, 0] = np.minimum(2 * P[..., 0, 0], (LOBE * self.kappa) ** 2)
-        x, P = fresh, prior
-        F, Q = self.motion.F(np.zeros(self.motion.dim_x)), self.motion.Q()
-        for k in range(frames.shape[-2]):
-            x, P = self.last.update(*move(x, P, F, Q), frames[..., k : k + 1, :])
-        return x, P
+VARIANTS: dict[str, Variant] = {
+    "B": Variant(offsets=(0, 1), loading=0.0, sequential_update=True),
+    "Bw": Variant(offsets=(0, 1), sequential_update=True),
+    "C": Variant(bidirectional=True),
+    "D": Variant(baselines=(1, 2, 4, 7), sequential_update=True),
+    "E": Variant(joint="delay_line"),
+    "E2": Variant(bidirectional=True, joint="delay_line", acquire=True),
+    "phasor": Variant(joint="phasor"),
+}
+
+
+def to_variant(variant: VariantName | Variant) -> Variant:
+    """Return the variant of a name, or the variant itself.
+
+    Examples
+    --------
+    >>> to_variant("C") == to_variant(Variant(bidirectional=True))
+    True
+    """
+    if isinstance(variant, Variant):
+        return variant
+    return VARIANTS[one_of("variant", variant, tuple(VARIANTS))]
 
 
 @lru_cache(maxsize=128)
-def assembled(
+def assemble_filter(
     measurement: ArraySamples,
     motion: MotionModel,
-    recipe: Variant,
-    aligned: bool,
-    drive: float | None,
+    variant: Variant,
     acquisition: int,
     gate: float | None,
-    extrapolate: bool,
 ) -> FilterAssembly:
-    """Build the parts of a recipe; the same ones as long as nothing in it changes."""
-    kappa, n_places = measurement.kappa, measurement.n_places
-    line = _line(measurement, recipe, drive)
-    looks, highest = _looks(measurement, recipe, extrapolate), measurement.correlation.highest
-    neighbours = PairwiseUpdate(looks, kappa, highest, recipe.each_sensor, aligned, gate)
-    if line is None:
-        return FilterAssembly(motion, None, neighbours, kappa, n_places, acquisition)
-    both = CombinedMotion(motion, LinearMotion(line.transition, line.innovation))
-    first = neighbours if recipe.acquire else None
-    return FilterAssembly(both, first, JointUpdate(line, kappa, gate), kappa, n_places, acquisition)
+    """Return the filter of a variant for an array, a source and a motion of the delay."""
+    kappa = measurement.kappa
+    pairwise = PairwiseUpdate(
+        _baseline_models(measurement, variant), kappa, measurement.correlation.highest,
+        variant.sequential_update, variant.aligned, gate,
+    )  # fmt: skip
+    source = _source_model(measurement, variant)
+    if source is None:
+        return FilterAssembly(motion, None, pairwise, kappa, measurement.n_places, acquisition)
+    motion = CombinedMotion(motion, LinearMotion(source.transition, source.innovation))
+    return FilterAssembly(
+        motion, pairwise if variant.acquire else None, JointUpdate(source, kappa, gate), kappa,
+        measurement.n_places, acquisition,
+    )  # fmt: skip
 
 
-def _line(measurement: ArraySamples, recipe: Variant, drive: float | None) -> SourceAtCentre | None:
+def initial_std(assembly: FilterAssembly, doa: float, std: float | None) -> float:
+    """Return the initial standard deviation of the delay, samples; warn if it is too wide.
+
+    Parameters
+    ----------
+    assembly : FilterAssembly
+    doa, std : float
+        Initial direction and its standard deviation, rad.
+    """
+    kappa = assembly.kappa
+    slope = kappa * max(float(np.cos(doa)), 0.05)
+    delay_std = slope * (np.deg2rad(15.0) if std is None else std)
+    if assembly.source is None or assembly.acquire is not None:
+        return delay_std
+    lobe = 2 / assembly.n_places
+    if std is not None and delay_std > lobe * kappa:
+        warnings.warn(
+            "a joint filter converges only from inside the main lobe, |sin doa - sin truth| < "
+            f"{lobe:.3g}; std reaches {delay_std / kappa:.3g}. Start nearer, or use variant 'E2'",
+            stacklevel=4,
+        )
+    return min(MAX_INITIAL_STD * kappa, delay_std)
+
+
+def _source_model(measurement: ArraySamples, variant: Variant) -> SourceAtCentre | None:
+    """Return the model of all sensors, None for a pairwise variant."""
     n, ratio, source = measurement.n_places, measurement.noise_ratio, measurement.correlation
-    if recipe.joint is None:
+    q = variant.process_noise
+    if variant.joint is None:
         return None
-    if recipe.joint == "delay_line":
-        return DelayLine(n, ratio, source, measurement.kappa, drive)
+    if variant.joint == "delay_line":
+        return DelayLine(n, ratio, source, measurement.kappa, q)
     if not isinstance(source, Tones) or source.order != 2:
-        raise ValueError(f"variant 'phasor' is for one tone; the source is {source!r}")
-    return Phasor(n, ratio, source.highest, 1e-2 if drive is None else drive)
+        raise ValueError(f"variant 'phasor' requires a source of one tone; got {source!r}")
+    return Phasor(n, ratio, source.highest, 1e-2 if q is None else q)
 
 
-def _looks(
-    measurement: ArraySamples, recipe: Variant, extrapolate: bool
-) -> tuple[InterpolationDelay, ...]:
-    """Return the models of all baselines, forwards and, if wanted, backwards."""
+def _baseline_models(measurement: ArraySamples, variant: Variant) -> tuple[InterpolationDelay, ...]:
+    """Return the models of all baselines, forwards and, if bidirectional, backwards."""
     source, kappa, ratio = measurement.correlation, measurement.kappa, measurement.noise_ratio
-    loading = ratio if recipe.loading is None else not_negative("loading", recipe.loading)
-    looks = []
-    for m in recipe.baselines:
+    loading = ratio if variant.loading is None else variant.loading
+    inflation = 3.0 if len(variant.baselines) > 1 else 1.0  # residuals share samples
+    models = []
+    for m in variant.baselines:
         if m >= measurement.n_places:
             continue
-        own = recipe.offsets if m == 1 else None
-        offsets = window(m * kappa) if own is None else own
-        if not extrapolate:
+        offsets = variant.offsets if m == 1 else None
+        offsets = window(m * kappa) if offsets is None else tuple(offsets)
+        if not variant.extrapolate:
             _check_reach(source, offsets, m * kappa)
         taps = DelayInterpolator(source, offsets, loading)
-        inflation = 3.0 if len(recipe.baselines) > 1 else 1.0
-        looks += [
-            InterpolationDelay(taps, measurement.n_places, ratio, way * m, inflation)
-            for way in ((1, -1) if recipe.both_ways else (1,))
+        models += [
+            InterpolationDelay(taps, measurement.n_places, ratio, direction * m, inflation)
+            for direction in ((1, -1) if variant.bidirectional else (1,))
         ]
-    return tuple(looks)
+    return tuple(models)
 
 
 def _check_reach(source: SourceCorrelation, offsets: tuple[int, ...], reach: float) -> None:
-    """Refuse taps that would have to extrapolate; tones may, it is exact for them."""
+    """Raise a ValueError for taps that would extrapolate, unless that is exact (tones)."""
     exact = source.order is not None and len(offsets) >= source.order
     if not exact and not min(offsets) - 1 <= -reach + 1e-9 <= reach - 1e-9 <= max(offsets):
         raise ValueError(
-            f"delays reach ±{reach:.4g} samples, which taps {offsets} cannot serve on this "
-            f"source: use offsets={window(reach)}"
+            f"offsets must cover delays of ±{reach:.4g} samples for this source; got {offsets}: "
+            f"use offsets={window(reach)}"
         )

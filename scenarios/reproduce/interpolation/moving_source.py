@@ -29,10 +29,10 @@ MOVING: tuple[tuple[str, MotionModel, dict[str, Any]], ...] = (
     ("C", DelayWalk(1e-3), {}),
     ("C", DelayWalk(1e-4), {}),
     ("C", DelayWalk(1e-5), {}),
-    ("D", DelayWalk(1e-4), {"aligned": True}),
-    ("D", DelayWalk(1e-5), {"aligned": True}),
+    ("D", DelayWalk(1e-4), {"variant__aligned": True}),
+    ("D", DelayWalk(1e-5), {"variant__aligned": True}),
     ("E", DelayWalk(1e-4), {}),
-    ("C", DelayDrift(1e-8), {"both_ways": False}),
+    ("C", DelayDrift(1e-8), {"variant__bidirectional": False}),
     ("phasor", DelayDrift(1e-9), {}),
     ("E", DelayDrift(1e-9), {}),
 )

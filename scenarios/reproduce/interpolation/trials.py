@@ -19,7 +19,7 @@ from arrivals.scenarios.simulations.sampled_source import (
     InterpolationScenario,
     InterpolationTone,
 )
-from arrivals.trackers import InterpolationEKF
+from arrivals.trackers.interpolation import VARIANTS, InterpolationEKF
 from arrivals.typing import Float
 
 SOURCES: dict[str, InterpolationScenario] = {
@@ -54,14 +54,15 @@ def tracker(
     if method in ("B", "Bw") and source.order is not None and source.order > 2:
         lowest = float(np.min(source.frequencies))  # type: ignore[attr-defined]  # tones
         measurement = measurement.replace(correlation=FlatBand(lowest, source.highest))
-    return InterpolationEKF(
+    plain = {name: params.pop(name) for name in ("motion", "std") if name in params}
+    made = InterpolationEKF(
         measurement,
-        variant=method,  # type: ignore[arg-type]  # one of FILTERS
+        variant=VARIANTS[method].replace(extrapolate=True),
         doa=np.deg2rad(start_deg),
         acquisition=max(12, n_steps // 4),
-        extrapolate=True,
-        **params,
+        **plain,
     )
+    return made.set_params(**params)
 
 
 def filter_directions(

@@ -1,4 +1,4 @@
-"""The trackers of the interpolation paper, for `test_conformance`."""
+"""Conformance cases of the trackers of the interpolation paper."""
 
 import numpy as np
 
@@ -16,8 +16,8 @@ SNAPSHOT = ArraySnapshot(SensorArray.ula(8, spacing=0.5), wavelength=1.0, noise=
 CIRCLE = ArraySnapshot(SensorArray.uca(7, radius=0.5), wavelength=1.0, noise=0.1)
 
 
-def spoilt(scenario: InterpolationScenario) -> Measurements:
-    """A trial with one sample missing, and one snapshot."""
+def with_gaps(scenario: InterpolationScenario) -> Measurements:
+    """Draw a trial with one sample missing, and one snapshot."""
     z = scenario.sample(np.random.default_rng(0)).measurements
     z[5, 2], z[7] = np.nan, np.nan
     return z
@@ -37,7 +37,7 @@ TRACKERS: list[tuple[str, MakeTracker, Measurements]] = [
         (
             "interpolation_ekf",
             lambda v=v: InterpolationEKF(TONE.measurement, variant=v, doa=0.9, acquisition=6),
-            spoilt(TONE),
+            with_gaps(TONE),
         )
         for v in ("B", "Bw", "C", "D", "E", "E2", "phasor")
     ],
@@ -47,7 +47,7 @@ TRACKERS: list[tuple[str, MakeTracker, Measurements]] = [
             lambda v=v: InterpolationEKF(
                 LEARNED, DelayDrift(1e-8), variant=v, doa=0.9, acquisition=6
             ),
-            spoilt(BAND),
+            with_gaps(BAND),
         )
         for v in ("C", "D", "E", "E2")
     ],

@@ -1,4 +1,4 @@
-"""The interpolation-delay filter: other recursions, small versions of the tables, refusals."""
+"""Interpolation-delay filter: equality with other recursions, rows of the tables, invalid input."""
 
 import warnings
 from typing import Any
@@ -19,10 +19,9 @@ from arrivals.scenarios.reproduce.interpolation.trials import (
     rms,
 )
 from arrivals.scenarios.simulations.sampled_source import InterpolationTone
-from arrivals.trackers import InterpolationEKF
+from arrivals.trackers.interpolation import VARIANTS, InterpolationEKF
 from arrivals.typing import Float
 
-VARIANTS = ["B", "Bw", "C", "D", "E", "E2", "phasor"]
 START = np.deg2rad(50.0)
 
 
@@ -35,8 +34,10 @@ def model(of: Trial) -> ArraySamples:
     return of.measurement
 
 
-def filter_b(of: Trial, **params: Any) -> InterpolationEKF:
-    return InterpolationEKF(model(of), variant="B", doa=START, **params)
+def filter_b(of: Trial, gate: float | None = None, **settings: Any) -> InterpolationEKF:
+    """Make a filter of variant B; `settings` replace those of the variant."""
+    variant = VARIANTS["B"].replace(**settings)
+    return InterpolationEKF(model(of), variant=variant, doa=START, gate=gate)
 
 
 def reference_b(y: Float, kappa: float, omega: float, eps: float, x: float, P: float) -> float:
@@ -53,65 +54,70 @@ def reference_b(y: Float, kappa: float, omega: float, eps: float, x: float, P: f
     return x
 
 
-def test_the_filter_is_the_recursion_of_the_specification() -> None:
+def test_variant_b_equals_the_recursion_of_the_specification() -> None:
     made = trial(1)
     tracker = filter_b(made)
     x0, P0 = float(tracker.x[0]), float(tracker.P[0, 0])
     y = made.measurements.real[:, ::-1].T  # the largest coordinate first
-    wanted = reference_b(y, 2.0, np.pi / 2, 10**-0.5, x0, P0)
-    assert tracker.run(made.measurements).x[-1, 0] == pytest.approx(wanted, abs=1e-12)
+    expected = reference_b(y, 2.0, np.pi / 2, 10**-0.5, x0, P0)
+    assert tracker.run(made.measurements).x[-1, 0] == pytest.approx(expected, abs=1e-12)
 
 
-def test_one_vector_update_a_snapshot_is_filterpys() -> None:
+def test_vector_update_equals_filterpys_ekf() -> None:
     from filterpy.kalman import ExtendedKalmanFilter
 
     made = trial(2)
-    tracker = filter_b(made, each_sensor=False)
-    look = tracker._parts.last.looks[0]  # type: ignore[union-attr]
-    ekf = ExtendedKalmanFilter(dim_x=1, dim_z=look.dim_z)
+    tracker = filter_b(made, sequential_update=False)
+    baseline = tracker.assembly.final.baseline_models[0]  # type: ignore[union-attr]
+    ekf = ExtendedKalmanFilter(dim_x=1, dim_z=baseline.dim_z)
     ekf.x, ekf.P, ekf.Q = tracker.x.copy(), tracker.P.copy(), np.zeros((1, 1))
     frames = made.measurements[:, ::-1]
     run = tracker.run(made.measurements)
     for k in range(1, len(frames)):
-        z, X = look.split(frames, k)
+        z, X = baseline.split(frames, k)
         ekf.predict()
-        ekf.update(z, look.H, look.h, R=float(look.variance(ekf.x)), args=(X,), hx_args=(X,))
+        ekf.update(
+            z, baseline.H, baseline.h, R=float(baseline.variance(ekf.x)), args=(X,), hx_args=(X,)
+        )
         assert run.x[k, 0] == pytest.approx(ekf.x[0], abs=1e-10)
 
 
 @pytest.mark.parametrize(("variant", "least"), [("B", 0.5), ("C", 0.85), ("D", 0.8)])
-def test_section_7_sources_are_found_from_60_degrees_away(variant: Any, least: float) -> None:
-    """The specification saw 0.55 (B) and 0.9 (C, D) in 40 runs; B with one update 0.06."""
+def test_section_7_start_60_degrees_off_converges(variant: Any, least: float) -> None:
+    """The specification has 0.55 (B) and 0.9 (C, D) in 40 runs; B with one update 0.06."""
     scenario = InterpolationTone()
     samples = draws(scenario, 60, 3)
     ends = filter_directions(scenario, samples, variant, 0.0)[:, -1]
     assert np.mean(abs(ends - 60) < 3) >= least
     if variant == "B":
-        at_once = filter_directions(scenario, samples, variant, 0.0, each_sensor=False)[:, -1]
-        assert np.mean(abs(at_once - 60) < 3) < 0.3
+        vector = filter_directions(
+            scenario, samples, variant, 0.0, variant__sequential_update=False
+        )[:, -1]
+        assert np.mean(abs(vector - 60) < 3) < 0.3
 
 
-def test_the_model_goes_into_filterpys_ukf_with_its_inputs_by_name() -> None:
+def test_baseline_model_runs_in_filterpys_ukf() -> None:
     from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
 
     made = trial(3)
-    look = filter_b(made)._parts.last.looks[0]  # type: ignore[union-attr]
+    baseline = filter_b(made).assembly.final.baseline_models[0]  # type: ignore[union-attr]
     points = MerweScaledSigmaPoints(1, alpha=0.5, beta=2.0, kappa=2.0)
-    ukf = UnscentedKalmanFilter(1, look.dim_z, 1.0, look.h, DelayWalk().f, points)
+    ukf = UnscentedKalmanFilter(1, baseline.dim_z, 1.0, baseline.h, DelayWalk().f, points)
     ukf.x, ukf.P, ukf.Q = np.array([2 * np.sin(START)]), np.array([[0.05]]), np.zeros((1, 1))
     for k in range(1, 100):
-        z, X = look.split(made.measurements[:, ::-1], k)
+        z, X = baseline.split(made.measurements[:, ::-1], k)
         ukf.predict()
-        ukf.update(z, R=float(look.variance(ukf.x)) * np.eye(9), regressors=X)
+        ukf.update(z, R=float(baseline.variance(ukf.x)) * np.eye(9), regressors=X)
     assert np.rad2deg(np.arcsin(ukf.x[0] / 2)) == pytest.approx(60, abs=2)
 
 
-@pytest.mark.parametrize("variant", VARIANTS)
-@pytest.mark.parametrize("each_sensor", [False, True])
-def test_a_batch_is_its_single_runs(variant: str, each_sensor: bool) -> None:
+@pytest.mark.parametrize("variant", list(VARIANTS))
+@pytest.mark.parametrize("sequential", [False, True])
+def test_run_batch_equals_single_runs(variant: str, sequential: bool) -> None:
     measurements = draws(InterpolationTone(n_steps=40), 3, 0).copy()
     measurements[1, 7, 2], measurements[2, 9] = np.nan, np.nan
-    tracker = filter_b(trial(), each_sensor=each_sensor).set_params(variant=variant)
+    settings = VARIANTS[variant].replace(sequential_update=sequential)
+    tracker = filter_b(trial()).set_params(variant=settings)
     runs = tracker.run_batch(measurements)
     for sequence, run in zip(measurements, runs, strict=True):
         single = tracker.run_batch([sequence])[0]
@@ -123,7 +129,7 @@ def test_a_batch_is_its_single_runs(variant: str, each_sensor: bool) -> None:
 
 @pytest.mark.parametrize("doa", [-70.0, -35.0, 20.0, 55.0])
 @pytest.mark.parametrize("variant", ["C", "D", "E2"])
-def test_the_direction_has_the_packages_sign(variant: Any, doa: float) -> None:
+def test_direction_has_the_sign_of_the_array_geometry(variant: Any, doa: float) -> None:
     """Exact delays from the array's geometry, on a line with a gap and off its centre."""
     array = SensorArray(np.array([-0.1, 0.7, 0.9, 1.1, 1.3, 1.5]), speed=1500.0)
     rate, frequency = 6000.0, 1200.0
@@ -137,7 +143,7 @@ def test_the_direction_has_the_packages_sign(variant: Any, doa: float) -> None:
 
 
 @pytest.mark.parametrize("variant", ["B", "C", "D", "E2"])
-def test_reversing_the_line_mirrors_the_direction(variant: Any) -> None:
+def test_reversed_line_mirrors_the_direction(variant: Any) -> None:
     made = trial(4, doa_deg=40.0)
     mirrored = model(made).replace(array=SensorArray(-model(made).array.positions, 1.0))
     one = InterpolationEKF(model(made), variant=variant, doa=0.6)
@@ -148,15 +154,15 @@ def test_reversing_the_line_mirrors_the_direction(variant: Any) -> None:
         np.testing.assert_allclose(np.rad2deg(negative[-1]), -40, atol=2)
 
 
-def test_scale_changes_nothing_where_the_power_is_learned() -> None:
+def test_scale_of_the_samples_has_no_effect_if_power_is_estimated() -> None:
     made = trial(5)
-    heard = model(made).replace(power=None)
-    tracker = InterpolationEKF(heard, variant="C", doa=START)
+    unknown_power = model(made).replace(power=None)
+    tracker = InterpolationEKF(unknown_power, variant="C", doa=START)
     one, other = tracker.run_batch([made.measurements, 1e6 * made.measurements])
     np.testing.assert_allclose(one.doa, other.doa, atol=1e-9)
 
 
-# -- small versions of the tables --------------------------------------------------------------
+# -- rows of the tables ------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -167,7 +173,7 @@ def test_scale_changes_nothing_where_the_power_is_learned() -> None:
         ("qpc", "C", 0.58), ("qpc", "D", 0.40), ("qpc", "E2", 0.343),
     ],
 )  # fmt: skip
-def test_table_9_1_at_60_degrees(name: str, variant: str, std: float) -> None:
+def test_table_9_1_standard_deviation_at_60_degrees(name: str, variant: str, std: float) -> None:
     """40 trials: the standard deviation of a standard deviation is 11 %; the limit is three."""
     scenario = SOURCES[name]
     ends = final_directions(scenario, 40, 3, variant, 50.0)
@@ -175,12 +181,12 @@ def test_table_9_1_at_60_degrees(name: str, variant: str, std: float) -> None:
     assert ends.std(ddof=1) == pytest.approx(std, rel=0.36)
 
 
-def test_fig_8_the_joint_filter_attains_the_bound() -> None:
+def test_fig_8_joint_filter_attains_the_bound() -> None:
     scenario = InterpolationTone(snr_db=10.0)
     assert rms(final_directions(scenario, 60, 0, "E", 55.0) - 60) < 1.35 * bound_deg(scenario)
 
 
-def test_section_5_noise_biases_unless_the_taps_know_it() -> None:
+def test_section_5_loading_removes_the_noise_bias() -> None:
     """A tone at 0.2 from 60 degrees at 5 dB: 3.94 degrees with the paper's taps, 0 with ours."""
     scenario = InterpolationTone(frequency=0.2, n_steps=800)
     samples = draws(scenario, 20, 0)
@@ -192,7 +198,7 @@ def test_section_5_noise_biases_unless_the_taps_know_it() -> None:
     )
 
 
-def test_table_9_4_a_ramp_is_followed() -> None:
+def test_table_9_4_ramp_is_tracked() -> None:
     scenario = InterpolationTone(doa_deg=20.0, end_deg=60.0, n_steps=400)
     samples = draws(scenario, 8, 0)
     span = slice(50, 380)
@@ -203,46 +209,46 @@ def test_table_9_4_a_ramp_is_followed() -> None:
     assert smooth < walk
 
 
-# -- refusals ----------------------------------------------------------------------------------
+# -- invalid input -----------------------------------------------------------------------------
 
 
-def test_two_taps_that_cannot_serve_a_band_name_those_that_can() -> None:
+def test_taps_too_short_for_a_band_raise_with_remedy() -> None:
     band = model(trial(name="band"))
     with pytest.raises(ValueError, match=r"use offsets=\(-3, -2, -1, 0, 1, 2, 3, 4\)"):
         InterpolationEKF(band, variant="B")
-    InterpolationEKF(band, variant="B", extrapolate=True)
+    InterpolationEKF(band, variant=VARIANTS["B"].replace(extrapolate=True))
     InterpolationEKF(model(trial()), variant="B")  # exact for a tone
 
 
-def test_a_joint_filter_warns_of_a_start_outside_the_main_lobe() -> None:
-    heard = model(trial())
+def test_joint_filter_warns_of_a_prior_wider_than_the_main_lobe() -> None:
+    scene = model(trial())
     with pytest.warns(UserWarning, match=r"\|sin doa - sin truth\| < 0.2"):
-        InterpolationEKF(heard, variant="E", std=np.deg2rad(30.0))
+        InterpolationEKF(scene, variant="E", std=np.deg2rad(30.0))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        InterpolationEKF(heard, variant="E")
-        InterpolationEKF(heard, variant="E2", std=np.deg2rad(30.0))
+        InterpolationEKF(scene, variant="E")
+        InterpolationEKF(scene, variant="E2", std=np.deg2rad(30.0))
 
 
 @pytest.mark.parametrize(
     "params", [{"variant": "F"}, {"std": -1.0}, {"doa": 2.0}, {"gate": 0.0}, {"acquisition": 0}]
 )
-def test_parameters_out_of_range_are_refused(params: dict[str, Any]) -> None:
+def test_parameter_out_of_range_raises(params: dict[str, Any]) -> None:
     with pytest.raises(ValueError, match=next(iter(params))):
         InterpolationEKF(model(trial()), **params)
 
 
-def test_the_phasor_is_for_one_tone() -> None:
+def test_phasor_of_several_tones_raises() -> None:
     with pytest.raises(ValueError, match="one tone"):
         InterpolationEKF(model(trial(name="qpc")), variant="phasor")
 
 
-@pytest.mark.parametrize("variant", VARIANTS)
-def test_refused_calls_change_nothing(variant: str) -> None:
+@pytest.mark.parametrize("variant", list(VARIANTS))
+def test_invalid_calls_leave_the_tracker_unchanged(variant: str) -> None:
     made = trial()
     tracker = filter_b(made).set_params(variant=variant)
     tracker.run(made.measurements[:10])
-    x, P, heard = tracker.x.copy(), tracker.P.copy(), tracker.heard
+    x, P, buffer = tracker.x.copy(), tracker.P.copy(), tracker.buffer
     for bad in (np.ones(9), np.ones((2, 10)), 1j * np.ones(10), ["a"] * 10):
         with pytest.raises((ValueError, TypeError)):
             tracker.update(bad)
@@ -250,26 +256,37 @@ def test_refused_calls_change_nothing(variant: str) -> None:
         tracker.set_params(nonsense=1)
     np.testing.assert_array_equal(tracker.x, x)
     np.testing.assert_array_equal(tracker.P, P)
-    assert tracker.heard is heard
+    assert tracker.buffer is buffer
 
 
-def test_a_gate_drops_what_is_far_off() -> None:
+def test_gate_drops_an_impulse() -> None:
     made = trial(6)
-    spoilt = made.measurements.copy()
-    spoilt[50] = 1e3
-    gated = filter_b(made, gate=6.0).run(spoilt)
+    impulsive = made.measurements.copy()
+    impulsive[50] = 1e3
+    gated = filter_b(made, gate=6.0).run(impulsive)
     assert abs(np.rad2deg(gated.doa[-1, 0]) - 60) < 3
 
 
-def test_latency_is_what_the_taps_need() -> None:
+def test_latency_follows_from_the_taps() -> None:
     made = trial()
     latency = {v: filter_b(made).set_params(variant=v).latency for v in VARIANTS}
     assert latency == {"B": 0, "Bw": 0, "C": 3, "D": 15, "E": 0, "E2": 0, "phasor": 0}
 
 
-def test_the_band_of_a_scenario_is_what_is_drawn() -> None:
+def test_band_scenario_has_its_power_in_the_band() -> None:
     made = trial(7, name="band", n_steps=400, snr_db=40.0, n_sensors=2)
     assert isinstance(model(made).correlation, FlatBand)
     spectrum = np.abs(np.fft.rfft(made.measurements[:, 0])) ** 2
-    inside = np.abs(np.fft.rfftfreq(400) - 0.25) <= 0.11
-    assert spectrum[inside].sum() / spectrum.sum() > 0.97
+    in_band = np.abs(np.fft.rfftfreq(400) - 0.25) <= 0.11
+    assert spectrum[in_band].sum() / spectrum.sum() > 0.97
+
+
+def test_variant_settings_are_reached_by_nested_names() -> None:
+    tracker = InterpolationEKF(model(trial()), variant="C")
+    tracker.set_params(variant="D", variant__aligned=True)
+    assert tracker.variant == VARIANTS["D"].replace(aligned=True)
+    assert tracker.get_params()["variant__baselines"] == (1, 2, 4, 7)
+    again = InterpolationEKF.from_dict(tracker.to_dict())
+    assert again.variant == tracker.variant
+    with pytest.raises(ValueError, match="joint"):
+        tracker.set_params(variant__joint="nonsense")
