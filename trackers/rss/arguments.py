@@ -124,7 +124,7 @@ def _covariances(P0: ArrayLike | None, K: int, n: int, position: Entries) -> Flo
 def _per_source(name: str, value: ArrayLike, K: int) -> Float:
     array = np.asarray(value, dtype=np.float64)
     if array.shape not in ((), (K,)):
-        raise ValueError(f"amplitude.{name} must be a number or have shape ({K},); got {value}")
+        raise ValueError(f"amplitude.{name} must be a number or have shape ({K},); got {value!r}")
     return np.array(np.broadcast_to(array, K))
 
 

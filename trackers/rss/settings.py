@@ -228,5 +228,5 @@ def _frozen(name: str, value: ArrayLike) -> Any:
     """Return a finite number or a tuple of finite numbers."""
     array = real(name, value)
     if array.ndim > 1 or not np.isfinite(array).all():
-        raise ValueError(f"{name} must be a finite number or a list of them; got {value}")
+        raise ValueError(f"{name} must be a finite number or a list of them; got {value!r}")
     return tuple(array.tolist()) if array.ndim else float(array)

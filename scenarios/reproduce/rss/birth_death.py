@@ -89,5 +89,5 @@ def _active_sources(
 
 def _tracker(trial: RSSTrial, sources: SourceBeliefs, params: dict[str, Any]) -> RSSVB:
     amplitude = AmplitudePrior(mean=sources.u, variance=sources.v)
-    initial = {"x0": sources.x, "P0": sources.P, "amplitude": amplitude}
+    initial: dict[str, Any] = {"x0": sources.x, "P0": sources.P, "amplitude": amplitude}
     return RSSVB(trial.motion, trial.measurement, **initial | params)

@@ -80,11 +80,11 @@ class SourceSettings:
 
     def amplitude(self, network: Network, alpha: float) -> AmplitudePrior:
         """Return the prior of the log amplitudes."""
-        known = self.power_db is not None
-        std_db = (
-            (3.0 if known else POWER_STD_DB) if self.power_std_db is None else self.power_std_db
-        )
-        level = float(db_to_neper(self.power_db)) if known else _source_level(network, alpha)
+        if self.power_db is None:
+            level, std_db = _source_level(network, alpha), POWER_STD_DB
+        else:
+            level, std_db = float(db_to_neper(self.power_db)), 3.0
+        std_db = std_db if self.power_std_db is None else self.power_std_db
         return AmplitudePrior(mean=level, variance=float(db_to_neper(std_db)) ** 2)
 
 

@@ -94,6 +94,10 @@ def calibrate(
     floor_db : float, optional
         Noise floor, dB; readings below it plus 3 dB are excluded.
 
+    Returns
+    -------
+    Calibration
+
     Raises
     ------
     ValueError

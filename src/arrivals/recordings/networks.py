@@ -108,6 +108,11 @@ class Network:
         step : int
         model : LogNormalRSS
             With one entry for each sensor of the network.
+
+        Returns
+        -------
+        model : LogNormalRSS
+        z : ndarray, shape (n_sensors,)
         """
         positions = self.sensors[step]
         known = np.isfinite(positions).all(axis=-1, keepdims=True)
@@ -128,6 +133,10 @@ def read_network(
         ``time_s, sensor, rss_db``. Levels in dB or dBm; empty where missing.
     sensors : path, optional
         Table of the sensors for a CSV file, with the columns ``name, x_m, y_m``.
+
+    Returns
+    -------
+    Network
 
     Raises
     ------
