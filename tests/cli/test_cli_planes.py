@@ -39,7 +39,7 @@ def plane(here: Path) -> Path:
 
 @pytest.mark.parametrize("kind", ["uca", "positions"])
 @pytest.mark.parametrize(
-    ("bins_and_snapshots", "n_steps"),
+    ("per_step", "n_steps"),
     [
         (("--frequency", "700"), 16),
         (("--frequencies", "500", "600", "700"), 16),
@@ -50,7 +50,7 @@ def plane(here: Path) -> Path:
 )
 @pytest.mark.parametrize("tracker", ["svalse", "cbf"])
 def test_track_of_a_planar_array_follows_the_azimuth(
-    plane: Path, kind: str, bins_and_snapshots: tuple[str, ...], n_steps: int, tracker: str,
+    plane: Path, kind: str, per_step: tuple[str, ...], n_steps: int, tracker: str,
     capsys: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
     job = [
@@ -58,7 +58,7 @@ def test_track_of_a_planar_array_follows_the_azimuth(
         "plane.wav",
         "--array",
         f"{kind}.toml",
-        *bins_and_snapshots,
+        *per_step,
         "--tracker",
         tracker,
     ]
@@ -76,17 +76,17 @@ def test_track_of_a_planar_array_follows_the_azimuth(
 
 
 @pytest.mark.parametrize(
-    "bins_and_snapshots",
+    "per_step",
     [
         ("--frequencies", "500", "700", "--snapshots", "3"),
         ("--band", "450", "850", "--window", "200", "--hop", "111", "--snapshots", "2"),
     ],
 )
-def test_stream_of_several_bins_and_snapshots_equals_the_file(
-    plane: Path, bins_and_snapshots: tuple[str, ...], capsys: pytest.CaptureFixture[str],
+def test_stream_of_several_per_step_equals_the_file(
+    plane: Path, per_step: tuple[str, ...], capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
-    job = ["--array", "uca.toml", *bins_and_snapshots, "--quiet"]
+    job = ["--array", "uca.toml", *per_step, "--quiet"]
     assert main(["track", "plane.wav", *job]) == 0
     expected = capsys.readouterr().out
     samples = wavfile.read("plane.wav")[1].astype("<f4").tobytes()
