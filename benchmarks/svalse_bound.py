@@ -1,7 +1,7 @@
-"""The ELBO of SVALSE's fast engine beside that of coordinate ascent, from the same components.
+"""The ELBO of SVALSE's Newton solver beside that of coordinate ascent, from the same components.
 
-Every third step of some runs on Figs 4, 5 and 6: both engines start from the components that the
-fast run carries. The competitor's bound has its exact angle densities, amplitudes refreshed.
+Every third step of some runs on Figs 4, 5 and 6: both solvers start from the components that the
+run by Newton steps tracks. The other bound has its exact angle densities, amplitudes refreshed.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""GOSPA of SVALSE's fast engine on lines, paired with coordinate ascent in the paper's form.
+"""GOSPA of SVALSE's Newton solver on lines, paired with coordinate ascent in the paper's form.
 
 Every row has our number, the limit, and whether it holds. `--parts` chooses what to do:
 
@@ -67,7 +67,7 @@ def scores(draws: list[Trial], tracker: SVALSE | VALSE) -> Float:
     return np.array([gospa(trial, run) for trial, run in zip(draws, runs, strict=True)])
 
 
-def told(rows: Float) -> str:
+def gospa_parts(rows: Float) -> str:
     """Return the mean GOSPA and its parts."""
     total, distance, missed, false = rows.mean(axis=0)
     return f"{total:.2f} ({distance:.2f}/{missed:.2f}/{false:.2f})"
@@ -81,7 +81,7 @@ def difference(ours: Float, theirs: Float) -> tuple[float, str]:
 
 
 def accuracy(runs: int, motion: BernoulliVonMises, limits: tuple[float, ...]) -> None:
-    """Fast engine, paired with coordinate ascent in the paper's form, with the same walk."""
+    """Newton solver, paired with coordinate ascent in the paper's form, with the same walk."""
     for name, limit in zip(FIGURES, limits, strict=True):
         draws = trials(name, range(1, runs + 1))
         model = line(name)
@@ -89,11 +89,16 @@ def accuracy(runs: int, motion: BernoulliVonMises, limits: tuple[float, ...]) ->
         theirs = scores(draws, SVALSE(model, motion, **PAPER))
         mean, text = difference(ours, theirs)
         if motion is ELECTRICAL:
-            row(f"{name}: {told(ours)} - {told(theirs)}", text, f"{limit:+.2f}", mean <= limit)
+            row(
+                f"{name}: {gospa_parts(ours)} - {gospa_parts(theirs)}",
+                text,
+                f"{limit:+.2f}",
+                mean <= limit,
+            )
         else:
             total = float(ours[:, 0].mean())
-            row(f"{name}: {told(ours)}", f"{total:.2f}", f"{limit:.1f}", total <= limit)
-            row(f"{name}: minus coordinate {told(theirs)}", text, "", None)
+            row(f"{name}: {gospa_parts(ours)}", f"{total:.2f}", f"{limit:.1f}", total <= limit)
+            row(f"{name}: minus coordinate {gospa_parts(theirs)}", text, "", None)
 
 
 def frames(runs: int) -> None:
@@ -103,7 +108,12 @@ def frames(runs: int) -> None:
         ours = scores(draws, VALSE(line(name)))
         theirs = scores(draws, VALSE(line(name), **PAPER))
         text = difference(ours, theirs)[1]
-        row(f"valse {name}: {told(ours)} - {told(theirs)}", text, f"specification {known}", None)
+        row(
+            f"valse {name}: {gospa_parts(ours)} - {gospa_parts(theirs)}",
+            text,
+            f"specification {known}",
+            None,
+        )
 
 
 # mean paired differences of the specification's table, and their standard errors
@@ -132,7 +142,7 @@ def sweep(runs: int) -> None:
             d = ours[:, 0] - theirs[:, 0]
             spread = np.hypot(error, d.std(ddof=1) / np.sqrt(runs))
             row(
-                f"{name} {snr_db} dB: {told(ours)} - {told(theirs)}",
+                f"{name} {snr_db} dB: {gospa_parts(ours)} - {gospa_parts(theirs)}",
                 text,
                 f"{known:+.2f} ± {error:.2f}",
                 bool(mean <= known + 3 * spread + 0.1),
@@ -156,9 +166,9 @@ def jumps(runs: int) -> None:
             tracker = SVALSE(line(name), ELECTRICAL)
             tracker.run(both[0].measurements)
             run, truth = tracker.run(both[1].measurements), np.rad2deg(both[1].truth)
-            found = np.rad2deg(run.doa)
-            after.append(mean_gospa(truth[:5], found[:5], c=10.0).total)
-            later.append(mean_gospa(truth[10:], found[10:], c=10.0).total)
+            estimated = np.rad2deg(run.doa)
+            after.append(mean_gospa(truth[:5], estimated[:5], c=10.0).total)
+            later.append(mean_gospa(truth[10:], estimated[10:], c=10.0).total)
         ours = f"{np.mean(after):.2f}, then {np.mean(later):.2f}"
         row(f"{name} from {low:.0f} to {high:.0f} dB", ours, f"specification {known}", None)
 

@@ -1,7 +1,7 @@
-"""CPU of SVALSE's fast engine: single runs, 64 sensors, a circle, batches; array calls.
+"""CPU of SVALSE's Newton solver: single runs, 64 sensors, a circle, batches; array calls.
 
-A step is the least of some repeats, then the mean over the steps is taken: what others do on the
-same machine would otherwise be counted too. The median over repeats stands beside it.
+A step is the minimum of some repeats, then the mean over the steps is taken, to exclude other load
+of the machine. The median over repeats stands beside it.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def single(repeats: int) -> None:
     for name in FIGURES:
         model, z, _ = draw(name, range(1, 2))
 
-        def fast(model: ArraySnapshot = model) -> SVALSE:
+        def newton(model: ArraySnapshot = model) -> SVALSE:
             return SVALSE(model, ELECTRICAL)
 
         def slow(model: ArraySnapshot = model) -> SVALSE:
@@ -62,7 +62,7 @@ def single(repeats: int) -> None:
 
         times, others = [], []
         for n in range(repeats):
-            times.append(cpu(fast, z[0]))
+            times.append(cpu(newton, z[0]))
             if n < 2:
                 others.append(cpu(slow, z[0, :15]))
         ours, theirs = np.min(times, axis=0), np.min(others, axis=0).mean()
@@ -114,7 +114,7 @@ def batch(n: int, repeats: int) -> None:
 
 
 class Counted(np.ndarray):
-    """An array that counts what is done with it."""
+    """An array that counts its operations."""
 
     calls = 0
 

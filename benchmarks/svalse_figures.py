@@ -45,9 +45,9 @@ def scores(trial: Trial, method: str, params: dict[str, Any]) -> list[float]:
     started = time.process_time()
     run = tracker.run(trial.measurements)
     cpu = time.process_time() - started
-    truth, found = np.rad2deg(trial.truth), np.rad2deg(run.doa)
-    g = mean_gospa(truth, found, c=10.0)
-    rest = [mean_rmse(truth, found, c=10.0), run.iterations.mean(), 1 - run.converged.mean()]
+    truth, estimated = np.rad2deg(trial.truth), np.rad2deg(run.doa)
+    g = mean_gospa(truth, estimated, c=10.0)
+    rest = [mean_rmse(truth, estimated, c=10.0), run.iterations.mean(), 1 - run.converged.mean()]
     return [g.total, g.distance, g.missed, g.false, *rest, 1e3 * cpu / len(run)]
 
 

@@ -19,28 +19,28 @@ MERGE_DISTANCE = float(np.deg2rad(1.5))  # rad of direction, of tracked componen
 
 @dataclass(frozen=True, eq=False)
 class ComponentPrior:
-    """What is known of the components before the snapshot, (65).
+    """Prior of the components of a step, (65).
 
     Parameters
     ----------
-    mu, kappa : ndarray, shape (n_carried,)
-        Von Mises densities of the angles of the components carried over; rad.
-    existence : ndarray, shape (n_carried,)
+    mu, kappa : ndarray, shape (n_tracked,)
+        Von Mises densities of the angles of the tracked components; rad.
+    existence : ndarray, shape (n_tracked,)
         Probability that each is active.
     birth : float
-        Probability that a component that was not carried is active.
-    age : ndarray of int, shape (n_carried,), optional
+        Probability that a component that was not tracked is active.
+    age : ndarray of int, shape (n_tracked,), optional
         Steps since each was last active; 0 for all if None.
     snr_db : float, optional
-        Signal-to-noise ratio of the steps before, where the noise may start.
+        Signal-to-noise ratio of the steps before, at which the noise may start.
     noise : ndarray, shape (n_bins,), optional
-        Noise variances of the last step, NaN where a bin was silent.
-    nuisance : ndarray, shape (n_carried, n_nuisance), optional
+        Noise variances of the last step, NaN where a bin had no data.
+    nuisance : ndarray, shape (n_tracked, n_nuisance), optional
         Densities of the second unknown.
     moments : ndarray, shape (n_tracked, n_moments), optional
         Whole densities of the angles, ⟨exp(jiθ)⟩, i = 0, 1, ..., in place of `mu` and `kappa`.
     n_moments : int
-        Number of moments wanted of the posterior densities; 0 for von Mises densities only.
+        Number of moments of the posterior densities to return; 0 for von Mises densities only.
     """
 
     mu: Float
@@ -57,32 +57,33 @@ class ComponentPrior:
 
 @dataclass(frozen=True, eq=False)
 class ComponentPosterior:
-    """The components after the snapshot, those carried over first.
+    """Posterior of the components of a step, the tracked ones first.
 
     Parameters
     ----------
     theta : ndarray, shape (n_components,)
         Mean angles, rad.
     resultant : ndarray, shape (n_components,)
-        Lengths of the mean of exp(jθ): 1 for an angle that is known, 0 for one that is not.
+        Lengths of the mean of exp(jθ): 1 for a certain angle, 0 for a uniform one.
     kappa : ndarray, shape (n_components,)
-        Concentrations of von Mises densities that stand for those of the angles.
+        Concentrations of von Mises densities that approximate those of the angles.
     active : ndarray of bool, shape (n_components,)
-        Components in use at the end.
+        Active components.
     age : ndarray of int, shape (n_components,)
-        Steps since each was in use, 0 for those that are; -1 for those to be forgotten.
+        Steps since each was active, 0 for those that are; -1 for those no longer tracked.
     amplitude : ndarray, shape (n_components,)
         Posterior means, zero where not active.
     evidence : ndarray, shape (n_components,)
-        By how much the ELBO would fall if an active component were removed, nats.
+        Decrease of the ELBO by removal of an active component, nats.
     noise, power : float
         Variances of the noise of a sensor (58) and of an amplitude (59), means over bins.
     iterations : int
     converged : bool
     snr_db : float, optional
-        Where the noise of the next step may start.
+        Signal-to-noise ratio at which the noise of the next step may start.
     bin_noise, nuisance, moments : ndarray, optional
-        As in `ComponentPrior`, of all components; None from engines for one look of a line.
+        As in `ComponentPrior`, of all components; None from coordinate ascent on one snapshot of
+        a line.
     """
 
     theta: Float

@@ -1,4 +1,4 @@
-"""Where the estimate of the noise of a spectrum starts, and where it ends."""
+"""Initial estimates of the noise, and floors of noise and power."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import numpy as np
 
 from arrivals.typing import Complex, Float, Int
 
-NOISE_FLOOR = 1e-9  # of the power: keeps a snapshot without noise from a division by zero
+NOISE_FLOOR = 1e-9  # of the power: avoids a division by zero without noise
 
 
 def noise_floor(max_snr_db: float | None) -> float:
-    """Return the least noise, as a share of the power, below which what is left is the model's.
+    """Return the smallest noise, as a share of the power: the rest counts as model error.
 
     Examples
     --------
@@ -20,14 +20,14 @@ def noise_floor(max_snr_db: float | None) -> float:
     return NOISE_FLOOR if max_snr_db is None else 10 ** (-max_snr_db / 10)
 
 
-def power_floor(floor: float | None, n_looks: int) -> float:
-    """Return the least power of a source in units of one look's noise after beamforming.
+def power_floor(floor: float | None, n_snapshots: int) -> float:
+    """Return the smallest power of a source, in units of the noise after beamforming.
 
     Parameters
     ----------
     floor : float or None
-        None: 0 for one look a step, which is the paper's model, and 3 for several.
-    n_looks : int
+        None: 0 for one snapshot a step, which is the paper's model, and 3 for several.
+    n_snapshots : int
 
     Examples
     --------
@@ -36,25 +36,25 @@ def power_floor(floor: float | None, n_looks: int) -> float:
     """
     if floor is not None:
         return floor
-    return 0.0 if n_looks == 1 else 3.0
+    return 0.0 if n_snapshots == 1 else 3.0
 
 
-def initial_noise(y: Complex, places: Int, snr_db: float | None) -> float:
-    """Start ν from an expected signal-to-noise ratio; or from the small eigenvalues of the lags.
+def initial_noise(y: Complex, grid_index: Int, snr_db: float | None) -> float:
+    """Return ν by an expected signal-to-noise ratio, or by the small eigenvalues of the lags.
 
     Parameters
     ----------
     y : ndarray, shape (n_sensors,)
-    places : ndarray of int, shape (n_sensors,)
-        Grid points of the sensors.
+    grid_index : ndarray of int, shape (n_sensors,)
+        Grid points of the sensors, integers.
     snr_db : float or None
         None: the mean of the ⌊M/4⌋ smallest eigenvalues of the Toeplitz matrix of the biased lags.
     """
     M, power = len(y), float(np.vdot(y, y).real)
     if snr_db is not None:
         return power / M * 10 ** (-snr_db / 10)
-    lags = autocorrelation(y, places) / M
-    apart = np.subtract.outer(places, places)
+    lags = autocorrelation(y, grid_index) / M
+    apart = np.subtract.outer(grid_index, grid_index)
     toeplitz = np.where(apart < 0, lags[np.abs(apart)].conj(), lags[np.abs(apart)])
     smallest = np.linalg.eigvalsh(toeplitz)[: max(M // 4, 1)]
     return max(float(smallest.mean()), NOISE_FLOOR * power / M)
@@ -66,7 +66,7 @@ first_noise = initial_noise
 def noise_from_eigenvalues(Y: Complex) -> Float:
     """Return the noise of each bin, (n_bins,), by the smaller half of its covariance's eigenvalues.
 
-    Divided by what noise alone would leave there if the larger half were sources.
+    Divided by the share of noise in them if the larger half were sources.
 
     Parameters
     ----------
@@ -86,16 +86,16 @@ def noise_from_eigenvalues(Y: Complex) -> Float:
     return np.asarray(np.maximum(smallest.mean(axis=1) / (N - M / 2), NOISE_FLOOR * power + 1e-300))
 
 
-def autocorrelation(z: Complex, places: Int) -> Complex:
-    """Return the lags Rᵢ = Σ z_{k+i} z*_k, i = 0 .. span, of samples at integer places.
+def autocorrelation(z: Complex, grid_index: Int) -> Complex:
+    """Return the lags Rᵢ = Σ z_{k+i} z*_k, i = 0 .. span, of samples at integer positions.
 
     Examples
     --------
     >>> autocorrelation(np.array([1, 1j]), np.array([0, 2])).round(6) + 0
     array([2.+0.j, 0.+0.j, 0.+1.j])
     """
-    span = int(places.max() - places.min())
+    span = int(grid_index.max() - grid_index.min())
     line = np.zeros(span + 1, dtype=np.complex128)
-    line[places - places.min()] = z
+    line[grid_index - grid_index.min()] = z
     spectrum = np.fft.fft(line, 1 << int(np.ceil(np.log2(2 * span + 2))))
     return np.asarray(np.fft.ifft(spectrum.real**2 + spectrum.imag**2)[: span + 1])

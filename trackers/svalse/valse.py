@@ -115,7 +115,7 @@ class VALSE(BatchDirectionTracker):
         return 0
 
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
-        """Report no direction: nothing is known of the next step."""
+        """Report no direction: there is no prediction of the next step."""
         self.predict_batch([self], dt)
         self.report_prior()
 
@@ -152,7 +152,7 @@ class VALSE(BatchDirectionTracker):
         not_negative("dt", dt)
 
     def report_prior(self) -> None:
-        """Report what is expected before a measurement: nothing."""
+        """Report the expected directions before a measurement: none."""
         self.report([])
 
     def observe(self, z: ArrayLike | None) -> ObservedSnapshots | None:
@@ -160,7 +160,7 @@ class VALSE(BatchDirectionTracker):
         return self.measurement.observe(z, self.reference)
 
     def component_prior(self, observed: ObservedSnapshots) -> ComponentPrior | None:
-        """Return the prior of the components: None, as nothing is known."""
+        """Return the prior of the components: None in VALSE."""
         return None
 
     def store(self, posterior: ComponentPosterior, observed: ObservedSnapshots) -> None:

@@ -1,4 +1,4 @@
-"""Single changes of the support of a line spectrum: what to merge, to remove, to add.
+"""Single changes of the support of a line spectrum: merges, removals, additions.
 
 All have a leading axis of independent problems. Gains are those of the support criterion.
 """
@@ -190,7 +190,7 @@ def add_candidates(
     room: Int,
     kl_weight: float,
 ) -> NewComponents:
-    """Return what to add: a new component, or one that was removed before.
+    """Return the components to add: new ones, or one that was removed before.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Mean responses of an array to uncertain angles, and their products, for the fast engine."""
+"""Mean responses of an array to uncertain angles, and their products."""
 
 from __future__ import annotations
 
@@ -21,12 +21,11 @@ class ExpectedResponse:
     manifold : Manifold
         Without a second parameter.
     temper : float
-        Looks that count as one: divides the evidence of each.
+        Number of snapshots that count as one: divides the evidence of each.
     power_floor : float
-        Power below which nothing counts as a source, in units of one look's noise after
-        beamforming.
+        Smallest power of a source, in units of the noise of one snapshot after beamforming.
     noise_floor : float
-        Least noise, as a share of the power.
+        Smallest noise, as a share of the power.
 
     Attributes
     ----------
@@ -99,7 +98,7 @@ class ExpectedResponse:
     def products(
         self, Y: Complex, mu: Float, s: Float, used: Bool | None
     ) -> tuple[Complex, Complex, Complex, Float]:
-        """Return A, X, h and what is lost of ‖a‖², as in `State`; `used` only if not all are.
+        """Return A, X, h and the loss of ‖a‖² of an `Evaluation`; `used` only if not all are.
 
         X holds âᴴâ, (∂â)ᴴâ, (∂²â)ᴴâ, and (∂â)ᴴ∂â where it is not -(∂²â)ᴴâ.
         """
@@ -137,7 +136,7 @@ class ExpectedResponse:
         return np.ascontiguousarray(A), (np.abs(T) ** 2).sum(axis=2), norm2
 
     def total(self, x: Float) -> Float:
-        """Return the sum over bins (B, F, ...) of what each tells, tempered."""
+        """Return the sum over bins (B, F, ...) of their evidence, tempered."""
         x = x[:, 0] if x.shape[1] == 1 else x.sum(axis=1)
         return x if self.tempering == 1 else x / self.tempering
 

@@ -109,7 +109,7 @@ class NewtonSolver(SolverSettings):
         manifold : Manifold
             Response of these sensors in these bins.
         prior : ComponentPrior or None
-            Prediction of the components; None if nothing is known.
+            Prediction of the components; None without one.
 
         Returns
         -------
@@ -133,7 +133,7 @@ class NewtonSolver(SolverSettings):
         manifold : Manifold
             Response of these sensors in these bins.
         priors : sequence of ComponentPrior or None
-            Predictions of the components; all None if nothing is known.
+            Predictions of the components; all None without them.
 
         Returns
         -------
@@ -236,12 +236,12 @@ def support_search(
     SupportSearch
         The same for equal arguments.
     """
-    M, n_looks = manifold.n_sensors, manifold.n_bins * n_snapshots
+    M, n_all = manifold.n_sensors, manifold.n_bins * n_snapshots
     n = solver.n_components(M)
     response = ExpectedResponse(
         manifold,
         solver.tempering,
-        power_floor(solver.power_floor, n_looks),
+        power_floor(solver.power_floor, n_all),
         noise_floor(solver.max_snr_db),
     )
     return SupportSearch(
@@ -254,5 +254,5 @@ def support_search(
         n_components=n,
         max_active=min(n, M - 1),
         fill_target=min(int(np.ceil(round(FILL_SHARE * response.extent, 6))), n, M - 1),
-        relearn=n_looks > 1 or manifold.coefficients is not None,
+        relearn=n_all > 1 or manifold.coefficients is not None,
     )
