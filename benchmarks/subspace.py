@@ -1,4 +1,4 @@
-"""The subspace methods: static and moving pairs beside the specification's figures, and speed.
+"""Subspace methods: static and moving pairs against the specification's figures, and speed.
 
 Accuracy: the median RMSE over runs, degrees, from the 100th interval on (the 40th where a source
 moves), scored by best assignment, since the methods label nothing. A figure agrees within 25 %, or
@@ -56,7 +56,7 @@ class Case:
 
 
 def cases() -> Iterator[Case]:
-    """Give the rows of section 7 that have figures for the subspace methods."""
+    """Iterate over the rows of section 7 with figures for the subspace methods."""
 
     def both(esprit: float, past: float) -> dict[str, float]:
         return {"esprit": esprit, "past": past}
@@ -134,13 +134,13 @@ def errors(case: Case, runs: int, rng: np.random.Generator) -> dict[str, float]:
         "root_music": root_music_angles(V[..., 2:], line.places, 2),
     }
     start = 40 if case.moving else 100
-    found = {}
+    median = {}
     for method, angle in theta.items():
         doa = np.rad2deg(np.arcsin(np.clip(angle / line.step, -1, 1)))[:, start:]
         at_ends = case.truth()[case.length - 1 :: case.length]
         truth = np.broadcast_to(at_ends[start:], doa.shape)
-        found[method] = float(np.median(best_assignment_rmse(truth, doa)))
-    return found
+        median[method] = float(np.median(best_assignment_rmse(truth, doa)))
+    return median
 
 
 def accuracy(runs: int) -> None:
@@ -197,7 +197,7 @@ def past_speed() -> None:
 
 
 def music_speed(n_snapshots: int = 50) -> None:
-    """Print CPU of one look for directions beside pyroomacoustics'."""
+    """Print CPU time of one estimate of directions beside that of pyroomacoustics."""
     try:
         import pyroomacoustics
     except ImportError:
@@ -213,7 +213,7 @@ def music_speed(n_snapshots: int = 50) -> None:
     spectra = np.zeros((15, n_fft // 2 + 1, n_snapshots), dtype=complex)
     bin_ = round(frequency * n_fft / rate)
     spectra[:, bin_] = y.T
-    scan = SpectrumSearch(array, c / frequency, 361)
+    search = SpectrumSearch(array, c / frequency, 361)
     tracker = MUSIC(model, n_sources=2)
     tracker.run(y)
 
@@ -223,7 +223,7 @@ def music_speed(n_snapshots: int = 50) -> None:
 
     def ours() -> Float:
         vectors = np.linalg.eigh(y.T @ y.conj() / n_snapshots)[1][:, ::-1]
-        return np.sort(scan.directions(Subspaces(vectors[:, :2], vectors[:, 2:])))
+        return np.sort(search.directions(Subspaces(vectors[:, :2], vectors[:, 2:])))
 
     def step() -> None:
         tracker.predict()

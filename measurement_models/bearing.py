@@ -162,7 +162,7 @@ class Bearing(MeasurementModel):
 def _two_entries(position: tuple[int, int] | None) -> tuple[int, int] | None:
     if position is None:
         return None
-    entries = tuple(count("position", entry, least=0) for entry in position)
+    entries = tuple(count("position", entry, minimum=0) for entry in position)
     if len(set(entries)) != 2 or len(entries) != 2:
         raise ValueError(f"position must name two entries of the state; got {position}")
     return entries[0], entries[1]

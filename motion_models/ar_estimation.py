@@ -34,7 +34,7 @@ def autocovariance(signal: ArrayLike, n_lags: int) -> Float:
     """
     x = _signal(signal)
     n = x.shape[-1]
-    if n <= count("n_lags", n_lags, least=0):
+    if n <= count("n_lags", n_lags, minimum=0):
         raise ValueError(f"{n_lags} lags need more than {n_lags} samples; got {n}")
     x = x - x.mean(axis=-1, keepdims=True)
     products = [(x[..., k:] * x[..., : n - k].conj()).real.sum(axis=-1) for k in range(n_lags + 1)]

@@ -165,7 +165,7 @@ def bessel_ratios(n: int, kappa: ArrayLike) -> Float:
     array([[1.    , 0.    , 0.    , 0.    ],
            [1.    , 0.9486, 0.8103, 0.6245]])
     """
-    n = count("n", n, least=0)
+    n = count("n", n, minimum=0)
     kappa = np.minimum(kappa, 1e150, dtype=np.float64)  # its square must not overflow
     square = kappa * kappa
     top = max(n + 8, 24)

@@ -81,7 +81,7 @@ class FunctionMotion(MotionModel):
     ) -> None:
         one_step = np.array(Q(1.0) if callable(Q) else Q, dtype=np.float64, ndmin=2)
         n = len(covariance("Q", one_step, len(one_step)))
-        entries = tuple(count("angles", entry, least=0) for entry in angles)
+        entries = tuple(count("angles", entry, minimum=0) for entry in angles)
         if any(entry >= n for entry in entries):
             raise ValueError(f"angles must be entries below {n}; got {entries}")
         own = {

@@ -146,7 +146,7 @@ def violations(place: str, source: str) -> list[str]:
     late = ["filterpy"]  # only inside a function
     if folder not in ("scenarios", *APPLICATIONS):
         banned += ["matplotlib", "sklearn", "joblib", "tqdm", "scipy.io", "soundfile", "h5py"]
-    if place == "arrivals/trackers/conformance/checks.py":
+    if place == "arrivals/trackers/conformance/parameter_checks.py":
         banned.remove("sklearn")
         late.append("sklearn")
 
@@ -185,7 +185,7 @@ def test_imports_run_one_way(place: str) -> None:
         ("arrivals/trackers/a.py", "from arrivals.scenarios.metrics.gospa import gospa"),
         ("arrivals/trackers/a.py", "def f():\n    import matplotlib.pyplot"),
         ("arrivals/trackers/a.py", "def f():\n    from sklearn.linear_model import HuberRegressor"),
-        ("arrivals/trackers/conformance/checks.py", "from sklearn.base import clone"),
+        ("arrivals/trackers/conformance/parameter_checks.py", "from sklearn.base import clone"),
         ("arrivals/trackers/a.py", "from filterpy.common import Saver"),
         ("arrivals/scenarios/a.py", "from trackers import SVALSE"),
         ("arrivals/scenarios/a.py", "from .metrics import gospa"),
@@ -201,7 +201,10 @@ def test_import_in_the_wrong_direction_is_seen(place: str, source: str) -> None:
     ("place", "source"),
     [
         ("arrivals/trackers/a.py", "from arrivals.motion_models import RandomWalk\nimport scipy"),
-        ("arrivals/trackers/conformance/checks.py", "def f():\n    from sklearn.base import clone"),
+        (
+            "arrivals/trackers/conformance/parameter_checks.py",
+            "def f():\n    from sklearn.base import clone",
+        ),
         ("arrivals/trackers/a.py", "def f():\n    from filterpy.common import Saver"),
         (
             "arrivals/scenarios/a.py",

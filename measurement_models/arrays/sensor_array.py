@@ -147,7 +147,7 @@ class SensorArray(FrozenModel):
         if self.speed is not None:
             object.__setattr__(self, "speed", positive("speed", self.speed))
         if self.channels is not None:
-            channels = tuple(count("channels", channel, least=0) for channel in self.channels)
+            channels = tuple(count("channels", channel, minimum=0) for channel in self.channels)
             if len(channels) != len(positions):
                 raise ValueError(
                     f"channels must name one channel for each of the {len(positions)} sensors; "
@@ -158,7 +158,7 @@ class SensorArray(FrozenModel):
             object.__setattr__(self, "channels", channels)
         if self.n_channels is not None:
             last = max(self.channels or range(len(positions)))
-            count("n_channels", self.n_channels, least=last + 1)
+            count("n_channels", self.n_channels, minimum=last + 1)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, SensorArray):
@@ -217,7 +217,7 @@ class SensorArray(FrozenModel):
         speed: float | None = None,
     ) -> SensorArray:
         """Make a uniform circle about the origin, the first sensor on the x axis, anticlockwise."""
-        angle = 2 * np.pi * np.arange(count("n_sensors", n_sensors, least=2)) / n_sensors
+        angle = 2 * np.pi * np.arange(count("n_sensors", n_sensors, minimum=2)) / n_sensors
         return cls(positive("radius", radius) * direction(angle, 2), speed).without(missing)
 
     @classmethod
@@ -250,7 +250,7 @@ class SensorArray(FrozenModel):
 
     def without(self, sensors: Iterable[int]) -> SensorArray:
         """Return the array less some sensors, named by index; the others keep their channels."""
-        gone = sorted({count("sensor", sensor, least=0) for sensor in sensors})
+        gone = sorted({count("sensor", sensor, minimum=0) for sensor in sensors})
         if not gone:
             return self
         if gone[-1] >= self.n_sensors:

@@ -143,7 +143,7 @@ class DelayLine(SourceAtCentre):
     drive: float | None = None
 
     def __post_init__(self) -> None:
-        count("n_sensors", self.n_sensors, least=2)
+        count("n_sensors", self.n_sensors, minimum=2)
         positive("noise_ratio", self.noise_ratio)
         instance("correlation", self.correlation, SourceCorrelation)  # type: ignore[type-abstract]  # any
         positive("kappa", self.kappa)
@@ -248,7 +248,7 @@ class Phasor(SourceAtCentre):
     drive: float = 1e-2
 
     def __post_init__(self) -> None:
-        count("n_sensors", self.n_sensors, least=2)
+        count("n_sensors", self.n_sensors, minimum=2)
         positive("noise_ratio", self.noise_ratio)
         positive("drive", self.drive)
         if not 0 < number("frequency", self.frequency) < 0.5:

@@ -73,7 +73,7 @@ class DelayInterpolator(FrozenModel):
     def __post_init__(self) -> None:
         instance("correlation", self.correlation, SourceCorrelation)  # type: ignore[type-abstract]  # any
         not_negative("loading", self.loading)
-        offsets = tuple(count("offsets", offset, least=-10_000) for offset in self.offsets)
+        offsets = tuple(count("offsets", offset, minimum=-10_000) for offset in self.offsets)
         if not offsets or len(set(offsets)) < len(offsets):
             raise ValueError(f"offsets must be different whole numbers; got {self.offsets}")
         object.__setattr__(self, "offsets", offsets)
@@ -181,7 +181,7 @@ class InterpolationDelay(MeasurementModel):
         instance("interpolator", self.interpolator, DelayInterpolator)
         not_negative("noise_ratio", self.noise_ratio)
         positive("inflation", self.inflation)
-        if not 1 <= abs(self.baseline) < count("n_sensors", self.n_sensors, least=2):
+        if not 1 <= abs(self.baseline) < count("n_sensors", self.n_sensors, minimum=2):
             raise ValueError(
                 f"baseline must be a number of steps from 1 to {self.n_sensors - 1}, or its "
                 f"negative; got {self.baseline}"

@@ -63,10 +63,10 @@ def entries(
     ValueError: position and amplitude must be different entries; got (0, 1), 1
     """
     if amplitude is not None:
-        amplitude = count("amplitude", amplitude, least=0)
+        amplitude = count("amplitude", amplitude, minimum=0)
     if position is None:
         return None, amplitude
-    entries = tuple(count("position", entry, least=0) for entry in position)
+    entries = tuple(count("position", entry, minimum=0) for entry in position)
     if len(entries) != 2:
         raise ValueError(f"position must name two entries of the state; got {position}")
     if len({*entries, amplitude}) != 3:

@@ -139,12 +139,12 @@ def eigenrays(
         raise ValueError(f"ranges must be finite and positive, m; got {ranges.tolist()}")
     if not 0 < number("steepest", steepest) < np.pi / 2:
         raise ValueError(f"steepest must lie in (0, π/2) rad; got {steepest}")
-    angle = steepest * (np.arange(count("n_rays", n_rays, least=2)) + 1) / n_rays
+    angle = steepest * (np.arange(count("n_rays", n_rays, minimum=2)) + 1) / n_rays
     fan = trace_rays(guide, angle, source, depths)
     floor = floor_reflection(guide, frequency, fan.slowness)
     parts = [
         _path(name, fan, guide, floor, source, depths, ranges)
-        for name in path_names(count("n_bottom", n_bottom, least=0))
+        for name in path_names(count("n_bottom", n_bottom, minimum=0))
     ]
     path, step, sensor, doa, time, amplitude = (np.concatenate(p) for p in zip(*parts, strict=True))
     pressure = amplitude * np.exp(-2j * np.pi * frequency * time)

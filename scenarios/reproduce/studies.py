@@ -171,8 +171,8 @@ def reproduce(
     if jobs != -1:
         count("jobs", jobs)
     if runs is not None:
-        count("runs", runs, least=min(2, _runs(name, quick=True)))
-    count("seed", seed, least=0)
+        count("runs", runs, minimum=min(2, _runs(name, quick=True)))
+    count("seed", seed, minimum=0)
     if page is not None:  # checked before hours of computation
         if not Path(page).parent.is_dir():
             raise FileNotFoundError(2, "the folder does not exist", str(Path(page).parent))

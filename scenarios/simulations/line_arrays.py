@@ -37,7 +37,7 @@ class LineScenario(Scenario):
 
     def __post_init__(self) -> None:
         number("snr_db", self.snr_db)
-        count("n_sensors", self.n_sensors, least=2)
+        count("n_sensors", self.n_sensors, minimum=2)
         count("n_steps", self.n_steps)
 
     @property

@@ -59,7 +59,7 @@ class InterpolationScenario(Scenario):
             if value is not None and not abs(number(name, value)) <= 90:
                 raise ValueError(f"{name} must lie within ±90 degrees; got {value}")
         number("snr_db", self.snr_db)
-        count("n_sensors", self.n_sensors, least=2)
+        count("n_sensors", self.n_sensors, minimum=2)
         count("n_steps", self.n_steps)
         one_of("reference", self.reference, ("first", "centre"))
 

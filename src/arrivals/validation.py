@@ -71,8 +71,8 @@ def probability(name: str, value: Any) -> float:
     return float(value)
 
 
-def count(name: str, value: Any, least: int = 1) -> int:
-    """Return a whole number that is at least `least`.
+def count(name: str, value: Any, minimum: int = 1) -> int:
+    """Return a whole number that is at least `minimum`.
 
     Examples
     --------
@@ -86,8 +86,8 @@ def count(name: str, value: Any, least: int = 1) -> int:
         raise TypeError(f"{name} must be a whole number; got {value!r}") from None
     if isinstance(value, bool):
         raise TypeError(f"{name} must be a whole number; got {value!r}")
-    if whole < least:
-        raise ValueError(f"{name} must be at least {least}; got {value}")
+    if whole < minimum:
+        raise ValueError(f"{name} must be at least {minimum}; got {value}")
     return whole
 
 

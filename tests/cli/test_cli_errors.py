@@ -99,7 +99,7 @@ def write_wav(path: Path, samples: Any) -> None:
         ("empty.wav", b"", ("empty.wav: the file is empty",)),
         ("short.wav", np.zeros((100, 8), "<i2"), ("one window requires 256",)),
         ("nan.wav", np.full((1000, 8), np.nan, "<f4"), ("no sample of the recording is finite",)),
-        ("narrow.wav", np.zeros((1000, 3), "<i2"), ("wants 8 channels; the recording has 3",)),
+        ("narrow.wav", np.zeros((1000, 3), "<i2"), ("8 channels",)),
         ("absent.wav", None, ("absent.wav", "No such file")),
         ("tow.ogg", b"OggS", ("suffix must be one of",)),
     ],

@@ -39,7 +39,7 @@ def plane(here: Path) -> Path:
 
 @pytest.mark.parametrize("kind", ["uca", "positions"])
 @pytest.mark.parametrize(
-    ("looks", "n_steps"),
+    ("per_step", "n_steps"),
     [
         (("--frequency", "700"), 16),
         (("--frequencies", "500", "600", "700"), 16),
@@ -50,10 +50,18 @@ def plane(here: Path) -> Path:
 )
 @pytest.mark.parametrize("tracker", ["svalse", "cbf"])
 def test_track_of_a_planar_array_follows_the_azimuth(
-    plane: Path, kind: str, looks: tuple[str, ...], n_steps: int, tracker: str,
+    plane: Path, kind: str, per_step: tuple[str, ...], n_steps: int, tracker: str,
     capsys: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
-    job = ["track", "plane.wav", "--array", f"{kind}.toml", *looks, "--tracker", tracker]
+    job = [
+        "track",
+        "plane.wav",
+        "--array",
+        f"{kind}.toml",
+        *per_step,
+        "--tracker",
+        tracker,
+    ]
     assert main([*job, "--out", "t.csv", "--plot", "t.png"]) == 0
     assert capsys.readouterr() == ("", "")
     rows = table(Path("t.csv").read_text())
@@ -62,23 +70,23 @@ def test_track_of_a_planar_array_follows_the_azimuth(
         max((row for row in rows if int(row["step"]) == k), key=lambda row: float(row["level_db"]))
         for k in range(n_steps)
     ]
-    found = np.array([float(row["doa_deg"]) for row in loudest])
-    assert np.median(np.abs(found - AZIMUTH)) < 4
+    estimate = np.array([float(row["doa_deg"]) for row in loudest])
+    assert np.median(np.abs(estimate - AZIMUTH)) < 4
     assert Path("t.png").stat().st_size > 1000
 
 
 @pytest.mark.parametrize(
-    "looks",
+    "per_step",
     [
         ("--frequencies", "500", "700", "--snapshots", "3"),
         ("--band", "450", "850", "--window", "200", "--hop", "111", "--snapshots", "2"),
     ],
 )
-def test_stream_of_several_bins_and_snapshots_equals_the_file(
-    plane: Path, looks: tuple[str, ...], capsys: pytest.CaptureFixture[str],
+def test_stream_of_several_per_step_equals_the_file(
+    plane: Path, per_step: tuple[str, ...], capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
-    job = ["--array", "uca.toml", *looks, "--quiet"]
+    job = ["--array", "uca.toml", *per_step, "--quiet"]
     assert main(["track", "plane.wav", *job]) == 0
     expected = capsys.readouterr().out
     samples = wavfile.read("plane.wav")[1].astype("<f4").tobytes()

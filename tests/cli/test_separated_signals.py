@@ -37,7 +37,7 @@ def voices() -> Float:
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory: pytest.TempPathFactory, voices: Float) -> Path:
-    """Write what five microphones hear of them: real samples, with the true delays."""
+    """Write the real samples of five microphones, with the true delays."""
     folder = tmp_path_factory.mktemp("scene")
     (folder / "array.toml").write_text(ARRAY)
     (folder / "even.toml").write_text(
@@ -45,9 +45,9 @@ def scene(tmp_path_factory: pytest.TempPathFactory, voices: Float) -> Path:
     )
     places = SensorArray.symmetric([0.06, 0.12]).positions[:, 0]
     lags = -places[:, None] * np.sin(DOA) / 343.0
-    heard = [sum(delayed(s, lag) for s, lag in zip(voices.T, row, strict=True)) for row in lags]
+    received = [sum(delayed(s, lag) for s, lag in zip(voices.T, row, strict=True)) for row in lags]
     noise = 0.005 * np.random.default_rng(1).standard_normal((8000, 5))
-    samples = np.stack(heard, axis=-1) + noise
+    samples = np.stack(received, axis=-1) + noise
     wavfile.write(folder / "talk.wav", RATE, samples.astype(np.float32))
     wavfile.write(folder / "silence.wav", RATE, np.zeros((800, 5), np.float32))
     model = ArraySnapshot(SensorArray.symmetric([0.06, 0.12]), 0.343, noise=1e-3)
@@ -72,9 +72,9 @@ def test_signals_of_a_recording_are_written_as_wav(
 ) -> None:  # fmt: skip
     monkeypatch.chdir(tmp_path)
     assert main(track(scene, *how, "--signals", "out.wav", "--out", "t.csv")) == 0
-    rate, found = wavfile.read("out.wav")
-    assert (rate, found.shape, found.dtype) == (RATE, (8000, 2), np.float32)
-    alike = np.corrcoef(found[1500:].T, voices[1500:].T)[:2, 2:]
+    rate, signals = wavfile.read("out.wav")
+    assert (rate, signals.shape, signals.dtype) == (RATE, (8000, 2), np.float32)
+    alike = np.corrcoef(signals[1500:].T, voices[1500:].T)[:2, 2:]
     assert np.diag(alike).min() > 0.95  # 0.7 at a microphone
     assert abs(alike[[0, 1], [1, 0]]).max() < 0.2
     rows = table(tmp_path / "t.csv")

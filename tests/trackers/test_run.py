@@ -90,7 +90,7 @@ def test_run_is_padded_with_nan() -> None:
     assert run.converged.tolist() == [True] * 4
     assert (run.n_steps, len(run), run.elapsed > 0) == (4, 4, True)
     assert {"doa", "label", "noise", "time"} <= set(dir(run))
-    with pytest.raises(AttributeError, match="this run has no attribute 'position'"):
+    with pytest.raises(AttributeError, match="run has no attribute 'position'"):
         _ = run.position
 
 

@@ -105,7 +105,7 @@ class SBL(BatchDirectionTracker):
     ) -> None:
         self.measurement = instance("measurement", measurement, ArraySnapshot)
         measurement.plain_wavelength("sbl")
-        self.n_directions = count("n_directions", n_directions, least=3)
+        self.n_directions = count("n_directions", n_directions, minimum=3)
         self.threshold = probability("threshold", threshold)
         self.initial_power = positive("initial_power", initial_power)
         self.initial_noise = positive("initial_noise", initial_noise)

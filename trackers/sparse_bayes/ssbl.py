@@ -84,7 +84,7 @@ class SSBL(SBL):
         leakage: float = 0.04,
         floor: float = 1e-3,
     ) -> None:
-        self.n_neighbours = count("n_neighbours", n_neighbours, least=0)
+        self.n_neighbours = count("n_neighbours", n_neighbours, minimum=0)
         self.leakage = positive("leakage", leakage)
         self.floor = positive("floor", floor)
         super().__init__(

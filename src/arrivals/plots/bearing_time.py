@@ -138,9 +138,9 @@ def _beam(measurement: ArraySnapshot, doa: Float, block: Any) -> Float:
         A = measurement.steering_vector(doa)
         return np.asarray(bartlett_power(A, block).max(axis=0))
     steering = measurement.waves.steering(doa)
-    looks = block.reshape(len(block), measurement.n_bins, measurement.n_snapshots, -1)
+    frames = block.reshape(len(block), measurement.n_bins, measurement.n_snapshots, -1)
     return np.asarray(
-        np.max([mean_beam_power(steering, np.swapaxes(Y, 1, 2)) for Y in looks], axis=0)
+        np.max([mean_beam_power(steering, np.swapaxes(Y, 1, 2)) for Y in frames], axis=0)
     )
 
 

@@ -20,12 +20,12 @@ from arrivals.typing import Complex
 def test_music_spectrum_is_a_ratio_of_norms_and_one_in_the_noise(
     theta: list[float],
 ) -> None:
-    found = subspaces_of([0.3, -1.0], np.arange(5))
+    subspaces = subspaces_of([0.3, -1.0], np.arange(5))
     A = np.exp(1j * np.outer(theta, np.arange(5)))
-    inside = [np.linalg.norm(found.noise.conj().T @ a) ** 2 for a in A]
+    inside = [np.linalg.norm(subspaces.noise.conj().T @ a) ** 2 for a in A]
     expected = 5 / np.maximum(inside, 5e-10)
-    np.testing.assert_allclose(music_spectrum(A, found.noise), expected, rtol=1e-6)
-    np.testing.assert_allclose(music_spectrum(found.noise.T, found.noise), 1.0)
+    np.testing.assert_allclose(music_spectrum(A, subspaces.noise), expected, rtol=1e-6)
+    np.testing.assert_allclose(music_spectrum(subspaces.noise.T, subspaces.noise), 1.0)
 
 
 def test_spectrum_search_by_the_smaller_subspace_equals_music_spectrum() -> None:
@@ -33,10 +33,10 @@ def test_spectrum_search_by_the_smaller_subspace_equals_music_spectrum() -> None
     rng = np.random.default_rng(0)
     Q = np.linalg.qr(rng.standard_normal((8, 8, 2)) @ np.array([1, 1j]))[0]
     for K in (1, 3, 4, 5, 7):
-        scan, found = SpectrumSearch(LINE.array, 1.0, 91), Subspaces(Q[:, :K], Q[:, K:])
-        grid, power = scan.spectrum(found)
+        scan, subspaces = SpectrumSearch(LINE.array, 1.0, 91), Subspaces(Q[:, :K], Q[:, K:])
+        grid, power = scan.spectrum(subspaces)
         A = LINE.array.steering_vector(grid, 1.0)
-        np.testing.assert_allclose(power, music_spectrum(A, found.noise), rtol=1e-9)
+        np.testing.assert_allclose(power, music_spectrum(A, subspaces.noise), rtol=1e-9)
 
 
 @given(st.floats(-3.1, 3.1))
@@ -57,17 +57,17 @@ def test_root_music_and_esprit_without_noise_are_exact(theta: list[float]) -> No
     if gaps.min() < 0.2:
         return
     grid_index = np.arange(6)
-    found = subspaces_of(theta, grid_index)
-    roots = np.sort(root_music_angles(found.noise, grid_index, len(theta)))
-    turns = np.sort(esprit_angles(found.signal, *shifted_pairs(grid_index, 1)))
+    subspaces = subspaces_of(theta, grid_index)
+    roots = np.sort(root_music_angles(subspaces.noise, grid_index, len(theta)))
+    turns = np.sort(esprit_angles(subspaces.signal, *shifted_pairs(grid_index, 1)))
     np.testing.assert_allclose(roots, sorted(theta), atol=1e-6)
     np.testing.assert_allclose(turns, sorted(theta), atol=1e-9)
 
 
 def test_kernels_of_a_batch_equal_single_cases() -> None:
     angles = [[0.3, -1.0], [2.0, 0.5]]
-    found = [subspaces_of(theta, np.arange(5)) for theta in angles]
-    noise, signal = np.stack([f.noise for f in found]), np.stack([f.signal for f in found])
+    subspaces = [subspaces_of(theta, np.arange(5)) for theta in angles]
+    noise, signal = np.stack([f.noise for f in subspaces]), np.stack([f.signal for f in subspaces])
     A = np.exp(1j * np.outer([0.1, 0.2, 0.3], np.arange(5)))
     first, second = shifted_pairs(np.arange(5), 1)
     for k in range(2):
@@ -87,8 +87,8 @@ def test_root_music_equals_music_on_a_fine_grid() -> None:
 
 
 def test_root_music_angles_with_too_few_visible_roots_are_nan() -> None:
-    found = subspaces_of([0.2, 2.5], np.arange(3))
-    roots = root_music_angles(found.noise, range(3), 2, max_angle=np.pi / 2)
+    subspaces = subspaces_of([0.2, 2.5], np.arange(3))
+    roots = root_music_angles(subspaces.noise, range(3), 2, max_angle=np.pi / 2)
     assert roots[0] == pytest.approx(0.2)
     assert np.isnan(roots[1])
 

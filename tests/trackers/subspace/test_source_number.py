@@ -30,10 +30,10 @@ def test_mdl_does_not_depend_on_unit_or_order_of_eigenvalues(
 def test_number_of_sources_of_equal_eigenvalues_is_zero_and_batches_equal_single_cases() -> None:
     batch = np.array([[3.0, 3.0, 3.0], [9.0, 3.0, 3.0], [90.0, 40.0, 3.0]])
     for criterion in ("aic", "mdl"):
-        found = number_of_sources(batch, 80, criterion)
-        np.testing.assert_array_equal(found, [0, 1, 2])
+        estimate = number_of_sources(batch, 80, criterion)
+        np.testing.assert_array_equal(estimate, [0, 1, 2])
         singles = [number_of_sources(values, 80, criterion) for values in batch]
-        np.testing.assert_array_equal(found, singles)
+        np.testing.assert_array_equal(estimate, singles)
 
 
 def test_number_of_sources_is_below_number_of_snapshots() -> None:

@@ -136,8 +136,8 @@ def test_errors_at_30_db_equal_the_specification() -> None:
     z = model.simulate(doa, s, rng)
     for name in ("esprit", "past", "root_music"):
         tracker = create(name, measurement=model, n_sources=2, forgetting=0.95, interval=30)
-        found = tracker.run(z).doa[1529::30]
-        error = np.rad2deg(best_assignment_rmse(doa[1529::30], found))
+        estimate = tracker.run(z).doa[1529::30]
+        error = np.rad2deg(best_assignment_rmse(doa[1529::30], estimate))
         assert 0.2 < error < 0.33
 
 
