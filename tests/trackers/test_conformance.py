@@ -28,7 +28,9 @@ def test_conforms(name: str, make: MakeTracker, measurements: Measurements, chec
     check(make, measurements)
 
 
-@pytest.mark.parametrize(("case", "n_sources"), zip(TRACKERS, N_SOURCES, strict=True), ids=IDS)
+@pytest.mark.parametrize(
+    ("case", "n_sources"), list(zip(TRACKERS, N_SOURCES, strict=True)), ids=IDS
+)
 def test_case_has_the_named_tracker_and_detects_sources(
     case: tuple[str, MakeTracker, Measurements], n_sources: int
 ) -> None:

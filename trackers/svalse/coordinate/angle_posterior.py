@@ -73,7 +73,7 @@ def quadrature(c: Complex) -> tuple[Complex, complex]:
     >>> float(moments[1].real.round(6)), complex(mean).real.__round__(6)  # I1(4)/I0(4)
     (0.863523, 0.863523)
     """
-    n_points = grid_size(np.abs(c) @ squares(len(c)))
+    n_points = grid_size(float(np.abs(c) @ squares(len(c))))
     if n_points > MAX_PLAIN_GRID and (moments := window_moments(c)) is not None:
         return moments, moments[1]
     moments = grid_moments(c, n_points)

@@ -22,7 +22,7 @@ HALF_WIDTH = 8.1  # of a window, standard deviations of its mode
 OFFSETS = 0.45 * np.arange(-18, 19)  # points of a window, standard deviations of its mode
 
 
-class Modes(NamedTuple):
+class DensityModes(NamedTuple):
     """Local maxima of a density, each an array of shape (n_modes,).
 
     Parameters
@@ -42,10 +42,10 @@ class Modes(NamedTuple):
     height: Float
     curvature: Float
 
-    def select(self, keep: Bool) -> Modes:
+    def select(self, keep: Bool) -> DensityModes:
         """Return the modes of a mask."""
         nuisance, theta, height, curvature = self
-        return Modes(nuisance[keep], theta[keep], height[keep], curvature[keep])
+        return DensityModes(nuisance[keep], theta[keep], height[keep], curvature[keep])
 
 
 class Windows(NamedTuple):
@@ -66,7 +66,7 @@ class Windows(NamedTuple):
     weight: Float
 
 
-def find_modes(c: Complex, log_q: Float, within: float = MAX_LOG_DROP) -> Modes:
+def find_modes(c: Complex, log_q: Float, within: float = MAX_LOG_DROP) -> DensityModes:
     """Return the maxima at most `within` nats below the top, refined by Newton's method.
 
     Parameters
@@ -91,7 +91,7 @@ def find_modes(c: Complex, log_q: Float, within: float = MAX_LOG_DROP) -> Modes:
         height, slope, curvature = sums[:, 0].real, -sums[:, 1].imag, sums[:, 2].real
         newton = slope / np.where(curvature > 0, curvature, np.inf)
         theta = np.minimum(np.maximum(theta + newton, start - step), start + step)
-    return Modes(nuisance, theta, height, curvature)
+    return DensityModes(nuisance, theta, height, curvature)
 
 
 @lru_cache(maxsize=64)
@@ -145,7 +145,7 @@ def integrate_windows(
     return Windows(modes.nuisance, powers[..., :n_moments], weight / weight.sum())
 
 
-def overlap(modes: Modes) -> bool:
+def overlap(modes: DensityModes) -> bool:
     """Return True if windows of one value of the second unknown overlap."""
     if len(modes.theta) == 1:
         return False
