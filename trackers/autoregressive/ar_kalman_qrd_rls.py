@@ -154,7 +154,7 @@ class ARKalmanQRDRLS(BlockProcessor):
         Parameters
         ----------
         u : None or 0
-            Not used: there is no control.
+            Not used: sources have no control input.
         dt : float
             Time between snapshots.
         """
