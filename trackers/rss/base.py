@@ -115,9 +115,8 @@ class RSSTracker(Tracker):
             return self.search.max_sources
         return len(np.atleast_2d(self.x0)) if self.x0 is not None else int(self.n_sources or 0)
 
-    @property
-    def sources(self) -> SourceBeliefs:
-        """Belief by source, unconfirmed sources included."""
+    def source_beliefs(self) -> SourceBeliefs:
+        """Return the belief by source, unconfirmed sources included."""
         return SourceBeliefs.from_state(real("x", self.x), real("P", self.P), self.motion.dim_x)
 
     def current_tracks(self, n_sources: int) -> TrackTable:
@@ -155,7 +154,7 @@ class RSSTracker(Tracker):
         """
         if u is not None and np.any(u):
             raise ValueError("u must be None or 0: model a control input in the motion")
-        sources = self.sources
+        sources = self.source_beliefs()
         predicted = self.predict_sources(sources, not_negative("dt", dt))
         self.set_belief(predicted, self.current_tracks(len(sources.u)))
         self.elapsed = self.elapsed + dt
@@ -221,7 +220,7 @@ class RSSTracker(Tracker):
 
     def detect_sources(self, readings: WeightedReadings) -> None:
         """Update the belief where the number of sources is unknown or changes."""
-        sources, W = self.sources, readings.W[0]
+        sources, W = self.source_beliefs(), readings.W[0]
         new = new_source_prior(self.measurement.sensors[W > 0], self.amplitude, self.search)
         problem = self.joint_posterior(sources, readings)._replace(xi=readings.xi[0], W=W)
         predicted = Candidate(problem, sources.u, problem.prior.theta)
@@ -245,7 +244,7 @@ class RSSTracker(Tracker):
     @property
     def estimate(self) -> PositionEstimate:
         """The confirmed sources."""
-        sources = self.sources
+        sources = self.source_beliefs()
         tracks = self.current_tracks(len(sources.u))
         xy, shown = self.position, tracks.confirmed
         return PositionEstimate(
@@ -280,7 +279,7 @@ class RSSTracker(Tracker):
         """
         positive("dt", dt)
         sequences = [list(sequence) for sequence in measurements]
-        sources = self.sources
+        sources = self.source_beliefs()
         equal = len({len(sequence) for sequence in sequences}) == 1 and len(sequences[0]) > 0
         if self.births or not equal or sources.u.size == 0:
             return super().run_batch(sequences, dt)

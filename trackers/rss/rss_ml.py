@@ -113,7 +113,7 @@ class RSSML(RSSTracker):
         if readings is None:
             self.record_missed()
             return
-        sources = self.sources.take(None)
+        sources = self.source_beliefs().take(None)
         if self.births or sources.u.size == 0:
             self.detect_sources(readings)
             return

@@ -127,7 +127,7 @@ class RSSVB(RSSTracker):
         if readings is None:
             self.record_missed()
             return
-        sources = self.sources.take(None)
+        sources = self.source_beliefs().take(None)
         if self.births or sources.u.size == 0:
             self.detect_sources(readings)
             return

@@ -53,7 +53,7 @@ def track_known_births(trial: RSSTrial, start_std: float = 5.0, **params: Any) -
     tracker: RSSVB | None = None
     before = np.zeros(active.shape[1], dtype=np.bool_)
     for step, z in enumerate(trial.measurements):
-        tracked = None if tracker is None else tracker.sources
+        tracked = None if tracker is None else tracker.source_beliefs()
         sources = _active_sources(trial, step, tracked, before, start_std)
         before = active[step]
         if len(sources.u) == 0:
