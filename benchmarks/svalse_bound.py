@@ -20,7 +20,8 @@ from arrivals.motion_models.bessel import log_i0
 from arrivals.scenarios import create
 from arrivals.trackers import SVALSE
 from arrivals.trackers.svalse.components import ComponentPosterior, ComponentPrior
-from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver, SingleSnapshotAscent
+from arrivals.trackers.svalse.coordinate.single_snapshot import SingleSnapshotAscent
+from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver
 from arrivals.trackers.svalse.newton.candidates import LOG_2PI
 from arrivals.trackers.svalse.newton.elbo import Components, evaluate  # fmt: skip
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
@@ -36,37 +37,37 @@ class Watched(SingleSnapshotAscent):
 
     exponent: dict[int, Complex]
 
-    def refine_angles(self) -> None:
+    def update_angles(self) -> None:
         """Update the densities and keep their exponents."""
-        integrate, kept = self.integrate, []
+        posterior, kept = self.posterior, []
 
         def keeping(c: Complex) -> tuple[Complex, complex]:
             kept.append(c.copy())
-            return integrate(c)
+            return posterior(c)
 
-        self.integrate = keeping
-        super().refine_angles()
-        self.integrate = integrate
+        self.posterior = keeping
+        super().update_angles()
+        self.posterior = posterior
         self.exponent = dict(zip(np.flatnonzero(self.active).tolist(), kept, strict=True))
 
     def bound(self) -> float:
         """Return the ELBO with exact densities, amplitudes refreshed, less Σ ln(1-ρ)."""
-        self.solve()
+        self.update_amplitudes()
         on = np.flatnonzero(self.active)
-        cost = [divergence(self.exponent[int(k)], complex(self.prior[k])) for k in on]
+        cost = [divergence(self.exponent[int(k)], complex(self.eta[k])) for k in on]
         return self.elbo() - float(np.log1p(-self.rho).sum()) - sum(cost)
 
 
 class WatchedAscent(CoordinateSolver):
-    """Coordinate ascent whose working state can be looked at afterwards."""
+    """Coordinate ascent that keeps its last state."""
 
     last: list[Watched] = []  # noqa: RUF012
 
-    def step(
-        self, y: Complex, manifold: Manifold, prediction: ComponentPrior | None
+    def initial_state(
+        self, snapshots: Complex, manifold: Manifold, prior: ComponentPrior | None
     ) -> SingleSnapshotAscent:
-        """Return the working state, and remember it."""
-        self.last[:] = [Watched(self, y, manifold, prediction)]
+        """Return the state, and keep it."""
+        self.last[:] = [Watched(self, snapshots, manifold, prior)]
         return self.last[0]
 
 

@@ -74,8 +74,7 @@ class SVALSE(VALSE):
     nuisance : ndarray, shape (L, n_nuisance)
         Their densities over the values of an unknown slowness or elevation.
     bin_noise : ndarray, shape (n_bins,)
-        Noise of each bin when it last had valid data; NaN before, and with coordinate ascent on
-        one snapshot of a line.
+        Noise of each bin when it last had valid data; NaN before.
     x, P, noise
         As in `VALSE`.
 

@@ -15,7 +15,8 @@ from arrivals.measurement_models import ArraySnapshot, Manifold, SensorArray
 from arrivals.motion_models import BernoulliVonMises
 from arrivals.trackers import SBL, SSBL, SVALSE
 from arrivals.trackers.svalse.components import ComponentPrior
-from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver, SingleSnapshotAscent
+from arrivals.trackers.svalse.coordinate.single_snapshot import SingleSnapshotAscent
+from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver
 from arrivals.typing import Complex, Float, Int
 
 FOLDER = os.environ.get("ARRIVALS_DATA")
@@ -30,7 +31,7 @@ class PublishedAscent(SingleSnapshotAscent):
 
     def covariances(self, on: Int) -> Complex:
         """Return columns 0, 1... of C in place of those of the active components."""
-        C = self.C[np.ix_(on, np.arange(len(on)))]
+        C: Complex = self.C[0][np.ix_(on, np.arange(len(on)))]
         np.fill_diagonal(C, 0)
         return C
 
@@ -44,11 +45,11 @@ REPLAYED: dict[str, Any] = {  # also of the first step, which has no prior
 class PublishedProgram(CoordinateSolver):
     """The published program: the paper's settings, and its error."""
 
-    def step(
-        self, y: Complex, manifold: Manifold, prediction: ComponentPrior | None
+    def initial_state(
+        self, snapshots: Complex, manifold: Manifold, prior: ComponentPrior | None
     ) -> SingleSnapshotAscent:
         """Return the solver state with the error."""
-        return PublishedAscent(self, y, manifold, prediction)
+        return PublishedAscent(self, snapshots, manifold, prior)
 
 
 def replayed(name: str, n_steps: int, engine: CoordinateSolver) -> tuple[Float, Int, Any]:
@@ -118,7 +119,7 @@ def test_free_running_mixture_keeps_the_recorded_number_of_sources(name: str) ->
     tracker = SVALSE(
         LINE,
         BernoulliVonMises(),
-        solver=CoordinateSolver(posterior="mixture", tolerance=1e-6, max_iterations=5000),
+        solver=CoordinateSolver.paper(),
         reference="first",
     )
     run = tracker.run(z["y"].T)

@@ -1,47 +1,64 @@
-"""Exact laws of the ascent: what every flip, every update and every iteration does to the ELBO."""
+"""Change of the ELBO by every flip, update and iteration of coordinate ascent."""
+
+from __future__ import annotations
+
+from typing import Literal
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.linalg import toeplitz
 
 from arrivals.measurement_models import ArraySnapshot, Manifold, SensorArray
 from arrivals.trackers.svalse.components import ComponentPrior
-from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver, SingleSnapshotAscent
+from arrivals.trackers.svalse.coordinate.single_snapshot import SingleSnapshotAscent
+from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver
 from arrivals.trackers.svalse.noise_initialization import autocorrelation
 from arrivals.typing import Complex, Float
 
 ARRAY = SensorArray.ula(11, spacing=0.5)
 MODEL = ArraySnapshot(ARRAY, wavelength=1.0, noise=0.05)
-KNOWN = ComponentPrior(np.array([0.5, -1.0]), np.array([100.0, 20.0]), np.array([0.75, 0.1]), 0.1)
+PRIOR = ComponentPrior(np.array([0.5, -1.0]), np.array([100.0, 20.0]), np.array([0.75, 0.1]), 0.1)
 
 
 def snapshot(seed: int, array: SensorArray = ARRAY) -> Complex:
     rng = np.random.default_rng(seed)
     model = ArraySnapshot(array, wavelength=1.0, noise=0.05)
     amplitude = rng.standard_normal((4, 2)) @ np.array([1, 1j])
-    return model.simulate(rng.uniform(-1.2, 1.2, 4), amplitude, rng)
+    return model.simulate(rng.uniform(-1.2, 1.2, 4), amplitude, rng)[None, :, None]
 
 
-class Watched(SingleSnapshotAscent):
-    """An ascent that remembers the exponents of its angles' densities."""
+def initialized(
+    seed: int, prior: ComponentPrior | None = None, manifold: Manifold | None = None
+) -> RecordingAscent:
+    """State after initialization and the first selection of the support."""
+    manifold = manifold or MODEL.manifold()
+    state = RecordingAscent(CoordinateSolver(), snapshot(seed), manifold, prior)
+    state.initialize()
+    state.choose_support()
+    return state
+
+
+class RecordingAscent(SingleSnapshotAscent):
+    """State that records the exponents of its angles' densities."""
 
     def __init__(
         self,
         settings: CoordinateSolver,
-        y: Complex,
+        Y: Complex,
         manifold: Manifold,
-        known: ComponentPrior | None,
+        prior: ComponentPrior | None,
     ) -> None:
-        super().__init__(settings, y, manifold, known)
+        super().__init__(settings, Y, manifold, prior)
         self.exponents: list[Complex] = []
-        integrate = self.integrate
+        posterior = self.posterior
 
-        def remember(c: Complex) -> tuple[Complex, complex]:
+        def record(c: Complex) -> tuple[Complex, complex]:
             self.exponents.append(c.copy())
-            return integrate(c)
+            return posterior(c)
 
-        self.integrate = remember
+        self.posterior = record
 
 
 def divergence(c: Complex, prior: complex) -> float:
@@ -55,89 +72,110 @@ def divergence(c: Complex, prior: complex) -> float:
     return float((np.exp(log_q) * (log_q - log_p)).mean() * 2 * np.pi)
 
 
-def full_elbo(step: Watched, divergences: Float) -> float:
+def full_elbo(state: SingleSnapshotAscent, divergences: Float) -> float:
     """The whole bound for any w and C, written out from the model, sections 2 and 5."""
-    on = np.flatnonzero(step.active)
-    K, M = len(on), len(step.y)
-    A, w, C = step.A[on], step.w[on], step.C[np.ix_(on, on)]
+    on = np.flatnonzero(state.active)
+    y, nu, tau = state.Y[0, :, 0], state.nu[0], state.tau[0]
+    K, M = len(on), len(y)
+    A, w, C = state.A[0, on], state.W[0, on, 0], state.C[0][np.ix_(on, on)]
     J = A.conj() @ A.T
     np.fill_diagonal(J, M)
-    misfit = np.linalg.norm(step.y) ** 2 - 2 * np.vdot(A.conj() @ step.y, w).real
+    misfit = np.linalg.norm(y) ** 2 - 2 * np.vdot(A.conj() @ y, w).real
     misfit += np.vdot(w, J @ w).real + np.trace(J @ C).real
     size = np.vdot(w, w).real + C.trace().real
-    likelihood = -M * np.log(np.pi * step.nu) - misfit / step.nu
-    amplitudes = -K * np.log(np.pi * step.tau) - size / step.tau
+    likelihood = -M * np.log(np.pi * nu) - misfit / nu
+    amplitudes = -K * np.log(np.pi * tau) - size / tau
     entropy = K * np.log(np.pi * np.e) + np.linalg.slogdet(C)[1]
     return float(likelihood + amplitudes + entropy - divergences.sum())
 
 
 @settings(deadline=None, max_examples=25)
 @given(st.integers(0, 10**6), st.booleans())
-def test_each_flip_changes_the_elbo_by_exactly_its_delta(seed: int, sequential: bool) -> None:
-    step = CoordinateSolver().step(snapshot(seed), MODEL.manifold(), KNOWN if sequential else None)
-    step.start()
-    step.choose_support()
+def test_flip_changes_the_elbo_by_its_gain(seed: int, sequential: bool) -> None:
+    state = initialized(seed, PRIOR if sequential else None)
     rng = np.random.default_rng(seed)
-    for k in rng.permutation(len(step.w)):
-        before, delta = step.elbo(), step.deltas()[k]
-        if np.isfinite(delta):
-            step.flip(int(k))
-            assert step.elbo() - before == pytest.approx(delta, abs=1e-6 * max(1, abs(before)))
+    for k in rng.permutation(len(state.rho)):
+        before, gain = state.elbo(), state.gains()[k]
+        if np.isfinite(gain):
+            state.flip(int(k))
+            assert state.elbo() - before == pytest.approx(gain, abs=1e-6 * max(1, abs(before)))
 
 
-def test_the_search_ends_where_no_single_flip_gains_and_solves_the_normal_equations() -> None:
-    for seed in range(20):
-        step = CoordinateSolver().step(snapshot(seed), MODEL.manifold(), None)
-        step.start()
-        step.choose_support()
-        assert (step.deltas() <= 1e-9).all()
-        C, w = step.C.copy(), step.w.copy()
-        step.solve()
-        np.testing.assert_allclose(step.C, C, atol=1e-12)
-        np.testing.assert_allclose(step.w, w, atol=1e-10)
+@pytest.mark.parametrize("seed", range(20))
+def test_choose_support_ends_at_a_local_maximum_with_the_exact_amplitudes(seed: int) -> None:
+    state = initialized(seed)
+    assert (state.gains() <= 1e-9).all()
+    C, W = state.C.copy(), state.W.copy()
+    state.update_amplitudes()
+    np.testing.assert_allclose(state.C, C, atol=1e-12)
+    np.testing.assert_allclose(state.W, W, atol=1e-10)
 
 
 @settings(deadline=None, max_examples=15)
 @given(st.integers(0, 10**6), st.booleans(), st.sampled_from(["middle", "first"]))
-def test_with_the_support_held_the_elbo_never_falls(
-    seed: int, sequential: bool, reference: str
+def test_elbo_of_a_fixed_support_never_decreases(
+    seed: int, sequential: bool, reference: Literal["middle", "first"]
 ) -> None:
-    known = KNOWN if sequential else None
-    manifold = MODEL.manifold("first" if reference == "first" else "middle")
-    step = Watched(CoordinateSolver(), snapshot(seed), manifold, known)
-    step.start()
-    step.choose_support()
-    on = np.flatnonzero(step.active)
+    state = initialized(seed, PRIOR if sequential else None, MODEL.manifold(reference))
+    on = np.flatnonzero(state.active)
     bounds = []
     for _ in range(12):
-        step.exponents.clear()
-        step.refine_angles()
+        state.exponents.clear()
+        state.update_angles()
         cost = np.array(
-            [divergence(c, step.prior[k]) for c, k in zip(step.exponents, on, strict=True)]
+            [divergence(c, state.eta[k]) for c, k in zip(state.exponents, on, strict=True)]
         )
-        bounds.append(full_elbo(step, cost))
-        step.solve()
-        bounds.append(full_elbo(step, cost))
-        step.learn_variances()
-        bounds.append(full_elbo(step, cost))
+        bounds.append(full_elbo(state, cost))
+        state.update_amplitudes()
+        bounds.append(full_elbo(state, cost))
+        state.update_variances()
+        bounds.append(full_elbo(state, cost))
     assert np.diff(bounds).min() > -1e-6
 
 
-def test_noise_and_power_are_stationary_points_of_the_elbo() -> None:
-    step = Watched(CoordinateSolver(), snapshot(3), MODEL.manifold(), KNOWN)
-    step.start()
-    step.choose_support()
-    step.learn_variances()
-    top, none = full_elbo(step, np.zeros(0)), np.zeros(0)
+def test_updated_variances_are_stationary_points_of_the_elbo() -> None:
+    state = initialized(3, PRIOR)
+    state.update_variances()
+    none = np.zeros(0)
+    top = full_elbo(state, none)
     for name in ("nu", "tau"):
-        best = getattr(step, name)
+        best = getattr(state, name)
         for factor in (0.97, 1.03):
-            setattr(step, name, best * factor)
-            assert full_elbo(step, none) < top
-        setattr(step, name, best)
+            setattr(state, name, best * factor)
+            assert full_elbo(state, none) < top
+        setattr(state, name, best)
 
 
-def test_lags_of_a_line_with_gaps_are_those_of_its_grid() -> None:
+def test_update_variances_without_a_component_keeps_both() -> None:
+    """Section 6: skip both when K = 0."""
+    state = initialized(3)
+    nu, tau = state.nu.copy(), state.tau.copy()
+    state.active[:] = False
+    state.update_variances()
+    assert (state.nu, state.tau) == (nu, tau)
+
+
+def test_paper_is_the_published_program() -> None:
+    solver = CoordinateSolver.paper()
+    assert (solver.posterior, solver.tolerance, solver.max_iterations) == ("mixture", 1e-6, 5000)
+    prior = ComponentPrior(np.zeros(0), np.zeros(0), np.zeros(0), 0.1)
+    assert solver.merge_distance(prior) == np.deg2rad(1.5)
+    assert (solver.initial_snr_db(prior), solver.initial_snr_db(None)) == (20.0, None)
+
+
+def test_mixture_with_a_noise_floor_is_the_mixture_of_the_fast_form() -> None:
+    """A floor far below the noise changes the form of the state, but not the result."""
+    fast = CoordinateSolver(posterior="mixture", snr_db=20.0)
+    general = fast.replace(max_snr_db=80.0)
+    a, b = (each.solve(snapshot(1), MODEL.manifold(), PRIOR) for each in (fast, general))
+    assert isinstance(
+        fast.initial_state(snapshot(1), MODEL.manifold(), PRIOR), SingleSnapshotAscent
+    )
+    assert a.active.tolist() == b.active.tolist()
+    np.testing.assert_allclose(a.theta[a.active], b.theta[b.active], atol=1e-3)
+
+
+def test_autocorrelation_of_a_line_with_gaps_is_that_of_its_grid() -> None:
     places = np.array([3, 0, 7, 4])
     z = np.array([1 + 1j, 2, -1j, 0.5])
     grid = np.zeros(8, dtype=complex)
@@ -146,11 +184,10 @@ def test_lags_of_a_line_with_gaps_are_those_of_its_grid() -> None:
     np.testing.assert_allclose(autocorrelation(z, places), lags, atol=1e-12)
 
 
-def test_silent_start_of_the_noise_is_the_mean_of_the_small_eigenvalues() -> None:
-    y = snapshot(5)
+def test_initial_noise_without_a_prior_is_the_mean_of_the_small_eigenvalues() -> None:
+    Y = snapshot(5)
+    y = Y[0, :, 0]
     lags = np.array([np.vdot(y[: 11 - i], y[i:]) for i in range(11)]) / 11
-    from scipy.linalg import toeplitz
-
     smallest = np.linalg.eigvalsh(toeplitz(lags))[:2]
-    step = CoordinateSolver(snr_db=None).step(y, MODEL.manifold(), None)
-    assert step.nu == pytest.approx(smallest.mean())
+    state = CoordinateSolver().initial_state(Y, MODEL.manifold(), None)
+    assert state.nu[0] == pytest.approx(smallest.mean())

@@ -1,8 +1,9 @@
 """Posterior of one angle whose log density is a trigonometric polynomial.
 
-ln q(θ) = Re Σ cᵢ exp(jiθ) + const, i = 0..D. Every function here takes the coefficients c (the
-constant c₀ is not looked at) and gives the moments Eᵢ = ⟨exp(jiθ)⟩, i = 0..D, and the mean of
-exp(jθ) of the one von Mises density that stands for q in the next time step: as a rule E₁.
+ln q(θ) = Re Σ cᵢ exp(jiθ) + const, i = 0..D. Every posterior here takes the coefficients c, of
+which the constant c₀ has no effect, and returns the moments Eᵢ = ⟨exp(jiθ)⟩, i = 0..D, and the
+mean of exp(jθ) of the one von Mises density that replaces q in the next time step: as a rule E₁.
+Equation numbers are those of Park, Meyer and Gerstoft, JASA 153(1), 2023.
 """
 
 from __future__ import annotations
@@ -20,12 +21,18 @@ from arrivals.motion_models.bessel import (
     log_i0,
 )
 from arrivals.motion_models.von_mises import mfold_concentration
+from arrivals.trackers.svalse.coordinate.windowed_quadrature import (
+    MAX_LOG_DROP,
+    find_modes,
+    integrate_windows,
+    mode_grid_size,
+)
 from arrivals.typing import Complex, Float, Int
 
 AnglePosterior = Callable[[Complex], tuple[Complex, complex]]
-LARGEST_GRID = 2048  # beyond it, windows about the modes are cheaper
-FINEST_GRID = 1 << 18  # points at most where windows do not serve
-NATS = 30.0  # what lies further below the top than this does not count
+MAX_PLAIN_GRID = 2048  # points; beyond them windows about the modes are cheaper
+MAX_GRID = 1 << 18  # points at most where windows fail
+MIN_CURVATURE = 1e-9  # of the logarithm of a density at its mode
 
 
 def fold(eta: Complex, harmonics: Int, degree: int) -> Complex:
@@ -66,73 +73,50 @@ def quadrature(c: Complex) -> tuple[Complex, complex]:
     >>> float(moments[1].real.round(6)), complex(mean).real.__round__(6)  # I1(4)/I0(4)
     (0.863523, 0.863523)
     """
-    sharpness = float(np.abs(c) @ _squares(len(c)))
-    n_points = 2 * math.pi * 1.2 * math.sqrt(1 + sharpness)
-    moments = _on_grid(c, n_points) if n_points <= LARGEST_GRID else _in_windows(c)
+    n_points = grid_size(float(np.abs(c) @ squares(len(c))))
+    if n_points > MAX_PLAIN_GRID and (moments := window_moments(c)) is not None:
+        return moments, moments[1]
+    moments = grid_moments(c, n_points)
     return moments, moments[1]
 
 
+def grid_size(sharpness: float) -> float:
+    """Return how many points resolve a density of at most this curvature of its logarithm."""
+    return min(2 * math.pi * 1.2 * math.sqrt(1 + sharpness), MAX_GRID)
+
+
 @lru_cache(maxsize=64)
-def _squares(n: int) -> Float:
+def squares(n: int) -> Float:
+    """Return 0, 1, 4, ..., (n - 1)²."""
     return np.arange(n, dtype=np.float64) ** 2
 
 
-def _on_grid(c: Complex, n_points: float) -> Complex:
-    """Moments by the trapezoidal rule: an inverse real FFT, an exponential, a real FFT."""
-    n_points = 1 << max(8, int(max(n_points, 2 * len(c))).bit_length())
-    log_q = np.fft.irfft(c, n_points, norm="forward")  # twice, but for the constant
+def grid_moments(c: Complex, n_points: float) -> Complex:
+    """Return moments by the trapezoidal rule on n_points or more: an inverse FFT, exp, an FFT."""
+    log_q = log_density(c, 1 << max(8, int(max(n_points, 2 * len(c))).bit_length()))
     log_q -= log_q.max()
-    log_q *= 0.5
     F = np.fft.rfft(np.exp(log_q, out=log_q))
     return np.asarray(F[: len(c)].conj() / F[0].real)
 
 
-def _in_windows(c: Complex) -> Complex:
-    """Moments by quadrature about each mode near the top: 37 points at 0.45 std, over 8.1 std.
-
-    Falls back to the whole circle where windows overlap or q has not died away at their edges.
-    """
-    modes, heights, curvatures = _modes(c)
-    near = heights > heights.max() - NATS
-    centres, std = modes[near], 1 / np.sqrt(curvatures[near])
-    theta = centres[:, None] + 0.45 * std[:, None] * np.arange(-18, 19)
-    d = np.exp(1j * theta[..., None] * np.arange(len(c)))
-    log_q = (d[..., 1:] @ c[1:]).real
-    log_q -= log_q.max()
-    gaps = np.diff(centres, append=centres[0] + 2 * np.pi)
-    overlap = len(centres) > 1 and (gaps < 8.1 * (std + np.roll(std, -1))).any()
-    if overlap or log_q[:, [0, -1]].max() > -22:
-        return _on_grid(c, min(2 * math.pi / (0.45 * float(std.min())), FINEST_GRID))
-    weight = std[:, None] * np.exp(log_q)
-    return np.asarray(np.einsum("wp,wpi->i", weight / weight.sum(), d))
+def log_density(c: Complex, n_points: int) -> Float:
+    """Return Re Σ cᵢ exp(jiθ), up to a constant, at 2π i / n_points."""
+    log_q = np.fft.irfft(c, n_points, norm="forward")  # twice, except for the constant
+    log_q *= 0.5
+    return log_q
 
 
-def _modes(c: Complex, within: float = NATS) -> tuple[Float, Float, Float]:
-    """Places, heights and curvatures of the maxima near the top, by a grid and Newton's method."""
-    i = np.arange(len(c))
-    n_points = 1 << int(np.ceil(np.log2(8 * len(c))))
-    log_q = np.fft.irfft(c, n_points, norm="forward") / 2
-    left, right = np.roll(log_q, 1), np.roll(log_q, -1)
-    # a peak between grid points may stand above both by an eighth of their neighbours' drop
-    headroom = np.maximum(2 * log_q - left - right, 0)
-    top = (log_q >= left) & (log_q > right) & (log_q + headroom >= log_q.max() - within)
-    step = 2 * np.pi / n_points
-    theta = np.asarray(np.flatnonzero(top) * step, dtype=np.float64)
-    start = theta
-    for _ in range(4):
-        terms = np.exp(1j * np.multiply.outer(theta, i)) * c
-        slope, curvature = -terms.imag @ i, terms.real @ i**2
-        newton = slope / np.where(curvature > 0, curvature, np.inf)
-        theta = np.clip(theta + newton, start - step, start + step)
-    terms = np.exp(1j * np.multiply.outer(theta, i)) * c
-    curvature = np.maximum(terms.real @ i**2, 1e-9)
-    return theta, terms.real[:, 1:].sum(axis=-1), curvature
+def window_moments(c: Complex) -> Complex | None:
+    """Return moments by quadrature about each mode near the top; None where that fails."""
+    log_q = log_density(c, mode_grid_size(len(c)))
+    windows = integrate_windows(c[None], log_q[None], len(c))
+    return None if windows is None else np.einsum("wp,wpi->i", windows.weight, windows.powers)
 
 
 def top_mode(c: Complex) -> tuple[Complex, complex]:
-    """Take the highest mode alone, as one von Mises density of its curvature.
+    """Return the highest mode alone, as one von Mises density of its curvature.
 
-    It starts new components: their density is sharpened by the next sweeps anyway.
+    It initializes new components, whose density the next iterations sharpen anyway.
 
     Examples
     --------
@@ -142,14 +126,15 @@ def top_mode(c: Complex) -> tuple[Complex, complex]:
     """
     if not c[1:].any():
         return np.eye(1, len(c), dtype=np.complex128)[0], 0j
-    modes, heights, curvatures = _modes(c, within=0.0)
-    best = np.argmax(heights)
-    moments = _von_mises(float(modes[best]), float(curvatures[best]), len(c))
+    modes = find_modes(c[None], log_density(c, mode_grid_size(len(c)))[None], within=0.0)
+    best = np.argmax(modes.height)
+    kappa = max(float(modes.curvature[best]), MIN_CURVATURE)
+    moments = von_mises_moments(float(modes.theta[best]), kappa, len(c))
     return moments, moments[1]
 
 
-def _von_mises(mu: float, kappa: float, n: int) -> Complex:
-    """Moments of one von Mises density: I_m(κ)/I_0(κ) exp(jmμ)."""
+def von_mises_moments(mu: float, kappa: float, n: int) -> Complex:
+    """Return the n moments of one von Mises density: I_m(κ)/I_0(κ) exp(jmμ)."""
     return np.asarray(bessel_ratios(n - 1, kappa) * np.exp(1j * mu * np.arange(n)))
 
 
@@ -164,48 +149,53 @@ def mixture(c: Complex, *, descending: bool = False, size: int = 1000) -> tuple[
     size : int
         Components kept at each stage.
     """
-    eta, concentration = _factors(c)
+    eta, concentration = factors(c)
     order = np.arange(2, len(c))
     if descending:
         order = order[np.argsort(-concentration[1:], kind="stable")]
     q = eta[:1]
     for m in order:
+        # (38), (40)
         angles = (np.angle(eta[m - 1]) + 2 * np.pi * np.arange(m)) / m
-        q = np.add.outer(q, concentration[m - 1] * np.exp(1j * angles)).ravel()  # (39)
-        q = _largest(q, size)
+        # (39)
+        q = np.add.outer(q, concentration[m - 1] * np.exp(1j * angles)).ravel()
+        q = largest(q, size)
     kappa, mu = np.abs(q), np.angle(q)
+    # (42), (44)
     log_weight = log_i0(kappa)
     weight = np.exp(log_weight - log_weight.max())
-    weight /= weight.sum()  # (42), (44)
-    ratios = bessel_ratios(len(c) - 1, kappa)
-    moments = np.einsum(
-        "d,di->i", weight, ratios * np.exp(1j * np.multiply.outer(mu, np.arange(len(c))))
-    )
+    weight /= weight.sum()
+    # â = Σ c_d I_m(κ_d)/I_0(κ_d) exp(jmμ_d)
+    i = np.arange(len(c))
+    powers = bessel_ratios(len(c) - 1, kappa) * np.exp(1j * np.multiply.outer(mu, i))
+    moments = np.einsum("d,di->i", weight, powers)
+    # (46)-(48), differences wrapped: (47) as printed fails at ±π
     centre = np.angle(moments[1])
-    off = np.angle(q * np.exp(-1j * centre))  # differences wrapped: (47) as printed breaks at ±π
-    mean = weight @ off
-    variance = weight @ (1 / np.maximum(kappa, 1e-300) + (off - mean) ** 2)
+    offset = np.angle(q * np.exp(-1j * centre))
+    mean = weight @ offset
+    variance = weight @ (1 / np.maximum(kappa, 1e-300) + (offset - mean) ** 2)
     return moments, complex(bessel_ratio(1 / variance) * np.exp(1j * centre))
 
 
-def _largest(q: Complex, size: int) -> Complex:
-    size_of = np.abs(q)
-    keep = size_of > size_of.max() - NATS
+def largest(q: Complex, size: int) -> Complex:
+    """Return the `size` largest of the parameters q, without those 30 below the largest."""
+    kappa = np.abs(q)
+    keep = kappa > kappa.max() - MAX_LOG_DROP
     if keep.sum() > size:
-        return np.asarray(q[np.argpartition(-size_of, size)[:size]])
+        return np.asarray(q[np.argpartition(-kappa, size)[:size]])
     return np.asarray(q[keep]) if keep.any() else q[:1]
 
 
-def _factors(c: Complex) -> tuple[Complex, Float]:
-    """Parameters ηₘ, m = 1..D, of the wrapped factors, and concentrations κ̃ₘ of their modes."""
+def factors(c: Complex) -> tuple[Complex, Float]:
+    """Return ηₘ, m = 1..D, of the wrapped factors, and concentrations κ̃ₘ of their modes (40)."""
     eta = c[1:].conj()
     m = np.arange(1, len(c))
     return eta, mfold_concentration(np.abs(eta), m)
 
 
 def nearest_modes(c: Complex) -> tuple[Complex, complex]:
-    """Follow each mode of the highest factor through the nearest of the others: Heuristic 2."""
-    eta, concentration = _factors(c)
+    """Add to each mode of the highest factor the nearest of every other factor: Heuristic 2."""
+    eta, concentration = factors(c)
     phase = np.angle(eta)
     N = int(np.flatnonzero(concentration)[-1]) + 1 if concentration.any() else 1
     q = concentration[N - 1] * np.exp(1j * (phase[N - 1] + 2 * np.pi * np.arange(N)) / N)
@@ -214,11 +204,12 @@ def nearest_modes(c: Complex) -> tuple[Complex, complex]:
         q = q + concentration[m - 1] * np.exp(1j * (phase[m - 1] + 2 * np.pi * turns) / m)
     best = q[np.argmax(np.abs(q))]
     mu, kappa = float(np.angle(best)), float(np.abs(best))
+    # one Newton step on g(θ) = Re(ηᴴ a(θ))
     i = np.arange(len(c))
     terms = (c * np.exp(1j * i * mu))[1:]
     slope, bend = -terms.imag @ i[1:], -(terms.real @ i[1:] ** 2)
     if bend < 0:
         mu, R = mu - slope / bend, np.exp(1 / (2 * bend))
         kappa = float(inverse_bessel_ratio(R))
-    moments = _von_mises(mu, kappa, len(c))
+    moments = von_mises_moments(mu, kappa, len(c))
     return moments, moments[1]

@@ -1,125 +1,149 @@
-"""Bernoulli-Gaussian amplitudes of components whose mean steering vectors are given.
+"""Fast form of coordinate ascent for one snapshot of a line on a uniform grid.
 
-Equation numbers are those of Park, Meyer and Gerstoft, JASA 153(1), 2023.
+The state is that of several snapshots; what every iteration repeats works on its single bin and
+snapshot. Equation numbers are those of Park, Meyer and Gerstoft, JASA 153(1), 2023.
 """
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from arrivals.trackers.svalse.coordinate.support import MergedSupport
-from arrivals.trackers.svalse.noise_initialization import NOISE_FLOOR
+from arrivals.measurement_models.manifolds.manifold import Manifold
+from arrivals.trackers.svalse.components import ComponentPrior
+from arrivals.trackers.svalse.coordinate.angle_posterior import (
+    AnglePosterior,
+    fold,
+    nearest_modes,
+    top_mode,
+    unfold,
+)
+from arrivals.trackers.svalse.coordinate.multi_snapshot import MultiSnapshotAscent
+from arrivals.trackers.svalse.noise_initialization import (
+    NOISE_FLOOR,
+    autocorrelation,
+    initial_noise,
+)
 from arrivals.typing import Complex, Float, Int
 
+if TYPE_CHECKING:
+    from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver
 
-class Amplitudes(MergedSupport):
-    """Which of L components are in use, how strong, and how strong the noise is.
+
+class SingleSnapshotAscent(MultiSnapshotAscent):
+    """State of one snapshot of a line: as `MultiSnapshotAscent`, n_bins = n_snapshots = 1.
 
     Attributes
     ----------
-    A : ndarray, shape (L, n_sensors)
-        Mean steering vectors â.
-    J, h : ndarray, shapes (L, L), (L,)
-        Their products with each other (49), the diagonal M, and with the snapshot (50).
-    active : ndarray of bool, shape (L,)
-        The support.
-    C, w : ndarray, shapes (L, L), (L,)
-        Covariance (52) and mean (53) of the amplitudes, zero off the support.
-    z, g : ndarray, shape (L,)
-        h - J w, and ν/v of each component that would be added; kept up to date by `flip`.
-    nu, tau, rho
-        Variances of noise and amplitudes, and the prior probabilities of being active, (L,).
+    views : tuple of ndarray, shapes (L, L), (L, L), (L,), (L,), (L,)
+        C, J, w, z = h - J w and g of the one snapshot, in the memory of C, J, W, Z and g.
     """
 
-    def __init__(self, y: Complex, rho: Float, nu: float, tau: float) -> None:
-        L = len(rho)
-        self.y, self.rho, self.nu, self.tau = y, rho, nu, tau
-        self.power = float(np.vdot(y, y).real)
-        self.A = np.zeros((L, len(y)), dtype=np.complex128)
-        self.J, self.C = np.zeros((2, L, L), dtype=np.complex128)
-        self.h, self.w, self.z = np.zeros((3, L), dtype=np.complex128)
-        self.g = np.zeros(L)
-        self.active = np.zeros(L, dtype=np.bool_)
+    def __init__(
+        self,
+        settings: CoordinateSolver,
+        Y: Complex,
+        manifold: Manifold,
+        prior: ComponentPrior | None,
+    ) -> None:
+        super().__init__(settings, Y, manifold, prior)
+        self.views = self.C[0], self.J[0], self.W[0, :, 0], self.Z[0, :, 0], self.g[0]
 
-    def refresh(self, changed: Int) -> None:
-        """Bring J (49) and h (50) up to date for components whose steering vectors changed."""
-        conj = self.A[changed].conj()
-        rows = conj @ self.A.T
-        rows[np.arange(len(changed)), changed] = len(self.y)  # ⟨‖a‖²⟩, not ‖â‖²
-        self.J[changed] = rows
-        self.J[:, changed] = rows.conj().T
-        self.h[changed] = conj @ self.y
+    @staticmethod
+    def applies(
+        settings: CoordinateSolver, Y: Complex, manifold: Manifold, prior: ComponentPrior | None
+    ) -> bool:
+        """Return True if data and settings are those of the paper: one snapshot of a line."""
+        line = manifold.coefficients is None and Y.shape[0] == Y.shape[2] == 1
+        floors = bool(settings.power_floor) or settings.max_snr_db is not None
+        von_mises = prior is None or prior.n_moments == 0
+        return line and von_mises and not floors and settings.tempering == 1
 
-    def empty(self) -> None:
-        """Set the amplitudes of all components to zero."""
-        self.C[:], self.w[:] = 0, 0
+    def initial_noise(self, Y: Complex, power: Float, prior: ComponentPrior | None) -> Float:
+        """Return ν of the expected SNR, or by the small eigenvalues of the lags."""
+        return np.array([initial_noise(Y[0, :, 0], self.k, self.settings.initial_snr_db(prior))])
 
-    def gains_from_empty(self) -> None:
-        """Reset what `flip` keeps up to date: z = h - J w and g = ν/v."""
-        M = len(self.y)
-        self.z = self.h.copy()
-        self.g = np.full(len(self.w), M + self.nu / self.tau)
-        with np.errstate(divide="ignore"):
-            self.odds = np.log(self.rho) - np.log1p(-self.rho) - np.log(self.tau)
+    def initialize_component(self, k: int, residual: Complex) -> None:
+        """Set a new component to the top mode of the residual's lags, (66)-(68)."""
+        top: AnglePosterior = nearest_modes if self.settings.posterior == "mixture" else top_mode
+        nu, tau = self.nu.item(), self.tau.item()
+        # η = 2 R / ν (M + ν/τ)
+        eta = 2 * autocorrelation(residual[0, :, 0], self.k) / (nu * (len(self.k) + nu / tau))
+        moments, self.mean[k] = top(eta.conj())
+        self.set_response(k, moments[None])
 
-    def deltas(self) -> Float:
-        """Return by how much the ELBO (56) would rise if each component were flipped."""
-        v, u = self.nu / self.g, self.z / self.g  # of an addition
-        np.copyto(v, self.C.diagonal().real, where=self.active)
-        np.copyto(u, self.w, where=self.active)
-        gain = np.log(v) + (u.real**2 + u.imag**2) / v + self.odds
-        if np.count_nonzero(self.active) >= len(self.y) - 1:
+    def gains(self) -> Float:
+        """Return by how much the ELBO (56) would rise if each component were flipped, Δ."""
+        C, _, w, z, g = self.views
+        v, u = self.nu.item() / g, z / g  # of an addition
+        np.copyto(v, C.diagonal().real, where=self.active)
+        np.copyto(u, w, where=self.active)
+        gain = np.log(v) + (u.real**2 + u.imag**2) / v + self.log_odds
+        if np.count_nonzero(self.active) >= len(self.k) - 1:
             gain[~self.active] = -np.inf
         return np.asarray(np.negative(gain, out=gain, where=self.active))
 
     def flip(self, k: int) -> None:
         """Add component k to the support or remove it: a rank-one change of C and w."""
+        C, J, w, z, g = self.views
+        nu = self.nu.item()
         if self.active[k]:
-            pivot = self.C[k, k].real
-            e, alpha, gamma = self.C[:, k] / pivot, -pivot, -self.w[k]
+            pivot = C[k, k].real
+            e, alpha, gamma = C[:, k] / pivot, -pivot, -w[k]
         else:
-            e = self.C @ self.J[:, k] / -self.nu
+            e = C @ J[:, k] / -nu
             e[k] = 1.0
-            alpha = self.nu / self.g[k]
-            gamma = self.z[k] / self.g[k]
-        r = e.conj() @ self.J
-        self.C += np.multiply.outer(alpha * e, e.conj())
-        self.w += gamma * e
-        self.z -= gamma * r.conj()
-        self.g -= alpha / self.nu * (r.real**2 + r.imag**2)
-        np.maximum(self.g, self.nu / self.tau, out=self.g)  # its bound, whatever the rounding
+            alpha, gamma = nu / g[k], z[k] / g[k]
+        r = e.conj() @ J
+        C += np.multiply.outer(alpha * e, e.conj())
+        w += gamma * e
+        z -= gamma * r.conj()
+        g -= alpha / nu * (r.real**2 + r.imag**2)
+        # ν/τ is the lower bound of g: rounding must not cross it
+        np.maximum(g, nu / self.tau.item(), out=g)
         if self.active[k]:
-            self.C[k], self.C[:, k], self.w[k] = 0, 0, 0
+            C[k], C[:, k], w[k] = 0, 0, 0
         self.active[k] = not self.active[k]
 
-    def solve(self) -> None:
-        """Compute C (52) and w (53) for the support as it is."""
+    def update_variances(self) -> None:
+        """Maximise the ELBO over ν (58) and τ (59); keep both if no component is active."""
+        K, M = np.count_nonzero(self.active), len(self.k)
+        if K == 0:
+            return
+        C, J, w, _, _ = self.views
+        power, h = self.power.item(), self.H[0, :, 0]
+        # ν = [‖y‖² - 2 Re(hᴴ w) + wᴴ J w + tr(J C)] / M   (58)
+        misfit = power - np.vdot(w, 2 * h - J @ w).real + np.vdot(C, J).real
+        self.nu = np.array([max(misfit, NOISE_FLOOR * power) / M])
+        # τ = [‖w‖² + tr C] / K   (59)
+        self.tau = np.array([(np.vdot(w, w).real + C.trace().real) / K])
+
+    def update_angles(self) -> None:
+        """Update q(θ) of each active component, given the present densities of the others.
+
+        ηₗ = 2/ν [y ŵ*ₗ - Σ (ŵₗ' ŵ*ₗ + Ĉₗ'ₗ) âₗ'], the sum over all others   (33).
+        """
         on = np.flatnonzero(self.active)
-        block = np.ix_(on, on)
-        regularised = self.J[block] + self.nu / self.tau * np.eye(len(on))
-        self.C[:], self.w[:] = 0, 0
-        self.C[block] = self.nu * np.linalg.inv(regularised)
-        self.w[on] = self.C[block] @ self.h[on] / self.nu
+        w, A = self.W[0, on, 0], self.A[0, on]
+        products = np.multiply.outer(w.conj(), w)
+        products.flat[:: len(on) + 1] = 0
+        products += self.covariances(on).T
+        scale = 2 / self.nu.item()
+        products *= scale
+        data = np.multiply.outer(scale * w.conj(), self.Y[0, :, 0])
+        priors = self.eta[on].conj()
+        for i, k in enumerate(on):
+            c = fold(data[i] - products[i] @ A, self.k, self.degree)
+            # (32)
+            c[1] += priors[i]
+            moments, self.mean[k] = self.posterior(c)
+            A[i] = unfold(moments, self.k)
+        self.A[0, on] = A
+        self.refresh(on)
 
-    def learn_variances(self) -> None:
-        """Maximise the ELBO over ν and τ, (58) and (59)."""
-        K, M = int(self.active.sum()), len(self.y)
-        if K > 0:
-            explained = 2 * np.vdot(self.h, self.w) - np.vdot(self.w, self.J @ self.w)
-            spread = np.vdot(self.C, self.J).real  # tr(J C)
-            floor = NOISE_FLOOR * self.power / M
-            self.nu = max(float(self.power - explained.real + spread) / M, floor)
-            self.tau = float((np.vdot(self.w, self.w) + self.C.trace()).real) / K
-
-    def reconstruction(self) -> Complex:
-        """Return x̂ = Σ ŵ â."""
-        return np.asarray(self.w @ self.A)
-
-    def elbo(self) -> float:
-        """Return the ELBO as a function of the support (56), for the C and w of that support."""
-        on = np.flatnonzero(self.active)
-        C, h = self.C[np.ix_(on, on)], self.h[on]
-        fit = np.vdot(h, C @ h).real / self.nu**2 + np.linalg.slogdet(C)[1]
-        prior = np.where(self.active, np.log(self.rho / self.tau), np.log1p(-self.rho)).sum()
-        rest = -len(self.y) * np.log(np.pi * self.nu) - self.power / self.nu
-        return float(rest + fit + prior)
+    def covariances(self, on: Int) -> Complex:
+        """Return the covariances of the active amplitudes with each other, zero on the diagonal."""
+        C: Complex = self.C[0, on[:, None], on]
+        C.flat[:: len(on) + 1] = 0
+        return C

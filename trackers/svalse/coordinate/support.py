@@ -1,4 +1,4 @@
-"""What the coordinate ascents on one look and on several have in common: which components are used.
+"""Support of the components: greedy selection, merging, and its initial values.
 
 Equation numbers are those of Park, Meyer and Gerstoft, JASA 153(1), 2023.
 """
@@ -15,79 +15,36 @@ from arrivals.motion_models.von_mises import wrap
 from arrivals.trackers.svalse.components import ComponentPrior
 from arrivals.typing import Bool, Complex, Float, Int
 
-CYCLE = 0.2  # of the iterations allowed: a component merged away so often is in a limit cycle
-
-
-class GreedySupport(ABC):
-    """Which of L components are in use: found by flips of one at a time.
-
-    Attributes
-    ----------
-    active : ndarray of bool, shape (L,)
-    """
-
-    active: Bool
-
-    @abstractmethod
-    def empty(self) -> None:
-        """Set the amplitudes of all components to zero."""
-
-    @abstractmethod
-    def gains_from_empty(self) -> None:
-        """Reset what `flip` keeps up to date."""
-
-    @abstractmethod
-    def deltas(self) -> Float:
-        """Return by how much the ELBO (56) would rise if each component were flipped."""
-
-    @abstractmethod
-    def flip(self, k: int) -> None:
-        """Add component k to the support or remove it."""
-
-    def choose_support(self) -> None:
-        """Search the support greedily from the empty one: each flip raises the ELBO by its Δ."""
-        self.active[:] = False
-        self.empty()
-        self.gains_from_empty()
-        for _ in range(4 * len(self.active)):
-            delta = self.deltas()
-            k = int(np.argmax(delta))
-            if not delta[k] > 1e-10:
-                return
-            self.flip(k)
-
-    def evidence(self) -> Float:
-        """Return by how much the ELBO would fall without each active component; -inf elsewhere."""
-        self.gains_from_empty()
-        return np.where(self.active, -self.deltas(), -np.inf)
+MIN_GAIN = 1e-10  # nats by which a change of the support must raise the ELBO
+MAX_MERGE_FRACTION = 0.2  # of max_iterations: a component merged more often is in a limit cycle
 
 
 @dataclass(frozen=True, eq=False)
 class InitialSupport:
-    """How a step begins: what the prediction says of each of L components.
+    """Prior of each of L components at the start of a step.
 
     Parameters
     ----------
-    known : Prediction
-        One of nothing in a first step and in VALSE.
-    n_carried : int
+    prior : ComponentPrior
+        One without components in a first step and in VALSE.
+    n_tracked : int
     rho : ndarray, shape (L,)
         Prior probabilities of being active.
     n_expected : int
-        Components among which the power is shared out at first.
-    learn_rho : bool
-        Whether ρ is learned, since nothing is carried.
+        Components among which the power is divided at first, K₀.
+    estimate_rho : bool
+        Whether ρ is estimated, since no component is tracked.
     """
 
-    known: ComponentPrior
-    n_carried: int
+    prior: ComponentPrior
+    n_tracked: int
     rho: Float
     n_expected: int
-    learn_rho: bool
+    estimate_rho: bool
 
     @classmethod
-    def of(cls, prediction: ComponentPrior | None, L: int) -> InitialSupport:
-        """Return the beginning of a step.
+    def of(cls, prior: ComponentPrior | None, L: int) -> InitialSupport:
+        """Return the initial support of a step.
 
         Examples
         --------
@@ -95,78 +52,111 @@ class InitialSupport:
         array([0.5, 0.5, 0.5, 0.5])
         """
         half = max(L // 2, 1)
-        if prediction is None or len(prediction.mu) == 0:
-            noise, none = None if prediction is None else prediction.noise, np.zeros(0)
-            known = ComponentPrior(none, none, none, half / L, noise=noise)
-            return cls(known, 0, np.full(L, half / L), half, learn_rho=True)
-        n = min(len(prediction.mu), L)
-        rho = np.concatenate([prediction.existence[:n], np.full(L - n, prediction.birth)])
-        return cls(prediction, n, rho, int((rho == rho.max()).sum()), learn_rho=False)
+        if prior is None or len(prior.mu) == 0:
+            noise, none = None if prior is None else prior.noise, np.zeros(0)
+            empty = ComponentPrior(none, none, none, half / L, noise=noise)
+            return cls(empty, 0, np.full(L, half / L), half, estimate_rho=True)
+        n = min(len(prior.mu), L)
+        rho = np.concatenate([prior.existence[:n], np.full(L - n, prior.birth)])
+        return cls(prior, n, rho, int((rho == rho.max()).sum()), estimate_rho=False)
 
 
-class MergedSupport(GreedySupport):
-    """A support in which no two components are too near to each other.
+class GreedySupport(ABC):
+    """Support found by changes of one component at a time, no two components too near.
 
     Attributes
     ----------
     manifold : Manifold
+    active : ndarray of bool, shape (L,)
+        The support.
     mean : ndarray, shape (L,)
         ⟨exp(jθ)⟩ of the present densities.
     rho : ndarray, shape (L,)
-    learn_rho : bool
+        Prior probabilities of being active.
+    n_tracked, n_expected, estimate_rho
+        As in `InitialSupport`.
     was_active : ndarray of bool, shape (L,)
-        In use at the end of an iteration.
+        Active at the end of an iteration.
     merged : ndarray of int, shape (L,)
-        How often each was merged away.
+        How often each was removed by merging.
     iterations : int
     """
 
     manifold: Manifold
     mean: Complex
-    rho: Float
-    learn_rho: bool
-    was_active: Bool
-    merged: Int
-    iterations: int
 
-    def begin(self, places: InitialSupport) -> None:
-        """Keep what a step begins with."""
-        L = len(places.rho)
-        self.n_carried, self.learn_rho = places.n_carried, places.learn_rho
-        self.n_expected = places.n_expected
-        self.was_active = np.zeros(L, dtype=np.bool_)
-        self.merged = np.zeros(L, dtype=np.int64)
+    def __init__(self, initial: InitialSupport) -> None:
+        L = len(initial.rho)
+        self.rho = initial.rho
+        self.n_tracked, self.n_expected = initial.n_tracked, initial.n_expected
+        self.estimate_rho = initial.estimate_rho
+        self.active: Bool = np.zeros(L, dtype=np.bool_)
+        self.was_active: Bool = np.zeros(L, dtype=np.bool_)
+        self.merged: Int = np.zeros(L, dtype=np.int64)
         self.iterations = 0
 
     @abstractmethod
-    def solve(self) -> None:
-        """Compute the amplitudes of the support as it is."""
+    def clear(self) -> None:
+        """Set the amplitudes of all components to zero."""
 
-    def learn_odds(self) -> None:
-        """Maximise the ELBO over ρ where nothing is predicted."""
+    @abstractmethod
+    def reset_gains(self) -> None:
+        """Compute anew what `flip` keeps up to date, for zero amplitudes."""
+
+    @abstractmethod
+    def gains(self) -> Float:
+        """Return by how much the ELBO (56) would rise if each component were flipped, Δ."""
+
+    @abstractmethod
+    def flip(self, k: int) -> None:
+        """Add component k to the support or remove it."""
+
+    @abstractmethod
+    def update_amplitudes(self) -> None:
+        """Compute the amplitudes for the present support, (52) and (53)."""
+
+    def choose_support(self) -> None:
+        """Search the support greedily from the empty one: each flip raises the ELBO by its Δ."""
+        self.active[:] = False
+        self.clear()
+        self.reset_gains()
+        for _ in range(4 * len(self.active)):
+            gains = self.gains()
+            k = int(np.argmax(gains))
+            if not gains[k] > MIN_GAIN:
+                return
+            self.flip(k)
+
+    def update_rho(self) -> None:
+        """Maximise the ELBO over ρ, one value for all components, if none is tracked."""
         L, K = len(self.rho), int(self.active.sum())
-        if self.learn_rho:
+        if self.estimate_rho:
             self.rho[:] = min(max(K, 1), L - 1) / L if L > 1 else 0.5
 
     def merge(self, distance: float) -> None:
-        """Switch off every active component nearer than this, rad of direction, to an earlier."""
+        """Remove every active component nearer than this, rad of direction, to an earlier one."""
         on = self.active.nonzero()[0]
         doa = self.manifold.to_doa(np.angle(self.mean[on]))
         near = np.abs(wrap(doa[:, None] - doa)) < distance
         if np.count_nonzero(near) > np.count_nonzero(near.diagonal()):
             for i, row in enumerate(np.triu(near, 1)):
                 if self.active[on[i]]:
-                    gone = on[row & self.active[on]]
-                    self.active[gone] = False
-                    self.merged[gone] += 1
-            self.solve()
+                    removed = on[row & self.active[on]]
+                    self.active[removed] = False
+                    self.merged[removed] += 1
+            self.update_amplitudes()
         self.was_active |= self.active
 
-    def cycles(self, max_iterations: int) -> bool:
-        """Tell whether the search keeps reviving what merging removes."""
-        return bool(self.merged.max() > CYCLE * max_iterations)
+    def is_cycling(self, max_iterations: int) -> bool:
+        """Return True if the search keeps reactivating what merging removes."""
+        return bool(self.merged.max() > MAX_MERGE_FRACTION * max_iterations)
+
+    def evidence(self) -> Float:
+        """Return by how much the ELBO would fall without each active component; -inf elsewhere."""
+        self.reset_gains()
+        return np.where(self.active, -self.gains(), -np.inf)
 
     @property
     def age(self) -> Int:
-        """0 of components in use, 1 of those that were, -1 of the others, (L,)."""
+        """0 of active components, 1 of those that were active, -1 of the others, (L,)."""
         return np.where(self.active, 0, np.where(self.was_active, 1, -1))
