@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -110,13 +111,7 @@ class ArraySnapshot(SingleSourceSnapshot):
         return len(self.wavelengths)
 
     def plain_wavelength(self, method: str) -> float:
-        """Return the wavelength, m, for a method of one snapshot a step of isotropic sensors.
-
-        Raises
-        ------
-        ValueError
-            If a step has more, or the sensors are directional; the message names `method`.
-        """
+        """Return the wavelength, m, or raise an error if a step has more than one snapshot."""
         if not (self.is_single and self.response is None):
             raise ValueError(
                 f"{method} takes one snapshot a step, at one frequency, of isotropic sensors; this "
@@ -125,7 +120,7 @@ class ArraySnapshot(SingleSourceSnapshot):
             )
         return self.wavelengths[0]
 
-    @property
+    @cached_property
     def shape(self) -> tuple[int, ...]:
         """Shape of one measurement: bins and snapshots, where there are several; sensors."""
         axes = [n for n in (self.n_bins, self.n_snapshots) if n > 1]
@@ -180,16 +175,14 @@ class ArraySnapshot(SingleSourceSnapshot):
         ValueError
             If the shape is wrong, or every sensor has a gap in some snapshot.
         """
-        if z is None:
+        values = np.asarray(np.nan if z is None else z)
+        if values.dtype.kind in "fc" and values.size and np.isnan(values).all():
             return None
-        z = np.asarray(z)
-        if z.dtype.kind in "fc" and z.size and np.isnan(z).all():
-            return None
-        return ObservedSnapshots.of(self.looks(z), self.manifold(reference))
+        return ObservedSnapshots.of(self.looks(values), self.manifold(reference))
 
     def looks(self, z: ArrayLike) -> Complex:
         """Return a measurement with the axes of a `Manifold`: (n_bins, n_sensors, n_snapshots)."""
-        rows = self.snapshot(z).reshape(self.n_bins, self.n_snapshots, self.array.n_sensors)
+        rows = self.snapshot(z).reshape(self.n_bins, self.n_snapshots, self.shape[-1])
         return np.swapaxes(rows, 1, 2)
 
     def manifold(self, reference: Reference = "middle") -> Manifold:
@@ -204,12 +197,18 @@ class ArraySnapshot(SingleSourceSnapshot):
             If directions are not identifiable: fewer than 3 sensors in a plane or in space, or
             all of them collinear there (front and back are ambiguous); a line of one sensor.
         """
-        one_of("reference", reference, ("middle", "first"))
-        check_directions(self.waves)
-        line = None
-        if self.angle == "auto" and self.n_bins == 1 and not self.slowness:
-            line = grid_line(self.array, self.wavelengths[0], reference)
-        return line or fourier_manifold(self.waves, reference)
+        if reference not in self._manifolds:
+            one_of("reference", reference, ("middle", "first"))
+            check_directions(self.waves)
+            line = None
+            if self.angle == "auto" and self.n_bins == 1 and not self.slowness:
+                line = grid_line(self.array, self.wavelengths[0], reference)
+            self._manifolds[reference] = line or fourier_manifold(self.waves, reference)
+        return self._manifolds[reference]
+
+    @cached_property
+    def _manifolds(self) -> dict[str, Manifold]:
+        return {}  # those made so far, by reference: the model does not change
 
     def ambiguity(self) -> tuple[float, float] | None:
         """Return the first two directions, rad, of equal response at every frequency, or None."""
@@ -296,8 +295,5 @@ class ArraySnapshot(SingleSourceSnapshot):
         return np.asarray(da)
 
     def for_likelihood(self, names: Sequence[str]) -> MeasurementModel:
-        """Return this model for `log_likelihood` at states with these names.
-
-        The amplitudes are integrated out if the state has none.
-        """
+        """Return this model for `log_likelihood`; amplitudes that are no states are integrated."""
         return self if tuple(names) in ((), ("doa",)) else of_state(self, names)

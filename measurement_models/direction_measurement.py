@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Protocol, runtime_checkable
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.manifolds.manifold import Manifold, Reference
@@ -45,30 +43,3 @@ class DirectionMeasurement(Protocol):
 
     def ambiguity(self) -> tuple[float, float] | None:
         """Return two directions, rad, with the same response, or None."""
-
-
-def check_directions(
-    measurement: DirectionMeasurement, reference: Reference, *, mixture: bool
-) -> None:
-    """Reject arrays without identifiable directions; warn of ambiguous ones.
-
-    Raises
-    ------
-    ValueError
-        If the measurement has no manifold, or none that the mixture serves.
-    """
-    manifold = measurement.manifold(reference)
-    if manifold.coefficients is None:
-        if mixture and not measurement.is_single:
-            raise ValueError('posterior="mixture" requires one snapshot a step at one frequency')
-        return
-    if mixture:
-        raise ValueError('posterior="mixture" requires a line on a uniform grid, at one wavelength')
-    if (pair := measurement.ambiguity()) is not None:
-        one, other = np.rad2deg(pair)
-        warnings.warn(
-            f"directions {one:.1f} and {other:.1f} degrees have equal responses at every "
-            "frequency: sources may be reported at either. Several frequencies, or sensors "
-            "nearer to each other, resolve the ambiguity",
-            stacklevel=4,
-        )

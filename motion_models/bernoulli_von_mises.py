@@ -1,6 +1,7 @@
 """A direction that walks on the circle, with birth and death of its source."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -61,7 +62,7 @@ class BernoulliVonMises(MotionModel):
         probability("p_activate", self.p_activate)
         probability("p_deactivate", self.p_deactivate)
 
-    @property
+    @cached_property
     def walk(self) -> VonMisesWalk:
         """Motion of the angle."""
         if self.kappa is None and self.sigma_doa is None:

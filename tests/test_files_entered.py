@@ -10,9 +10,16 @@ import numpy as np
 import pytest
 
 import arrivals
-from arrivals.measurement_models import LinearMeasurement
-from arrivals.motion_models import ConstantVelocity
-from arrivals.trackers import Kalman, Tracker
+from arrivals.measurement_models import (
+    ArraySamples,
+    ArraySnapshot,
+    LinearMeasurement,
+    LogNormalRSS,
+    SensorArray,
+    Tones,
+)
+from arrivals.motion_models import ConstantVelocity, RandomWalk
+from arrivals.trackers import RSSVB, SVALSE, InterpolationEKF, Kalman, Tracker
 
 PACKAGE = Path(arrivals.__file__).parent
 
@@ -44,7 +51,32 @@ def kalman() -> tuple[Tracker, Any]:
     return Kalman(ConstantVelocity(q=0.1), position, np.zeros(4), np.eye(4)), [1.0, 2.0]
 
 
-STEPS: list[tuple[Callable[[], tuple[Tracker, Any]], int]] = [(kalman, 6)]
+def svalse() -> tuple[Tracker, Any]:
+    """18: three models of the array and its data, three of the motion, eight of the solver."""
+    model = ArraySnapshot(SensorArray.ula(15, spacing=0.5), wavelength=1.0, noise=0.05)
+    return SVALSE(model), model.simulate([-0.3, 0.4], [1.0, 1.0j], np.random.default_rng(0))
+
+
+def rss_vb() -> tuple[Tracker, Any]:
+    rng = np.random.default_rng(0)
+    model = LogNormalRSS(rng.uniform(-60, 60, (40, 2)), log_noise=4.6, position=(0, 1))
+    places = np.array([[-25.0, 10.0], [30.0, -5.0]])
+    tracker = RSSVB(RandomWalk(q=1.0), model, x0=places + 5.0, P0=100 * np.eye(2))
+    return tracker, model.draw([9.2, 9.0], places, rng)
+
+
+def interpolation_ekf() -> tuple[Tracker, Any]:
+    array = SensorArray.ula(10, spacing=0.5, speed=1000.0)
+    model = ArraySamples(array, rate=4000.0, correlation=Tones(0.25), snr_db=20.0)
+    return InterpolationEKF(model, doa=0.5), np.cos(np.pi / 2 * np.arange(10))
+
+
+STEPS: list[tuple[Callable[[], tuple[Tracker, Any]], int]] = [
+    (kalman, 6),
+    (svalse, 18),
+    (rss_vb, 12),
+    (interpolation_ekf, 10),
+]
 
 
 @pytest.mark.parametrize(("make", "limit"), STEPS)

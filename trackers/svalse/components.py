@@ -169,12 +169,12 @@ class SolverSettings(FrozenModel):
         """Return the largest number of components for an array of n_sensors."""
         return min(n_sensors, self.max_components or n_sensors)
 
-    def merge_distance(self, prior: ComponentPrior | None) -> float:
+    def merge_distance(self, with_prior: bool) -> float:
         """Return the distance, rad, below which components are merged; 0 for never."""
         if self.merge is None:
-            return 0.0 if prior is None else MERGE_DISTANCE
+            return MERGE_DISTANCE if with_prior else 0.0
         return self.merge
 
     def initial_snr_db(self, prior: ComponentPrior | None) -> float | None:
         """Return the signal-to-noise ratio of the initial noise; None to estimate it."""
-        return 20.0 if self.snr_db is None and prior is not None else self.snr_db
+        return prior.snr_db if self.snr_db is None and prior is not None else self.snr_db

@@ -28,6 +28,7 @@ from arrivals.validation import instance, one_of
 
 DEFAULT_MOTION = BernoulliVonMises(sigma_doa=np.deg2rad(1.5))
 Memory = Literal["von_mises", "posterior"]
+INITIAL_SNR_DB = 20.0  # of the first step, for one snapshot a step
 
 
 @register("svalse")
@@ -213,14 +214,16 @@ class SVALSE(VALSE):
 
     def component_prior(self, observed: ObservedSnapshots) -> ComponentPrior:
         """Return the predicted densities and probabilities of the tracked components, (65)."""
-        on = self.tracked
+        on, snr_db = self.tracked, self.expected_snr_db
+        if snr_db is None and self.measurement.is_single:
+            snr_db = getattr(self.solver, "snr_db", None) or INITIAL_SNR_DB
         return ComponentPrior(
             self.mu[on],
             self.kappa[on],
             self.existence[on],
             self.birth,
             self.age[on],
-            self.expected_snr_db,
+            snr_db,
             noise=self.bin_noise[observed.bins],
             nuisance=self.nuisance[on],
             moments=self.moments[on] if self.moments.size else None,

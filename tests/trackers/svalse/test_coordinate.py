@@ -158,8 +158,8 @@ def test_update_variances_without_a_component_keeps_both() -> None:
 def test_paper_is_the_published_program() -> None:
     solver = CoordinateSolver.paper()
     assert (solver.posterior, solver.tolerance, solver.max_iterations) == ("mixture", 1e-6, 5000)
-    prior = ComponentPrior(np.zeros(0), np.zeros(0), np.zeros(0), 0.1)
-    assert solver.merge_distance(prior) == np.deg2rad(1.5)
+    prior = ComponentPrior(np.zeros(0), np.zeros(0), np.zeros(0), 0.1, snr_db=20.0)
+    assert solver.merge_distance(prior is not None) == np.deg2rad(1.5)
     assert (solver.initial_snr_db(prior), solver.initial_snr_db(None)) == (20.0, None)
 
 

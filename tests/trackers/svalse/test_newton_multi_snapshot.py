@@ -14,7 +14,7 @@ from arrivals.measurement_models import ArraySnapshot
 from arrivals.motion_models.bessel import log_i0
 from arrivals.scenarios import create
 from arrivals.trackers import SVALSE
-from arrivals.trackers.svalse.components import MERGE_DISTANCE, ComponentPosterior, ComponentPrior
+from arrivals.trackers.svalse.components import ComponentPosterior, ComponentPrior
 from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver
 from arrivals.trackers.svalse.newton.candidates import (
     CandidateGrid,
@@ -217,7 +217,7 @@ def wrapped_normal_bound(
     components = active_components(known, fit)
     problem = StepInput(Y, None, 8)
     assert fit.bin_noise is not None
-    response = support_search(NewtonSolver(), manifold, Y.shape[2], MERGE_DISTANCE).response
+    response = support_search(NewtonSolver(), manifold, Y.shape[2], with_prior=True).response
     nu, tau = fit.bin_noise / problem.power, np.full(len(Y), 0.3)
     K = np.array([len(on)])
     state = evaluate(response, problem.Y[None], components, K, nu[None], tau[None], np.zeros(1))

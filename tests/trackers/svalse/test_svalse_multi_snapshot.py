@@ -22,7 +22,6 @@ from svalse_scenes import (
 from arrivals.measurement_models import ArraySnapshot, ElementResponse, SensorArray
 from arrivals.scenarios import create, mean_gospa
 from arrivals.trackers import SVALSE, VALSE
-from arrivals.trackers.svalse.components import MERGE_DISTANCE
 from arrivals.trackers.svalse.newton.solver import NewtonSolver, support_search
 from arrivals.trackers.svalse.noise_initialization import noise_from_eigenvalues
 
@@ -35,7 +34,7 @@ every_model = pytest.mark.parametrize("model", MODELS, ids=NAMES)
 @pytest.mark.parametrize("model", [CIRCLE, SEVERAL, ELEMENTS], ids=NAMES[:3])
 def test_circle_turned_by_grid_steps_turns_every_angle(model: ArraySnapshot) -> None:
     """By whole steps of the grid on which components are born; see the next for others."""
-    n = len(support_search(NewtonSolver(), model.manifold(), 1, MERGE_DISTANCE).grid.theta)
+    n = len(support_search(NewtonSolver(), model.manifold(), 1, with_prior=True).grid.theta)
     turn, doa = 2 * np.pi * 5 / n, np.array([[0.3, -2.0, 1.6]] * 4)
     other, z = turned(model, turn), snapshots_of(model, doa)
     a, b = SVALSE(model, SLOW).run(z), SVALSE(other, SLOW).run(z)

@@ -113,7 +113,7 @@ class CoordinateSolver(SolverSettings):
         if not snapshots.any():
             return NO_COMPONENTS
         state = self.initial_state(snapshots, manifold, prior)
-        merge, most = self.merge_distance(prior), self.max_iterations
+        merge, most = self.merge_distance(prior is not None), self.max_iterations
         x, converged = state.initialize(), False  # (66)-(68)
         while not converged and state.iterations < most and not state.is_cycling(most):
             state.iterations += 1

@@ -143,14 +143,14 @@ class NewtonSolver(SolverSettings):
         whole_densities = any(prior is not None and prior.n_moments for prior in priors)
         if whole_densities or len(manifold.nuisance_weights) > 1:
             return self.converted(CoordinateSolver).solve_batch(snapshots, manifold, priors)
-        n = self.n_components(manifold.n_sensors)
-        steps = [StepInput(Y, prior, n) for Y, prior in zip(snapshots, priors, strict=True)]
+        search = support_search(self, manifold, snapshots[0].shape[2], priors[0] is not None)
+        steps = [
+            StepInput(Y, prior, search.n_components)
+            for Y, prior in zip(snapshots, priors, strict=True)
+        ]
         posteriors = [inactive_posterior(step) for step in steps]
         powered = [i for i, step in enumerate(steps) if not step.no_power]
-        if powered and manifold.n_sensors > 1:
-            search = support_search(
-                self, manifold, snapshots[0].shape[2], self.merge_distance(priors[0])
-            )
+        if powered and search.max_active > 0:
             solved = self._solve([steps[i] for i in powered], search)
             for i, posterior in zip(powered, solved, strict=True):
                 posteriors[i] = posterior
@@ -216,7 +216,7 @@ def unsolved(state: SolverState) -> SolverState:
 
 @lru_cache(maxsize=16)  # arrays, and some sets of their sensors: each holds a grid of responses
 def support_search(
-    solver: NewtonSolver, manifold: Manifold, n_snapshots: int, merge: float
+    solver: NewtonSolver, manifold: Manifold, n_snapshots: int, with_prior: bool
 ) -> SupportSearch:
     """Return the support search of an array with so many snapshots a step.
 
@@ -228,8 +228,8 @@ def support_search(
         Response of the array.
     n_snapshots : int
         Snapshots of a step.
-    merge : float
-        Distance, rad of direction, below which components are merged.
+    with_prior : bool
+        True if components have a prior, which sets the default distance of merging.
 
     Returns
     -------
@@ -246,7 +246,7 @@ def support_search(
     )
     return SupportSearch(
         response,
-        CandidateGrid(response, GRID_POINTS_PER_SENSOR, merge),
+        CandidateGrid(response, GRID_POINTS_PER_SENSOR, solver.merge_distance(with_prior)),
         limits=solver.limits,
         tolerance=solver.tolerance,
         max_iterations=solver.max_iterations,

@@ -59,7 +59,6 @@ class StepInput:
     """
 
     def __init__(self, Y: Complex, prior: ComponentPrior | None, max_components: int) -> None:
-        self.has_prior = prior is not None
         self.prior = NO_PRIOR if prior is None else prior
         self.power = (Y.real**2 + Y.imag**2).sum(axis=(1, 2)) / (Y.shape[1] * Y.shape[2])
         self.no_power = not self.power.any()
@@ -73,7 +72,7 @@ class StepInput:
         """Return the signal-to-noise ratio at which the noise starts.
 
         That of the steps before, else that of the settings; if that is None, by the covariance of
-        many snapshots or, without a prior, the lags of one snapshot of a line, else 20.
+        many snapshots or the lags of one snapshot of a line, else 20.
         """
         if self.prior.snr_db is not None:
             return self.prior.snr_db
@@ -82,7 +81,7 @@ class StepInput:
         M, N = self.Y.shape[1:]
         if M * settings.tempering <= N:  # snapshots enough for a covariance
             return -10 * float(np.log10(noise_from_eigenvalues(self.Y)).mean())
-        if self.has_prior or manifold.coefficients is not None or N > 1:
+        if manifold.coefficients is not None or N > 1:
             return 20.0
         return -10 * float(np.log10(initial_noise(self.Y[0, :, 0], manifold.harmonics, None)))
 
