@@ -77,7 +77,7 @@ def test_track_frequency_above_nyquist_is_refused(
         (
             'kind = "positions"\npositions = [[0, 0], [0, 0.1], [0, 0.3]]\nchannels = [1, 2, 3]\n'
             "speed = 343.0\n",
-            ("front from back", "azimuths 120 and 60 degrees"),
+            ("collinear", "azimuths 120 and 60 degrees"),
         ),
     ],
 )
