@@ -118,10 +118,10 @@ class ArraySnapshot(SingleSourceSnapshot):
             If a step has more, or the sensors are directional; the message names `method`.
         """
         if not (self.is_single and self.response is None):
+            elements = "isotropic" if self.response is None else "directional"
             raise ValueError(
-                f"{method} takes one snapshot a step, at one frequency, of isotropic sensors; this "
-                f"model has measurements of shape {self.shape}"
-                + ("" if self.response is None else " and directional elements")
+                f"{method} requires one snapshot a step, at one frequency, of isotropic sensors; "
+                f"got shape {self.shape} of {elements} ones"
             )
         return self.wavelengths[0]
 
@@ -139,9 +139,8 @@ class ArraySnapshot(SingleSourceSnapshot):
     @property
     def waves(self) -> PlaneWaves:
         """Response of the array to plane waves."""
-        return PlaneWaves(
-            self.array, self.wavelengths, self.response, self.slowness, self.elevation
-        )
+        parts = self.response, self.slowness, self.elevation
+        return PlaneWaves(self.array, self.wavelengths, *parts)
 
     def steering_vector(self, doa: ArrayLike) -> Complex:
         """Return responses to `doa` (...), rad: (..., n_sensors), or (..., n_bins, n_sensors).
@@ -180,9 +179,7 @@ class ArraySnapshot(SingleSourceSnapshot):
         ValueError
             If the shape is wrong, or every sensor has a gap in some snapshot.
         """
-        if z is None:
-            return None
-        z = np.asarray(z)
+        z = np.asarray(np.nan if z is None else z)
         if z.dtype.kind in "fc" and z.size and np.isnan(z).all():
             return None
         return ObservedSnapshots.of(self.looks(z), self.manifold(reference))
