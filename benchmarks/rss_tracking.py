@@ -214,7 +214,9 @@ def _two(network: Network, single: Network) -> None:
             far = []
             for readings in steps_of(network, calibration):
                 loud = np.argsort(
-                    np.where(np.isnan(readings.z), np.inf, -readings.z + readings.model.offsets)
+                    np.where(
+                        np.isnan(readings.z), np.inf, -readings.z + readings.model.gains.offsets
+                    )
                 )
                 start = readings.model.sensors[loud[:2]] + readings.model.r_min
                 found = snapshot(readings, calibration, start, method)

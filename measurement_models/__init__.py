@@ -20,6 +20,8 @@ from arrivals.measurement_models.signal_strength.decibels import (
     dbm_to_neper,
     neper_to_db,
 )
+from arrivals.measurement_models.signal_strength.envelope import AveragedEnvelope
+from arrivals.measurement_models.signal_strength.gains import LogGains
 from arrivals.measurement_models.signal_strength.log_normal import LogNormalRSS
 from arrivals.measurement_models.snapshot_likelihood import composite
 
@@ -38,6 +40,8 @@ __all__ = [
     # bearings and signal strength
     "Bearing",
     "LogNormalRSS",
+    "AveragedEnvelope",
+    "LogGains",
     "db_to_neper",
     "dbm_to_neper",
     "neper_to_db",

@@ -111,12 +111,12 @@ class ArraySnapshot(SingleSourceSnapshot):
         return len(self.wavelengths)
 
     def plain_wavelength(self, method: str) -> float:
-        """Return the wavelength, m, or raise an error if a step has more than one snapshot."""
+        """Return the wavelength, m, for a method of one snapshot a step of isotropic sensors."""
         if not (self.is_single and self.response is None):
+            elements = "isotropic" if self.response is None else "directional"
             raise ValueError(
-                f"{method} takes one snapshot a step, at one frequency, of isotropic sensors; this "
-                f"model has measurements of shape {self.shape}"
-                + ("" if self.response is None else " and directional elements")
+                f"{method} requires one snapshot a step, at one frequency, of isotropic sensors; "
+                f"got shape {self.shape} of {elements} ones"
             )
         return self.wavelengths[0]
 
@@ -134,9 +134,8 @@ class ArraySnapshot(SingleSourceSnapshot):
     @property
     def waves(self) -> PlaneWaves:
         """Response of the array to plane waves."""
-        return PlaneWaves(
-            self.array, self.wavelengths, self.response, self.slowness, self.elevation
-        )
+        parts = self.response, self.slowness, self.elevation
+        return PlaneWaves(self.array, self.wavelengths, *parts)
 
     def steering_vector(self, doa: ArrayLike) -> Complex:
         """Return responses to `doa` (...), rad: (..., n_sensors), or (..., n_bins, n_sensors).
@@ -175,10 +174,10 @@ class ArraySnapshot(SingleSourceSnapshot):
         ValueError
             If the shape is wrong, or every sensor has a gap in some snapshot.
         """
-        values = np.asarray(np.nan if z is None else z)
-        if values.dtype.kind in "fc" and values.size and np.isnan(values).all():
+        z = np.asarray(np.nan if z is None else z)
+        if z.dtype.kind in "fc" and z.size and np.isnan(z).all():
             return None
-        return ObservedSnapshots.of(self.looks(values), self.manifold(reference))
+        return ObservedSnapshots.of(self.looks(z), self.manifold(reference))
 
     def looks(self, z: ArrayLike) -> Complex:
         """Return a measurement with the axes of a `Manifold`: (n_bins, n_sensors, n_snapshots)."""

@@ -31,6 +31,25 @@ class Tracker(Configurable, ABC):
         Mean of the belief; NaN in unused slots where the number of sources varies.
     P : ndarray, shape (dim_x, dim_x)
         Covariance of the belief; zero in unused slots.
+
+    Examples
+    --------
+    >>> from arrivals.trackers import StateEstimate
+    >>> class Smoothing(Tracker):
+    ...     def __init__(self, gain=0.5):
+    ...         self.gain, self.x, self.P = gain, np.zeros(1), np.eye(1)
+    ...     def predict(self, u=None, *, dt=1.0):
+    ...         pass
+    ...     def update(self, z):
+    ...         if z is not None:
+    ...             self.x = self.x + self.gain * (z - self.x)
+    ...     @property
+    ...     def estimate(self):
+    ...         return StateEstimate(self.x, self.P)
+    >>> Smoothing(gain=0.5).run([1.0, None, 1.0]).x
+    array([[0.5 ],
+           [0.5 ],
+           [0.75]])
     """
 
     x: Float

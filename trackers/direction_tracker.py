@@ -64,6 +64,22 @@ class DirectionTracker(Tracker):
         Directions reported last; read-only.
     noise : float
         Estimated noise variance of one sensor; NaN where the method gives none; read-only.
+
+    Examples
+    --------
+    >>> class PhaseStep(DirectionTracker):
+    ...     n_slots = 1
+    ...     def __init__(self):
+    ...         self.reset()
+    ...     def predict(self, u=None, *, dt=1.0):
+    ...         pass
+    ...     def update(self, z):
+    ...         if z is not None:
+    ...             self.report([np.arcsin(np.angle(np.vdot(z[:-1], z[1:])) / np.pi)])
+    >>> snapshot = np.exp(1j * np.pi * np.sin(0.3) * np.arange(4))
+    >>> PhaseStep().run([snapshot, None]).doa
+    array([[0.3],
+           [0.3]])
     """
 
     @property

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.signal_strength.decibels import neper_to_db
-from arrivals.measurement_models.signal_strength.envelope import log_envelope_moments
+from arrivals.measurement_models.signal_strength.envelope import AveragedEnvelope
 from arrivals.typing import Float
 from arrivals.validation import count, number, real
 
@@ -36,24 +36,6 @@ def per_sensor(name: str, value: ArrayLike, n: int) -> float | Float:
     return array
 
 
-def gains(log_gain: ArrayLike, n: int) -> Float:
-    """Return known log gains (..., n) that cannot be written to.
-
-    Examples
-    --------
-    >>> gains([0.0, 0.1], 3)
-    Traceback (most recent call last):
-    ValueError: log_gain must have shape (..., 3); got (2,)
-    """
-    array = np.array(real("log_gain", log_gain))
-    if array.ndim not in (1, 2) or array.shape[-1] != n:
-        raise ValueError(f"log_gain must have shape (..., {n}); got {array.shape}")
-    if not np.isfinite(array).all():
-        raise ValueError("log_gain must be finite")
-    array.setflags(write=False)
-    return array
-
-
 def entries(
     position: tuple[int, int] | None, amplitude: int | None
 ) -> tuple[tuple[int, int] | None, int | None]:
@@ -79,18 +61,21 @@ def entries(
     return (entries[0], entries[1]), amplitude
 
 
-def moments(
-    sigma: float | Float | None, n_snapshots: int, exact: bool, n: int
-) -> tuple[float, Float]:
-    """Return the bias and the variances of readings."""
-    bias, variance = 0.0, np.full(n, 1 / (4 * n_snapshots))
-    if sigma is not None:
-        variance = np.broadcast_to(np.square(sigma), n).copy()
-    elif exact:
-        mean, spread = log_envelope_moments(n_snapshots)
-        bias, variance = float(mean), np.full(n, float(spread))
+def reading_error(
+    sigma: ArrayLike | AveragedEnvelope, n: int
+) -> tuple[float | Float | AveragedEnvelope, float, Float]:
+    """Return the checked `sigma` of n readings, their bias, Np, and their variances, Np²."""
+    bias, variance = 0.0, np.zeros(n)
+    if isinstance(sigma, AveragedEnvelope):
+        bias, variance[:] = sigma.moments()
+        checked: float | Float | AveragedEnvelope = sigma
+    else:
+        checked = per_sensor("sigma", sigma, n)
+        if not np.all(np.asarray(checked) > 0):
+            raise ValueError(f"sigma must be positive; got {sigma!r}")
+        variance[:] = np.square(checked)
     variance.setflags(write=False)
-    return bias, variance
+    return checked, bias, variance
 
 
 def check_unit(z: Float, xi: Float, log_noise: float, std: float) -> None:

@@ -5,10 +5,14 @@ The reading is e = (Σ|y|²/N)^½ = σ Z/√(2N) with Z ~ χ of 2N degrees of fr
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike
 
+from arrivals.parameters import FrozenModel
 from arrivals.typing import Float
+from arrivals.validation import count, instance
 
 
 def envelope_moments(n_snapshots: ArrayLike) -> tuple[Float, Float]:
@@ -71,3 +75,40 @@ def sample_log_envelope(
     (3,)
     """
     return 0.5 * np.log(rng.chisquare(2 * n_snapshots, shape) / (2 * n_snapshots))
+
+
+@dataclass(frozen=True)
+class AveragedEnvelope(FrozenModel):
+    """Error of readings that average the envelope of N Gaussian snapshots.
+
+    Parameters
+    ----------
+    n_snapshots : int
+        N, snapshots in one reading.
+    exact_moments : bool
+        Use the exact mean log σ_y + ½(ψ(N) - ln N), with variance ¼ψ'(N), in place of log σ_y
+        and 1/4N.
+
+    References
+    ----------
+    Cevher, Sankaranarayanan, Chellappa, ICASSP 2008, (3).
+
+    Examples
+    --------
+    >>> AveragedEnvelope(n_snapshots=25).moments()
+    (0.0, 0.01)
+    """
+
+    n_snapshots: int = 50
+    exact_moments: bool = False
+
+    def __post_init__(self) -> None:
+        count("n_snapshots", self.n_snapshots)
+        instance("exact_moments", self.exact_moments, bool)
+
+    def moments(self) -> tuple[float, float]:
+        """Return bias, Np, and variance, Np², of a reading."""
+        if not self.exact_moments:
+            return 0.0, 1 / (4 * self.n_snapshots)
+        mean, variance = log_envelope_moments(self.n_snapshots)
+        return float(mean), float(variance)

@@ -13,14 +13,17 @@ from arrivals.measurement_models.base import MeasurementModel, default_position,
 from arrivals.measurement_models.signal_strength.arguments import (
     check_unit,
     entries,
-    gains,
-    moments,
     per_sensor,
+    reading_error,
 )
-from arrivals.measurement_models.signal_strength.envelope import sample_log_envelope
+from arrivals.measurement_models.signal_strength.envelope import (
+    AveragedEnvelope,
+    sample_log_envelope,
+)
+from arrivals.measurement_models.signal_strength.gains import LogGains
 from arrivals.measurement_models.signal_strength.path_loss import Levels, PropagationModel, slopes
 from arrivals.typing import Float
-from arrivals.validation import constant, count, number, positive, real
+from arrivals.validation import constant, count, instance, number, positive, real
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -31,24 +34,17 @@ class LogNormalRSS(MeasurementModel):
     ----------
     sensors : array_like, shape (n_sensors, 2)
         Positions of the sensors, m.
-    sigma : float or array_like, shape (n_sensors,), optional
-        Standard deviation of the readings, Np: the shadowing of measured data. If None,
-        readings average snapshots, and it is 1/(2√N).
-    n_snapshots : int
-        N, snapshots of the envelope in one reading.
+    sigma : AveragedEnvelope, float or array_like, shape (n_sensors,)
+        Standard deviation of the readings, Np: the shadowing of measured data; or the average of
+        N snapshots that makes it 1/(2√N).
     alpha : float
         Loss exponent: received power falls as R^-α. A slope of 10 n dB a decade is α = n.
     log_noise : float or array_like, shape (n_sensors,), optional
         Log amplitude of the noise, Np; without noise if None.
-    offsets : float or array_like, shape (n_sensors,)
-        Log gains of the sensors, Np, of source and noise alike.
-    log_gain : array_like, shape (n_sensors,) or (n_sources, n_sensors), optional
-        Known log gains of the sources' way to the sensors, Np, as `doppler_log_gain` gives them.
+    gains : LogGains
+        Known log gains of the sensors and of the paths from the sources.
     r_min : float
         Ranges are not below this, m.
-    exact_moments : bool
-        Expect the exact mean log σ_y + ½(ψ(N) - ln N), with variance ¼ψ'(N), in place of
-        log σ_y and 1/4N. Of no effect with `sigma`.
     position : tuple of two int, optional
         Entries of one source's state that are x and y. If None, those that the motion model calls
         so; in states without names (0, 1) of 2 or 3 entries, (0, 2) of more.
@@ -88,18 +84,21 @@ class LogNormalRSS(MeasurementModel):
     """
 
     sensors: Float
-    sigma: float | Float | None
-    n_snapshots: int
+    sigma: float | Float | AveragedEnvelope
     alpha: float
     log_noise: float | Float | None
-    offsets: float | Float
-    log_gain: Float | None
+    gains: LogGains
     r_min: float
-    exact_moments: bool
     position: tuple[int, int] | None
     amplitude: int | None
     log_amplitude: float
     n_sources: int
+    renamed: ClassVar[dict[str, str]] = {
+        "n_snapshots": "sigma__n_snapshots",
+        "exact_moments": "sigma__exact_moments",
+        "offsets": "gains__offsets",
+        "log_gain": "gains__paths",
+    }
     _bias: ClassVar[float]  # of the object, yet no parameters
     _variance: ClassVar[Float]
     _noise: ClassVar[float | Float]
@@ -107,15 +106,12 @@ class LogNormalRSS(MeasurementModel):
     def __init__(
         self,
         sensors: ArrayLike,
-        sigma: float | ArrayLike | None = None,
+        sigma: ArrayLike | AveragedEnvelope = AveragedEnvelope(),
         *,
-        n_snapshots: int = 50,
         alpha: float = 2.0,
         log_noise: float | ArrayLike | None = None,
-        offsets: float | ArrayLike = 0.0,
-        log_gain: ArrayLike | None = None,
+        gains: LogGains = LogGains(),
         r_min: float = 1.0,
-        exact_moments: bool = False,
         position: tuple[int, int] | None = None,
         amplitude: int | None = None,
         log_amplitude: float = 0.0,
@@ -125,26 +121,19 @@ class LogNormalRSS(MeasurementModel):
         if places.shape[1] != 2:
             raise ValueError(f"sensors must have shape (n_sensors, 2); got {places.shape}")
         n = len(places)
+        instance("gains", gains, LogGains).check(n)
         own: dict[str, Any] = {
             "sensors": places,
-            "sigma": None if sigma is None else per_sensor("sigma", sigma, n),
-            "n_snapshots": count("n_snapshots", n_snapshots),
             "alpha": positive("alpha", alpha),
             "log_noise": None if log_noise is None else per_sensor("log_noise", log_noise, n),
-            "offsets": per_sensor("offsets", offsets, n),
-            "log_gain": None if log_gain is None else gains(log_gain, n),
+            "gains": gains,
             "r_min": positive("r_min", r_min),
-            "exact_moments": bool(exact_moments),
             "log_amplitude": number("log_amplitude", log_amplitude),
             "n_sources": count("n_sources", n_sources),
         }
         own["position"], own["amplitude"] = entries(position, amplitude)
-        if own["sigma"] is not None and not np.all(np.asarray(own["sigma"]) > 0):
-            raise ValueError(f"sigma must be positive; got {sigma!r}")
         own["_noise"] = -np.inf if own["log_noise"] is None else own["log_noise"]
-        own["_bias"], own["_variance"] = moments(
-            own["sigma"], own["n_snapshots"], own["exact_moments"], n
-        )
+        own["sigma"], own["_bias"], own["_variance"] = reading_error(sigma, n)
         for name, value in own.items():
             object.__setattr__(self, name, value)
 
@@ -191,8 +180,7 @@ class LogNormalRSS(MeasurementModel):
     @property
     def propagation(self) -> PropagationModel:
         """Sensors, exponent, noise, floor and gains, for kernels."""
-        gain = 0.0 if self.log_gain is None else self.log_gain
-        return PropagationModel(self.sensors, self.alpha, self._noise, self.r_min, gain)
+        return PropagationModel(self.sensors, self.alpha, self._noise, self.r_min, self.gains.paths)
 
     def levels(self, u: ArrayLike, theta: ArrayLike) -> Levels:
         """Return log σ_y and responsibilities of sources (..., n_sources), (..., n_sources, 2)."""
@@ -203,7 +191,7 @@ class LogNormalRSS(MeasurementModel):
     def h(self, x: ArrayLike) -> Float:
         """Return log σ_y, with offsets and bias, of states: (..., n) -> (..., n_sensors)."""
         u, theta = self.sources(x)
-        return np.asarray(self.levels(u, theta).log_sigma + self.offsets + self._bias)
+        return np.asarray(self.levels(u, theta).log_sigma + self.gains.offsets + self._bias)
 
     def H(self, x: ArrayLike) -> Float:
         """Return the Jacobian of `h` at one state, (n_sensors, n)."""
@@ -220,15 +208,16 @@ class LogNormalRSS(MeasurementModel):
         return H.reshape(self.dim_z, x.size)
 
     def sample(self, x: ArrayLike, rng: np.random.Generator) -> Float:
-        """Draw readings of each state: the exact statistic [2], or Gaussian with `sigma`."""
+        """Draw readings of each state: averages of snapshots, or Gaussian with a number `sigma`."""
         u, theta = self.sources(x)
         return self.draw(u, theta, rng)
 
     def draw(self, u: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Float:
         """Draw readings of sources (..., n_sources), (..., n_sources, 2), as `sample` does."""
-        level = self.levels(u, theta).log_sigma + self.offsets
-        if self.sigma is None:
-            return np.asarray(level + sample_log_envelope(self.n_snapshots, level.shape, rng))
+        level = self.levels(u, theta).log_sigma + self.gains.offsets
+        if isinstance(self.sigma, AveragedEnvelope):
+            N = self.sigma.n_snapshots
+            return np.asarray(level + sample_log_envelope(N, level.shape, rng))
         return np.asarray(level + self.sigma * rng.standard_normal(level.shape))
 
     def readings(self, z: ArrayLike) -> Float:
@@ -253,7 +242,7 @@ class LogNormalRSS(MeasurementModel):
         z = real("z", z)
         if z.ndim == 0 or z.shape[-1] != self.dim_z:
             raise ValueError(f"readings must have shape (..., {self.dim_z}); got {z.shape}")
-        xi = z - self.offsets - self._bias
+        xi = z - self.gains.offsets - self._bias
         check_unit(z, xi, np.max(self._noise), np.sqrt(self._variance.max()))
         return np.asarray(xi)
 

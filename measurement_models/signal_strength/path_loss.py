@@ -223,7 +223,7 @@ def doppler_log_gain(
     Returns
     -------
     ndarray, shape (..., n_sensors)
-        For `log_gain` of `LogNormalRSS`.
+        For `paths` of `LogGains`.
 
     Raises
     ------

@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from arrivals.measurement_models import LogNormalRSS, db_to_neper
+from arrivals.measurement_models import AveragedEnvelope, LogNormalRSS, db_to_neper
 from arrivals.motion_models import MotionModel, RandomWalk
 from arrivals.scenarios.base import Scenario, Trial
 from arrivals.scenarios.registry import register
@@ -129,7 +129,7 @@ class RSSScenario(Scenario):
         """Return the measurement model of sensors at given positions (n_sensors, 2), m."""
         return LogNormalRSS(
             sensors,
-            n_snapshots=self.n_snapshots,
+            AveragedEnvelope(self.n_snapshots),
             alpha=self.alpha,
             log_noise=float(db_to_neper(self.noise_db)),
             position=(0, 1) if self.motion.dim_x == 2 else (0, 2),

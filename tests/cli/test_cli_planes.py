@@ -106,7 +106,10 @@ def test_stream_of_several_per_step_equals_the_file(
         (("--frequency", "500", "--band", "450", "850"), ("pass only one of --frequency",)),
         (("--frequency", "500", "--snapshots", "0"), ("snapshots must be at least 1",)),
         (("--frequency", "500", "--snapshots", "99"), ("16 snapshots; one step requires 99",)),
-        (("--frequencies", "500", "700", "--tracker", "mvdr"), ("mvdr takes one snapshot a step",)),
+        (
+            ("--frequencies", "500", "700", "--tracker", "mvdr"),
+            ("mvdr requires one snapshot a step",),
+        ),
     ],
 )
 def test_track_of_several_bins_with_invalid_arguments_prints_one_line(

@@ -52,6 +52,13 @@ class FixedPointSolver(FrozenModel):
         Maximum number of iterations.
     patience : int
         Maximum number of iterations without a smaller change.
+
+    Examples
+    --------
+    >>> A = np.exp(1j * np.pi * np.outer([-0.5, 0.0, 0.5], np.arange(4))) / 2
+    >>> solution = FixedPointSolver().solve(A, 6 * A[None, 1, :, None], np.ones((1, 3)), 1.0)
+    >>> solution.gamma.round(1)
+    array([[ 0., 36.,  0.]])
     """
 
     tolerance: float = 1e-3

@@ -1,6 +1,7 @@
 """Subspace methods."""
 
-from arrivals.trackers.subspace.base import CovarianceSubspace, Subspaces, SubspaceTracker
+from arrivals.trackers.subspace.base import Subspaces, SubspaceTracker
+from arrivals.trackers.subspace.covariance import CovarianceSubspace
 from arrivals.trackers.subspace.esprit import ESPRIT
 from arrivals.trackers.subspace.music import MUSIC, music_spectrum
 from arrivals.trackers.subspace.past import PAST

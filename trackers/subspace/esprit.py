@@ -9,7 +9,8 @@ import numpy as np
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.manifolds.uniform_line import UniformLineManifold
 from arrivals.trackers.registry import register
-from arrivals.trackers.subspace.base import CovarianceSubspace, Subspaces, uniform_line
+from arrivals.trackers.subspace.base import Subspaces, uniform_line
+from arrivals.trackers.subspace.covariance import CovarianceSubspace
 from arrivals.trackers.subspace.root_music import ENDFIRE_TOLERANCE
 from arrivals.typing import Complex, Float, Int
 

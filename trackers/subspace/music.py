@@ -16,7 +16,8 @@ from arrivals.trackers.beamforming.spectrum import (
     scan_steering_matrix,
 )
 from arrivals.trackers.registry import register
-from arrivals.trackers.subspace.base import CovarianceSubspace, NumberOfSources, Subspaces
+from arrivals.trackers.subspace.base import NumberOfSources, Subspaces
+from arrivals.trackers.subspace.covariance import CovarianceSubspace
 from arrivals.typing import Complex, Float
 from arrivals.validation import count
 

@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.manifolds.uniform_line import UniformLineManifold
 from arrivals.trackers.registry import register
-from arrivals.trackers.subspace.base import CovarianceSubspace, Subspaces, uniform_line
+from arrivals.trackers.subspace.base import Subspaces, uniform_line
+from arrivals.trackers.subspace.covariance import CovarianceSubspace
 from arrivals.typing import Complex, Float
 
 ENDFIRE_TOLERANCE = 0.1  # electrical angles up to this fraction beyond endfire count as endfire

@@ -44,7 +44,7 @@ def steps_of(
 
 def strongest(readings: FramedReadings) -> Float:
     """Return the position of the sensor with the largest level without its offset, (2,)."""
-    level = np.where(np.isnan(readings.z), -np.inf, readings.z - readings.model.offsets)
+    level = np.where(np.isnan(readings.z), -np.inf, readings.z - readings.model.gains.offsets)
     return np.asarray(readings.model.sensors[level.argmax()])
 
 

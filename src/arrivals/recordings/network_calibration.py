@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from arrivals.measurement_models import LogNormalRSS, db_to_neper
+from arrivals.measurement_models import LogGains, LogNormalRSS, db_to_neper
 from arrivals.recordings.networks import Network
 from arrivals.typing import Float, Int
 from arrivals.validation import positive
@@ -65,7 +65,7 @@ class Calibration:
             sensors,
             sigma,
             alpha=self.alpha,
-            offsets=self.offsets,
+            gains=LogGains(self.offsets),
             log_noise=floor,
             r_min=self.r_min,
             position=position,

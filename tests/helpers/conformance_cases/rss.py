@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from arrivals.measurement_models import LogNormalRSS, db_to_neper
+from arrivals.measurement_models import AveragedEnvelope, LogGains, LogNormalRSS, db_to_neper
 from arrivals.motion_models import ConstantVelocity, CoordinatedTurn, RandomWalk
 from arrivals.trackers import RSSML, RSSVB, BirthDeath, GridSearch, MAPSolver, VariationalSolver
 from arrivals.trackers.conformance import MakeTracker, Measurements
@@ -13,7 +13,9 @@ RNG = np.random.default_rng(7)
 PLACES = RNG.uniform(-60.0, 60.0, (20, 2))
 NOISE = float(db_to_neper(40.0))
 STILL = LogNormalRSS(PLACES, log_noise=NOISE, position=(0, 1))
-MOVING = LogNormalRSS(PLACES, log_noise=NOISE, alpha=2.5, exact_moments=True, offsets=0.1)
+MOVING = LogNormalRSS(
+    PLACES, AveragedEnvelope(exact_moments=True), log_noise=NOISE, alpha=2.5, gains=LogGains(0.1)
+)
 TRUTH = np.array([[-25.0, 10.0], [30.0, -5.0]])
 X4 = np.insert(TRUTH + 4.0, [1, 2], 0.0, axis=1)
 P4 = np.diag([50.0, 2.0, 50.0, 2.0])

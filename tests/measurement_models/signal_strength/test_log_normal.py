@@ -11,7 +11,14 @@ from scipy.differentiate import jacobian
 from scipy.special import logsumexp
 from scipy.stats import chi, norm
 
-from arrivals.measurement_models import LogNormalRSS, db_to_neper, dbm_to_neper, neper_to_db
+from arrivals.measurement_models import (
+    AveragedEnvelope,
+    LogGains,
+    LogNormalRSS,
+    db_to_neper,
+    dbm_to_neper,
+    neper_to_db,
+)
 from arrivals.measurement_models.signal_strength.decibels import neper_to_dbm, watt_to_neper
 from arrivals.measurement_models.signal_strength.envelope import (
     envelope_moments,
@@ -28,8 +35,8 @@ PLACES = RNG.uniform(-50.0, 50.0, (12, 2))
 NOISE = float(db_to_neper(40.0))
 GAINS = RNG.normal(0, 0.1, (2, 12))
 TWO = LogNormalRSS(
-    PLACES, alpha=3.0, log_noise=NOISE, offsets=RNG.normal(0, 0.3, 12), r_min=2.0,
-    log_gain=GAINS, position=(0, 1), amplitude=2, n_sources=2,
+    PLACES, alpha=3.0, log_noise=NOISE, gains=LogGains(RNG.normal(0, 0.3, 12), GAINS), r_min=2.0,
+    position=(0, 1), amplitude=2, n_sources=2,
 )  # fmt: skip
 STATE = np.array([-20.0, 13.0, 9.2, 31.0, -4.0, 9.0])
 
@@ -57,7 +64,9 @@ def test_level_is_the_sum_of_powers() -> None:
     u, theta = TWO.sources(STATE)
     R = np.maximum(np.linalg.norm(theta[:, None] - PLACES, axis=-1), 2.0)
     terms = 2 * (u[:, None] + GAINS) - 3.0 * np.log(R)
-    expected = 0.5 * logsumexp(np.vstack([terms, np.full(12, 2 * NOISE)]), axis=0) + TWO.offsets
+    expected = (
+        0.5 * logsumexp(np.vstack([terms, np.full(12, 2 * NOISE)]), axis=0) + TWO.gains.offsets
+    )
     np.testing.assert_allclose(TWO.h(STATE), expected, rtol=1e-13)
 
 
@@ -99,7 +108,7 @@ def test_nothing_overflows_at_the_ends_of_the_scale() -> None:
 
 
 def test_silence_is_the_noise() -> None:
-    found = TWO.replace(log_gain=None).levels(np.zeros(0), np.zeros((0, 2)))
+    found = TWO.replace(gains__paths=0.0).levels(np.zeros(0), np.zeros((0, 2)))
     np.testing.assert_allclose(found.log_sigma, NOISE)
 
 
@@ -151,7 +160,7 @@ def test_drawn_readings_have_the_exact_moments() -> None:
 
 
 def test_exact_moments_are_in_the_gaussian_interface() -> None:
-    exact = TWO.replace(exact_moments=True, n_snapshots=4)
+    exact = TWO.replace(sigma__exact_moments=True, sigma__n_snapshots=4)
     bias, variance = log_envelope_moments(4)
     np.testing.assert_allclose(exact.h(STATE) - TWO.h(STATE), bias)
     np.testing.assert_allclose(exact.R, variance * np.eye(12))
@@ -207,7 +216,7 @@ def test_two_sources_with_unknown_powers_run_in_the_ekf_and_the_particle_filter(
     amplitude = LinearMotion([[1.0]], [[1e-4]], names=["log_amplitude"])
     each = CombinedMotion(RandomWalk(q=0.01), amplitude)
     start = STATE + np.array([2.0, -2.0, 0.1, 2.0, 2.0, -0.1])
-    model = TWO.replace(log_gain=None, sigma=0.3)
+    model = TWO.replace(gains__paths=0.0, sigma=0.3)
     z = model.sample(np.tile(STATE, (40, 1)), np.random.default_rng(3))
     z[5, 2], z[7] = np.nan, np.nan
     P0 = np.diag([9.0, 9.0, 0.1] * 2)
@@ -228,12 +237,10 @@ def test_two_sources_with_unknown_powers_run_in_the_ekf_and_the_particle_filter(
         ({"alpha": -2.0}, "alpha must be finite and positive"),
         ({"sigma": 0.0}, "sigma must be positive"),
         ({"sigma": [0.5, 0.5]}, r"sigma must be a number or have shape \(12,\); got \(2,\)"),
-        ({"offsets": [np.nan] * 12}, "offsets must be finite"),
         ({"log_noise": np.inf}, "log_noise must be finite"),
-        ({"log_gain": np.zeros(3)}, r"log_gain must have shape \(..., 12\)"),
-        ({"log_gain": np.full(12, np.inf)}, "log_gain must be finite"),
+        ({"gains": LogGains(np.zeros(3))}, r"offsets must have shape \(..., 12\)"),
+        ({"gains": LogGains(paths=np.zeros(3))}, r"paths must have shape \(..., 12\)"),
         ({"r_min": 0.0}, "r_min must be finite and positive"),
-        ({"n_snapshots": 0}, "n_snapshots must be at least 1"),
         ({"position": (0, 0)}, "must be different entries"),
         ({"position": (0, 1, 2)}, "must name two entries"),
         ({"position": (0, 2), "amplitude": 0}, "must be different entries"),
@@ -243,6 +250,31 @@ def test_two_sources_with_unknown_powers_run_in_the_ekf_and_the_particle_filter(
 def test_nonsense_is_refused(params: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         LogNormalRSS(**{"sensors": PLACES} | params)
+
+
+def test_invalid_parts_are_refused() -> None:
+    with pytest.raises(ValueError, match="n_snapshots must be at least 1"):
+        AveragedEnvelope(0)
+    with pytest.raises(ValueError, match="offsets must be finite"):
+        LogGains([np.nan] * 12)
+    with pytest.raises(ValueError, match="paths must be finite"):
+        LogGains(paths=np.full(12, np.inf))
+    with pytest.raises(ValueError, match="offsets must have at most 1 dimensions"):
+        LogGains(np.zeros((2, 12)))
+
+
+def test_models_of_equal_gains_are_equal() -> None:
+    same = TWO.replace(gains=LogGains(TWO.gains.offsets, GAINS.copy()))
+    assert (same, hash(same)) == (TWO, hash(TWO))
+    assert TWO.replace(gains__offsets=0.0) != TWO
+    assert LogNormalRSS.from_dict(TWO.to_dict()) == TWO
+
+
+def test_former_parameters_are_refused_with_their_new_place() -> None:
+    with pytest.raises(TypeError, match=r"'n_snapshots': it is now called .* parameter of 'sigma'"):
+        LogNormalRSS(PLACES, n_snapshots=20)  # type: ignore[call-arg]
+    with pytest.raises(TypeError, match=r"'log_gain': it is now called 'paths', a .* of 'gains'"):
+        LogNormalRSS(PLACES, log_gain=GAINS)  # type: ignore[call-arg]
 
 
 def test_states_of_the_wrong_shape_are_refused() -> None:

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import gamma
 
-from arrivals.measurement_models import LogNormalRSS, db_to_neper
+from arrivals.measurement_models import AveragedEnvelope, LogNormalRSS, db_to_neper
 from arrivals.scenarios import available, create
 from arrivals.scenarios.bounds.detection import (
     amplitude_gaussian_detection,
@@ -152,7 +152,7 @@ def test_detection_matches_section_8(
 
 def test_exact_detection_matches_simulation() -> None:
     rng = np.random.default_rng(0)
-    model = LogNormalRSS([[0.0, 0.0]], n_snapshots=10, log_noise=0.0)
+    model = LogNormalRSS([[0.0, 0.0]], AveragedEnvelope(10), log_noise=0.0)
     u, place = np.zeros((100_000, 1)), np.tile([[[2.0, 0.0]]], (100_000, 1, 1))
     z = model.draw(u, place, rng)[:, 0]
     threshold = 0.5 * np.log(gamma.isf(0.01, 10) / 10)
