@@ -3,6 +3,10 @@
 import os
 from pathlib import Path
 
+# One BLAS thread a process: matrices are small, and pytest runs one process a core. It is read
+# when numpy is imported, here and in processes that tests start.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import numpy as np
 import pytest
 from command_line import ARRAY, DOA, RATE, WINDOW, pressure
