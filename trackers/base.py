@@ -151,13 +151,6 @@ class Tracker(Configurable, ABC):
             setattr(self, name, getattr(checked, name))
         return self
 
-    @classmethod
-    def type_name(cls) -> str:
-        """Return the registered name, or "module:Class" of a class that is not registered."""
-        from arrivals.trackers.registry import TRACKERS
-
-        return TRACKERS.name_of(cls) or super().type_name()
-
 
 def is_missing(z: ArrayLike | None) -> bool:
     """Return True if a measurement is missing: None, or all NaN.

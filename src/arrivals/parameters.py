@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 FINDERS: list[Callable[[str], type]] = []  # functions from registered names to classes
+NAMERS: list[Callable[[type], str | None]] = []  # functions from classes to registered names
 
 
 class Configurable:
@@ -143,9 +144,12 @@ class Configurable:
         Returns
         -------
         str
-            "package:Class" if the package, the first two parts of the module's name, exports the
-            class, else "module:Class". Trackers return their registered names.
+            The registered name, if any; else "package:Class" if the package, the first two parts
+            of the module's name, exports the class; else "module:Class".
         """
+        for name_of in NAMERS:
+            if name := name_of(cls):
+                return name
         package = ".".join(cls.__module__.split(".")[:2])
         is_public = getattr(sys.modules.get(package), cls.__qualname__, None) is cls
         return f"{package if is_public else cls.__module__}:{cls.__qualname__}"
