@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -207,19 +207,15 @@ class SensorArray(FrozenModel):
             raise ValueError(f"distances must be a list of positive numbers; got {distances!r}")
         return cls(np.concatenate([-d[::-1], [0.0], d]), speed).without(missing)
 
-    @classmethod
-    def from_csv(cls, path: str | Path, *, speed: float | None = None) -> SensorArray:
-        """Read positions, one sensor a row, columns x, y, z in metres; see `arrays.files`."""
-        from arrivals.measurement_models.arrays.files import from_csv
+    if TYPE_CHECKING:  # functions of `arrays.files`, which the package `arrays` attaches
 
-        return from_csv(path, speed=speed)
+        @staticmethod
+        def from_csv(path: str | Path, *, speed: float | None = None) -> SensorArray:
+            """Read positions, one sensor a row, columns x, y, z in metres."""
 
-    @classmethod
-    def from_toml(cls, path: str | Path) -> SensorArray:
-        """Read an array file; see `arrays.files` for its keys."""
-        from arrivals.measurement_models.arrays.files import from_toml
-
-        return from_toml(path)
+        @staticmethod
+        def from_toml(path: str | Path) -> SensorArray:
+            """Read an array file; see `arrays.files` for its keys."""
 
     def without(self, sensors: Iterable[int]) -> SensorArray:
         """Return the array without some sensors, named by index; the others keep their channels."""
