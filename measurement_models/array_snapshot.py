@@ -177,9 +177,9 @@ class ArraySnapshot(SingleSourceSnapshot):
         z = np.asarray(np.nan if z is None else z)
         if z.dtype.kind in "fc" and z.size and np.isnan(z).all():
             return None
-        return ObservedSnapshots.of(self.looks(z), self.manifold(reference))
+        return ObservedSnapshots.of(self.snapshots(z), self.manifold(reference))
 
-    def looks(self, z: ArrayLike) -> Complex:
+    def snapshots(self, z: ArrayLike) -> Complex:
         """Return a measurement with the axes of a `Manifold`: (n_bins, n_sensors, n_snapshots)."""
         rows = self.snapshot(z).reshape(self.n_bins, self.n_snapshots, self.shape[-1])
         return np.swapaxes(rows, 1, 2)
@@ -241,7 +241,7 @@ class ArraySnapshot(SingleSourceSnapshot):
             return log_known(self.snapshot(z), self.wave(doa, amplitude), self.noise)
         a = self.waves.steering(doa.ravel())
         a = a.reshape(*a.shape[:3], *doa.shape)
-        return log_marginal(self.looks(z), a, self.noise, self.power)
+        return log_marginal(self.snapshots(z), a, self.noise, self.power)
 
     def wave(self, doa: ArrayLike, amplitude: ArrayLike) -> Complex:
         """Return noiseless measurements of sources at `doa` (..., n_sources), as in `simulate`."""

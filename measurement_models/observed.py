@@ -94,10 +94,6 @@ class ObservedSnapshots:
         """Equal for steps with the same valid data."""
         return b"".join(each.tobytes() for each in (self.bins, self.sensors, self.times))
 
-    def block(self, Y: Complex) -> Complex:
-        """Return the snapshots without gaps."""
-        return self.snapshots
-
 
 def complex_snapshot(z: ArrayLike, shape: tuple[int, ...]) -> Complex:
     """Return a measurement as complex numbers of a shape, NaN where a sensor gave none.

@@ -136,7 +136,7 @@ def test_snapshot_keeps_its_argument_and_masks_what_is_no_number() -> None:
     z = MODELS[0].snapshot(given)
     np.testing.assert_array_equal(np.isnan(z), [False, True, True, False, False])
     np.testing.assert_array_equal(given, kept)
-    assert MODELS[0].looks([1, 2, 3, 4, 5]).shape == (1, 5, 1)
+    assert MODELS[0].snapshots([1, 2, 3, 4, 5]).shape == (1, 5, 1)
 
 
 @pytest.mark.parametrize(

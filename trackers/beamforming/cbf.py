@@ -110,7 +110,7 @@ class CBF(DirectionTracker):
         model = self.measurement
         if model.is_single and model.response is None:
             return self.spectrum(model.steering_vector(self.doa_grid), z)
-        return mean_beam_power(model.waves.steering(self.doa_grid), model.looks(z))
+        return mean_beam_power(model.waves.steering(self.doa_grid), model.snapshots(z))
 
     def _amplitude(self, doa: Float, z: Complex) -> Complex:
         """Return amplitudes, or the root of the mean power over several bins and snapshots."""
@@ -119,7 +119,7 @@ class CBF(DirectionTracker):
             return self.amplitudes(model.steering_vector(doa), z)
         A = model.waves.steering(doa)
         norm = (A.real**2 + A.imag**2).sum(axis=2).mean(axis=(0, 1))
-        return np.asarray(np.sqrt(mean_beam_power(A, model.looks(z)) / norm) + 0j)
+        return np.asarray(np.sqrt(mean_beam_power(A, model.snapshots(z)) / norm) + 0j)
 
     def spectrum(self, A: Complex, z: Complex) -> Float:
         """Return the power of one snapshot from directions with steering vectors A.

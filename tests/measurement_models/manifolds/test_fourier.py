@@ -168,7 +168,7 @@ def test_shape_and_snapshots_agree(model: ArraySnapshot) -> None:
     rng = np.random.default_rng(0)
     z = model.simulate(np.zeros((5, 2)), 1.0, rng)
     assert z.shape == (5, *model.shape)
-    Y = model.looks(z[0])
+    Y = model.snapshots(z[0])
     assert Y.shape == (model.n_bins, model.array.n_sensors, model.n_snapshots)
     assert np.array_equal(np.swapaxes(Y, 1, 2).reshape(model.shape), z[0])
 

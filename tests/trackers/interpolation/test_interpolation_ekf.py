@@ -150,7 +150,7 @@ def test_reversed_line_mirrors_the_direction(variant: Any) -> None:
     other = InterpolationEKF(mirrored, variant=variant, doa=-0.6)
     negative = other.run(made.measurements).doa
     assert np.rad2deg(one.run(made.measurements).doa[-1, 0]) == pytest.approx(40, abs=2)
-    if variant != "B":  # whose two taps look one way only
+    if variant != "B":  # its two taps (0, 1) are one-sided
         np.testing.assert_allclose(np.rad2deg(negative[-1]), -40, atol=2)
 
 

@@ -31,7 +31,7 @@ PRIOR = ComponentPrior(np.array([0.5, -2.0]), np.array([100.0, 20.0]), np.array(
 def simulated(seed: int, model: ArraySnapshot = MODEL) -> Complex:
     rng = np.random.default_rng(seed)
     w = rng.standard_normal((*model.shape[:-1], 3, 2)) @ np.array([1, 1j])
-    return model.looks(model.simulate(rng.uniform(-3, 3, 3), w, rng))
+    return model.snapshots(model.simulate(rng.uniform(-3, 3, 3), w, rng))
 
 
 def initialized(seed: int, sequential: bool = False, **changes: Any) -> MultiSnapshotAscent:
@@ -172,7 +172,7 @@ def test_general_form_on_a_line_agrees_with_the_fast_form(reference: Any) -> Non
     manifold = trial.measurement.manifold(reference)  # type: ignore[union-attr]
     prior = None
     for z in trial.measurements:
-        Y = trial.measurement.looks(z)  # type: ignore[union-attr]
+        Y = trial.measurement.snapshots(z)  # type: ignore[union-attr]
         fast = CoordinateSolver(**settings).solve(Y, manifold, prior)
         general = GeneralSolver(**settings).solve(Y, manifold, prior)
         assert general.iterations == fast.iterations

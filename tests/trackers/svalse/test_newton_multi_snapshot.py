@@ -41,10 +41,10 @@ DOA = np.array([-1.1, -0.1, 0.7])
 
 
 def drawn(model: ArraySnapshot, seed: int, noise: float = 0.03) -> Complex:
-    """Looks (F, M, N) of three sources."""
+    """Return snapshots (F, M, N) of three sources."""
     rng = np.random.default_rng(seed)
     w = np.exp(2j * np.pi * rng.random((*model.shape[:-1], 3)))
-    return model.looks(model.replace(noise=noise).simulate(DOA, w, rng))
+    return model.snapshots(model.replace(noise=noise).simulate(DOA, w, rng))
 
 
 def scene(
@@ -242,7 +242,7 @@ def test_the_bound_is_no_lower_than_that_of_coordinate_ascent(numbers: dict[str,
         for t, z in enumerate(trial.measurements):
             tracker.predict()
             if t % 3 == 1:
-                known, Y = prior_of(tracker, z), model.looks(z)
+                known, Y = prior_of(tracker, z), model.snapshots(z)
                 ours = NewtonSolver().solve(Y, manifold, known)
                 other = CoordinateSolver(tolerance=1e-6).solve(Y, manifold, known)
                 bounds = [wrapped_normal_bound(manifold, Y, known, f, 0.5) for f in (ours, other)]

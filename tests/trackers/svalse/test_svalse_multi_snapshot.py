@@ -137,7 +137,7 @@ def test_noise_of_many_snapshots_is_that_of_the_small_eigenvalues() -> None:
     rng = np.random.default_rng(0)
     for noise in (0.01, 1.0):
         model = CIRCLE.replace(n_snapshots=400, noise=noise)
-        Y = model.looks(model.simulate([0.3, -2.0], rng.standard_normal((400, 2)) + 0j, rng))
+        Y = model.snapshots(model.simulate([0.3, -2.0], rng.standard_normal((400, 2)) + 0j, rng))
         assert noise_from_eigenvalues(Y)[0] == pytest.approx(noise, rel=0.3)
 
 
