@@ -50,6 +50,8 @@ class CombinedMotion(MotionModel):
     ('x', 'vx', 'y', 'vy', 'log_amplitude')
     """
 
+    former_names = ("Stacked",)
+
     first: MotionModel
     second: MotionModel
     names: tuple[str, ...] | None

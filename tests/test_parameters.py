@@ -237,13 +237,18 @@ def test_models_are_named_by_the_public_package() -> None:
     assert Drift().to_dict()["type"].endswith("test_parameters:Drift")
 
 
-def test_old_class_path_is_refused_with_the_public_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    old = "arrivals.measurement_models.snapshots:ArraySnapshot"
-    with pytest.raises(ValueError, match=r"called 'arrivals.measurement_models:ArraySnapshot'"):
-        MeasurementModel.from_dict(SNAPSHOTS.to_dict() | {"type": old})
-    monkeypatch.setattr(RandomWalk, "former_names", ("Wandering",))
-    with pytest.raises(ValueError, match=r"is now called 'arrivals.motion_models:RandomWalk'"):
-        Configurable.from_dict({"type": "arrivals.motion_models.linear:Wandering", "q": 1.0})
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("arrivals.measurement_models.snapshots:ArraySnapshot", "measurement_models:ArraySnapshot"),
+        ("arrivals.motion_models.stacked:Stacked", "motion_models:CombinedMotion"),
+        ("arrivals.motion_models:Stacked", "motion_models:CombinedMotion"),
+        ("arrivals.trackers.kalman_type:KalmanType", "trackers:GaussianFilter"),
+    ],
+)
+def test_old_class_path_is_refused_with_the_public_one(old: str, new: str) -> None:
+    with pytest.raises(ValueError, match=f"no class '{old}': it is now called 'arrivals.{new}'"):
+        Configurable.from_dict({"type": old})
 
 
 def test_configuration_does_not_import_other_packages() -> None:

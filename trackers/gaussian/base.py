@@ -80,6 +80,8 @@ class GaussianFilter(Tracker):
     (array([1.5]), array([[1.]]), array([3.]), array([[0.5]]))
     """
 
+    former_names = ("KalmanType",)
+
     motion: MotionModel
     measurement: MeasurementModel
 
