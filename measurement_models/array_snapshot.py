@@ -178,7 +178,7 @@ class ArraySnapshot(SingleSourceSnapshot):
         values = np.asarray(np.nan if z is None else z)
         if values.dtype.kind in "fc" and values.size and np.isnan(values).all():
             return None
-        return ObservedSnapshots.of(self.looks(values), self.manifold(reference))
+        return ObservedSnapshots.from_measurement(self.looks(values), self.manifold(reference))
 
     def looks(self, z: ArrayLike) -> Complex:
         """Return a measurement with the axes of a `Manifold`: (n_bins, n_sensors, n_snapshots)."""

@@ -279,7 +279,7 @@ def test_manifold_has_room_for_more_axes() -> None:
     manifold = MODELS[0].manifold()
     assert manifold.steering(np.zeros(4)).shape == (1, manifold.n_bins, 5, 4)
     assert manifold.coefficients is None
-    assert not manifold.mirror
+    assert not manifold.front_back_ambiguous
     assert manifold.nuisance_weights.tolist() == [1.0]
     with pytest.raises(ValueError, match="reference must be one of"):
         MODELS[0].manifold("last")  # type: ignore[arg-type]

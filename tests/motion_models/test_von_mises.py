@@ -316,7 +316,7 @@ def test_walk_wraps_its_states() -> None:
 def test_a_walk_in_direction_widens_by_the_same_angle_everywhere() -> None:
     """σ_θ = σ_β dθ/dβ: the concentration of the step is of each component."""
     walk, slope = VonMisesWalk(sigma_doa=0.02), np.array([3.0, 1.0, 0.3])
-    np.testing.assert_allclose(walk.step(slope), (0.02 * slope) ** -2.0)
+    np.testing.assert_allclose(walk.step_concentration(slope), (0.02 * slope) ** -2.0)
     widened = walk.blur([np.inf] * 3, slope=slope)
     np.testing.assert_allclose(1 / np.sqrt(widened) / slope, 0.02, rtol=1e-3)
     twice = walk.blur(walk.blur([50.0, 500.0, 5000.0], slope=slope), slope=slope)

@@ -206,9 +206,9 @@ def test_an_asymmetric_scene_keeps_the_packages_sign() -> None:
     doa = np.deg2rad(35.0)
     arrival = -array.positions[:, 0] * np.sin(doa)  # s after the origin
     assert arrival.argmin() == 3
-    lag = model.places * model.delay(doa)
+    lag = model.grid_index * model.delay(doa)
     np.testing.assert_allclose(lag - lag.min(), arrival - arrival.min(), atol=1e-12)
-    assert model.places.tolist() == [4, 2, 1, 0]
+    assert model.grid_index.tolist() == [4, 2, 1, 0]
     frame = model.frame(np.array([1.0, 2.0, 3.0, 4.0]))
     np.testing.assert_array_equal(frame, [4.0, 3.0, 2.0, np.nan, 1.0])
 

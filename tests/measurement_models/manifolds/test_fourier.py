@@ -114,7 +114,7 @@ def test_fewer_sensors_and_bins_are_the_smaller_array(model: ArraySnapshot) -> N
 
 def test_a_line_s_angle_folds_to_the_front() -> None:
     manifold = ArraySnapshot(SPARSE, [1.0, 1.7]).manifold()
-    assert manifold.mirror
+    assert manifold.front_back_ambiguous
     theta = np.deg2rad([0.0, 80.0, 100.0, 180.0, -100.0, 260.0])
     np.testing.assert_allclose(
         np.rad2deg(manifold.to_doa(theta)), [0, 80, 80, 0, -80, -80], atol=1e-9

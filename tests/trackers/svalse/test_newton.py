@@ -237,13 +237,13 @@ class Explicit(UniformLineManifold):
 
     @property
     def coefficients(self) -> Any:
-        return np.eye(len(self.places), dtype=np.complex128)[None, None]
+        return np.eye(len(self.grid_index), dtype=np.complex128)[None, None]
 
 
 def test_a_response_with_coefficients_takes_the_same_steps() -> None:
     line = GAPS.manifold()
     assert isinstance(line, UniformLineManifold)
-    explicit = Explicit(line.places, line.step, line.origin, line.reference)
+    explicit = Explicit(line.grid_index, line.step, line.origin, line.reference)
     state = scene(0, GAPS)
     one, other = ExpectedResponse(line), ExpectedResponse(explicit)
     assert other.extent == pytest.approx(one.extent)
