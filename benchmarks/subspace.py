@@ -126,12 +126,12 @@ def errors(case: Case, runs: int, rng: np.random.Generator) -> dict[str, float]:
     """Return the median RMSE of each method, degrees."""
     line, y = snapshots(case, runs, rng)
     V, W = eigenvectors(y, case.forgetting), past_bases(y, case.forgetting)
-    order = np.argsort(line.places)
+    order = np.argsort(line.grid_index)
     first, second = order[:-1], order[1:]
     theta = {
         "esprit": esprit_angles(V[..., :2], first, second),
         "past": esprit_angles(W, first, second),
-        "root_music": root_music_angles(V[..., 2:], line.places, 2),
+        "root_music": root_music_angles(V[..., 2:], line.grid_index, 2),
     }
     start = 40 if case.moving else 100
     median = {}
@@ -207,9 +207,9 @@ def music_speed(n_snapshots: int = 50) -> None:
     array = SensorArray.ula(15, c / frequency / 2)
     model = ArraySnapshot(array, c / frequency, noise=0.1)
     y = two_sources(model, n_snapshots)
-    places = np.stack([array.positions[:, 0], np.zeros(15)])
+    positions = np.stack([array.positions[:, 0], np.zeros(15)])
     grid = np.linspace(0, np.pi, 361)  # counted from endfire
-    peer = pyroomacoustics.doa.MUSIC(places, rate, n_fft, c=c, num_src=2, azimuth=grid)
+    peer = pyroomacoustics.doa.MUSIC(positions, rate, n_fft, c=c, num_src=2, azimuth=grid)
     spectra = np.zeros((15, n_fft // 2 + 1, n_snapshots), dtype=complex)
     bin_ = round(frequency * n_fft / rate)
     spectra[:, bin_] = y.T

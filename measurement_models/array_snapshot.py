@@ -177,7 +177,7 @@ class ArraySnapshot(SingleSourceSnapshot):
         z = np.asarray(np.nan if z is None else z)
         if z.dtype.kind in "fc" and z.size and np.isnan(z).all():
             return None
-        return ObservedSnapshots.of(self.snapshots(z), self.manifold(reference))
+        return ObservedSnapshots.from_measurement(self.snapshots(z), self.manifold(reference))
 
     def snapshots(self, z: ArrayLike) -> Complex:
         """Return a measurement with the axes of a `Manifold`: (n_bins, n_sensors, n_snapshots)."""

@@ -34,8 +34,8 @@ class ObservedSnapshots:
     full_manifold: Manifold | None = None
 
     @classmethod
-    def of(cls, Y: Complex, manifold: Manifold | None = None) -> ObservedSnapshots:
-        """Leave out bins and snapshots without a number, then sensors with a gap in the others.
+    def from_measurement(cls, Y: Complex, manifold: Manifold | None = None) -> ObservedSnapshots:
+        """Remove bins and snapshots without data, then sensors with a gap in the others.
 
         Bins of zeros alone are left out, too, as long as others have data.
 
@@ -59,7 +59,7 @@ class ObservedSnapshots:
         --------
         >>> Y = np.ones((2, 3, 4), dtype=complex)
         >>> Y[1], Y[0, 2, 3] = np.nan, np.nan
-        >>> observed = ObservedSnapshots.of(Y)
+        >>> observed = ObservedSnapshots.from_measurement(Y)
         >>> observed.bins, observed.sensors, observed.snapshots.shape
         (array([ True, False]), array([ True,  True, False]), (1, 2, 4))
         """
@@ -71,10 +71,10 @@ class ObservedSnapshots:
         times = np.asarray(valid.any(axis=(0, 1)))
         sensors = np.asarray(valid[bins][:, :, times].all(axis=(0, 2)))
         if not sensors.any():
-            most = int(valid.sum(axis=1).max())
+            n_valid = int(valid.sum(axis=1).max())
             raise ValueError(
                 "z must have sensors without a gap in any bin and snapshot; got at most "
-                f"{most} of {Y.shape[1]} sensors at once, each with a NaN elsewhere"
+                f"{n_valid} of {Y.shape[1]} sensors at once, each with a NaN elsewhere"
             )
         has_power = (np.where(valid, Y, 0)[:, sensors][:, :, times] != 0).any(axis=(1, 2))
         if has_power.any():
@@ -85,7 +85,9 @@ class ObservedSnapshots:
     def manifold(self) -> Manifold:
         """Response of the valid sensors at the valid bins."""
         if self.full_manifold is None:
-            raise ValueError("manifold must be passed to ObservedSnapshots.of; got None")
+            raise ValueError(
+                "manifold must be passed to ObservedSnapshots.from_measurement; got None"
+            )
         at_bins = self.full_manifold.only(np.flatnonzero(self.bins))
         return at_bins.without(np.flatnonzero(~self.sensors))
 
@@ -124,16 +126,16 @@ def complex_snapshot(z: ArrayLike, shape: tuple[int, ...]) -> Complex:
     return array
 
 
-def updated(known: Float, bins: Bool, values: Float | None) -> Float:
-    """Return the noise of all bins: new values where there are some.
+def merge_noise(noise: Float, bins: Bool, values: Float | None) -> Float:
+    """Return the noise of all bins, with new values of the valid ones.
 
     Examples
     --------
-    >>> updated(np.array([1.0, 2.0]), np.array([False, True]), np.array([5.0]))
+    >>> merge_noise(np.array([1.0, 2.0]), np.array([False, True]), np.array([5.0]))
     array([1., 5.])
     """
     if values is None:
-        return known
-    fresh = known.copy()
-    fresh[bins] = values
-    return fresh
+        return noise
+    merged = noise.copy()
+    merged[bins] = values
+    return merged

@@ -72,8 +72,8 @@ class MotionModel(FrozenModel, ABC):
 
     def sample(self, x: ArrayLike, rng: np.random.Generator, dt: float = 1.0) -> Float:
         """Draw states after `dt`, each with its own noise: (..., dim_x) -> (..., dim_x)."""
-        moved = self.f(x, dt)
-        return moved + gaussian(self.Q(dt), moved.shape[:-1], rng)
+        mean = self.f(x, dt)
+        return mean + gaussian(self.Q(dt), mean.shape[:-1], rng)
 
 
 class LinearMotionModel(MotionModel):

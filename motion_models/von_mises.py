@@ -205,7 +205,7 @@ class VonMisesWalk(MotionModel):
     --------
     >>> VonMisesWalk(kappa=100.0).Q().round(4)
     array([[0.0101]])
-    >>> VonMisesWalk(sigma_doa=0.1).step([1.0, 0.5])
+    >>> VonMisesWalk(sigma_doa=0.1).step_concentration([1.0, 0.5])
     array([100., 400.])
     """
 
@@ -222,7 +222,7 @@ class VonMisesWalk(MotionModel):
                 f"got kappa={self.kappa}, sigma_doa={self.sigma_doa}"
             )
 
-    def step(self, slope: ArrayLike = 1.0) -> Float:
+    def step_concentration(self, slope: ArrayLike = 1.0) -> Float:
         """Return the concentration of the step per unit of time.
 
         Parameters
@@ -241,7 +241,7 @@ class VonMisesWalk(MotionModel):
 
     @property
     def state_names(self) -> tuple[str, ...]:
-        """Doa."""
+        """The name doa."""
         return ("doa",)
 
     @property
@@ -259,7 +259,9 @@ class VonMisesWalk(MotionModel):
 
     def Q(self, dt: float = 1.0) -> Float:
         """Return the variance of the wrapped normal step of the same A, -2 ln A(κ) dt, in rad²."""
-        return np.full((1, 1), -2 * log_bessel_ratio(self.step()) * not_negative("dt", dt))
+        return np.full(
+            (1, 1), -2 * log_bessel_ratio(self.step_concentration()) * not_negative("dt", dt)
+        )
 
     def blur(self, kappa: ArrayLike, dt: float = 1.0, slope: ArrayLike = 1.0) -> Float:
         """Return the concentration after a step of densities that had concentration `kappa`.
@@ -274,7 +276,7 @@ class VonMisesWalk(MotionModel):
         dt : float
             Not negative.
         slope : array_like, shape (...)
-            As in `step`.
+            As in `step_concentration`.
 
         Returns
         -------
@@ -290,10 +292,10 @@ class VonMisesWalk(MotionModel):
         >>> VonMisesWalk(kappa=100.0).blur([0.0, 100.0, np.inf]).round(2)
         array([  0.  ,  50.25, 100.  ])
         """
-        step = not_negative("dt", dt) * log_bessel_ratio(self.step(slope))
-        return from_log_ratio(log_bessel_ratio(kappa) + step)
+        log_ratio = not_negative("dt", dt) * log_bessel_ratio(self.step_concentration(slope))
+        return from_log_ratio(log_bessel_ratio(kappa) + log_ratio)
 
     def sample(self, x: ArrayLike, rng: np.random.Generator, dt: float = 1.0) -> Float:
         """Draw angles after one von Mises step, of concentration A⁻¹(A(κ)^dt)."""
-        moved = self.f(x, dt)
-        return wrap(moved + rng.vonmises(0.0, self.blur(np.inf, dt), moved.shape))
+        mean = self.f(x, dt)
+        return wrap(mean + rng.vonmises(0.0, self.blur(np.inf, dt), mean.shape))

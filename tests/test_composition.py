@@ -122,7 +122,7 @@ def test_direction_and_amplitude_are_tracked_from_snapshots() -> None:
         assert np.sqrt((error[:, 1:] ** 2).mean()) < 0.25
 
 
-def test_particle_filter_weighs_complex_and_composite_snapshots_alike() -> None:
+def test_particle_filter_weights_of_complex_and_composite_snapshots_are_equal() -> None:
     walk = DirectionAmplitudeWalk(VonMisesWalk(500.0), amplitude_noise=0.02)
     z = SNAPSHOT.simulate([0.3], [1.0 + 0.5j], np.random.default_rng(0))
     for motion, x in ((walk, [0.2, 1.0, 0.5]), (VonMisesWalk(500.0), [0.2])):
@@ -265,7 +265,7 @@ def test_numerical_jacobian_equals_that_of_the_models() -> None:
         np.testing.assert_allclose(seen.H(place), BEARINGS.H(place), rtol=1e-6, atol=1e-8)
 
 
-def test_functions_of_one_state_and_of_many_give_the_same() -> None:
+def test_functions_of_one_state_and_of_many_are_equal() -> None:
     one = FunctionMotion(turning, Q=np.eye(2), names=["angle", "rate"], angles=[0])
     many = FunctionMotion(turning_all, Q=np.eye(2), vectorized=True)
     x = np.random.default_rng(0).standard_normal((3, 4, 2))
@@ -311,12 +311,12 @@ def test_function_measurement_runs_in_a_filter_with_named_entries() -> None:
         (lambda: DirectionAmplitudeWalk(VonMisesWalk(9.0), -1), ValueError, "amplitude_noise must"),
     ],
 )  # fmt: skip
-def test_nonsense_is_refused(call: Any, error: type[Exception], message: str) -> None:
+def test_invalid_arguments_are_refused(call: Any, error: type[Exception], message: str) -> None:
     with pytest.raises(error, match=message):
         call()
 
 
-def test_linear_parts_stay_linear() -> None:
+def test_combination_of_linear_parts_is_linear() -> None:
     walk = CombinedMotion(RandomWalk(0.1), LOUDNESS)
     matrix = LinearMeasurement(np.eye(3)[:1], [[1.0]])
     tracker = Kalman(walk, CombinedMeasurement(matrix, matrix), np.zeros(3), np.eye(3))

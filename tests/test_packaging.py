@@ -193,7 +193,7 @@ def test_imports_run_one_way(place: str) -> None:
         ("arrivals/validation.py", "def f():\n    from arrivals.motion_models import RandomWalk"),
     ],
 )
-def test_import_in_the_wrong_direction_is_seen(place: str, source: str) -> None:
+def test_import_in_the_wrong_direction_is_detected(place: str, source: str) -> None:
     assert violations(place, source)
 
 

@@ -102,7 +102,7 @@ def test_replace_returns_a_new_model() -> None:
         walk.kappa = 1.0  # type: ignore[misc]
 
 
-def test_models_are_shared_by_copies_and_rebuilt_by_pickle() -> None:
+def test_models_are_shared_by_copies_and_remade_by_pickle() -> None:
     motion = LinearMotion([[1.0, 1.0], [0.0, 1.0]], np.eye(2))
     for model in (motion, SNAPSHOTS, RandomWalk(q=0.5)):
         assert copy.copy(model) is model
@@ -170,7 +170,9 @@ def test_list_of_parts_survives_the_round_trip() -> None:
         ({"type": "cbf", "measurement": 1}, TypeError, "measurement must be a ArraySnapshot|an Ar"),
     ],
 )
-def test_bad_configuration_is_refused(config: Any, error: type[Exception], message: str) -> None:
+def test_invalid_configuration_is_refused(
+    config: Any, error: type[Exception], message: str
+) -> None:
     with pytest.raises(error, match=message):
         Tracker.from_dict(config)
 

@@ -16,17 +16,17 @@ def grid_spacing(coordinates: ArrayLike, tolerance: float = 1e-3) -> float | Non
     >>> grid_spacing([0.0, 1.5, 3.5]), grid_spacing([0.0, 1.0, 2.7183]), grid_spacing([0.0])
     (0.5, None, None)
     """
-    places = np.unique(np.asarray(coordinates, dtype=np.float64))
-    places = places - places[0]
-    gaps = sorted(np.diff(places).tolist())
-    finest = int(4096 * gaps[0] / places[-1]) if gaps else 0
+    points = np.unique(np.asarray(coordinates, dtype=np.float64))
+    points = points - points[0]
+    gaps = sorted(np.diff(points).tolist())
+    finest = int(4096 * gaps[0] / points[-1]) if gaps else 0
     for parts in range(1, finest + 1):
         spacing, span, n_points = gaps[0] / parts, 0.0, 0
         for gap in gaps:  # larger gaps count more points and make the spacing more exact
             n_points += round(gap / spacing)
             span += gap
             spacing = span / n_points
-        off = np.abs(places - spacing * np.rint(places / spacing)).max()
+        off = np.abs(points - spacing * np.rint(points / spacing)).max()
         if off <= tolerance / parts * spacing:
             return float(spacing)
     return None

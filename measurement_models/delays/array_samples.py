@@ -40,7 +40,7 @@ class ArraySamples(FrozenModel):
     ----------
     kappa : float
         κ, the delay between neighbouring grid points at endfire, samples.
-    places : ndarray of int, shape (n_sensors,)
+    grid_index : ndarray of int, shape (n_sensors,)
         Grid point of each sensor, counted from the largest coordinate.
 
     Raises
@@ -69,7 +69,7 @@ class ArraySamples(FrozenModel):
     snr_db: float = 0.0
     power: float | None = None
     kappa: float = field(init=False, repr=False, compare=False)
-    places: Int = field(init=False, repr=False, compare=False)
+    grid_index: Int = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         instance("array", self.array, SensorArray)
@@ -88,10 +88,10 @@ class ArraySamples(FrozenModel):
         if self.array.speed is None:
             raise ValueError("the array has no wave speed: give speed, m/s")
         p = self.array.positions[:, 0]
-        places = np.rint((p.max() - p) / spacing).astype(np.int64)
-        places.setflags(write=False)
+        grid_index = np.rint((p.max() - p) / spacing).astype(np.int64)
+        grid_index.setflags(write=False)
         object.__setattr__(self, "kappa", self.rate * spacing / self.array.speed)
-        object.__setattr__(self, "places", places)
+        object.__setattr__(self, "grid_index", grid_index)
         if 2 * self.correlation.highest * self.kappa > 1 + 1e-6:
             limit = self.rate / (2 * self.kappa)
             raise ValueError(
@@ -105,12 +105,12 @@ class ArraySamples(FrozenModel):
         return float(10 ** (-self.snr_db / 10))
 
     @property
-    def n_places(self) -> int:
+    def n_grid_points(self) -> int:
         """Number of grid points from the first sensor to the last."""
-        return int(self.places.max()) + 1
+        return int(self.grid_index.max()) + 1
 
     def frame(self, z: ArrayLike) -> Float:
-        """Return snapshots on the grid: (..., n_sensors) -> (..., n_places), NaN where none is.
+        """Return snapshots on the grid: (..., n_sensors) -> (..., n_grid_points), else NaN.
 
         Raises
         ------
@@ -127,8 +127,8 @@ class ArraySamples(FrozenModel):
                 f"a snapshot must have shape (..., {self.array.n_sensors}), one sample a sensor; "
                 f"got {z.shape}"
             )
-        frame = np.full((*z.shape[:-1], self.n_places), np.nan)
-        frame[..., self.places] = np.where(np.isfinite(z), z, np.nan)
+        frame = np.full((*z.shape[:-1], self.n_grid_points), np.nan)
+        frame[..., self.grid_index] = np.where(np.isfinite(z), z, np.nan)
         return frame
 
     def delay(self, doa: ArrayLike) -> Float:

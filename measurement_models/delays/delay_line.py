@@ -7,6 +7,7 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -121,8 +122,8 @@ class DelayLine(SourceAtCentre):
     kappa : float
         Largest delay between neighbours, samples: a band needs taps as far as ±κ(N-1)/2 and two
         more; tones need two taps each.
-    drive : float, optional
-        q_s, what is new in the source at every snapshot beyond its correlation: 1e-2 for tones,
+    process_noise : float, optional
+        q_s, variance gained by the source at every snapshot beyond its correlation: 1e-2 for tones,
         1e-3 for a band if None. Sources that move need it: their phase at the centre drifts.
 
     Notes
@@ -137,17 +138,19 @@ class DelayLine(SourceAtCentre):
     array([0.707, 1.   , 0.707])
     """
 
+    renamed: ClassVar[dict[str, str]] = {"drive": "process_noise"}
+
     correlation: SourceCorrelation
     kappa: float
-    drive: float | None = None
+    process_noise: float | None = None
 
     def __post_init__(self) -> None:
         count("n_sensors", self.n_sensors, minimum=2)
         positive("noise_ratio", self.noise_ratio)
         instance("correlation", self.correlation, SourceCorrelation)  # type: ignore[type-abstract]  # any
         positive("kappa", self.kappa)
-        if self.drive is not None:
-            positive("drive", self.drive)
+        if self.process_noise is not None:
+            positive("process_noise", self.process_noise)
 
     @property
     def offsets(self) -> tuple[int, ...]:
@@ -186,10 +189,12 @@ class DelayLine(SourceAtCentre):
         """Error of that prediction, and q_s, on the newest sample."""
         n = self.dim_source
         tones = self.correlation.order is not None
-        drive = (1e-2 if tones else 1e-3) if self.drive is None else self.drive
+        process_noise = (
+            (1e-2 if tones else 1e-3) if self.process_noise is None else self.process_noise
+        )
         Q = np.zeros((n, n))
         predicted = float(self.transition[0] @ self.correlation.rho(np.arange(1, n + 1)))
-        Q[0, 0] = max(1 - predicted, 0.0) + drive
+        Q[0, 0] = max(1 - predicted, 0.0) + process_noise
         return Q
 
     @property
@@ -231,7 +236,7 @@ class Phasor(SourceAtCentre):
         ε, noise power over source power.
     frequency : float
         Cycles per sample.
-    drive : float
+    process_noise : float
         Variance gained by u and by v at every snapshot.
 
     Notes
@@ -244,13 +249,15 @@ class Phasor(SourceAtCentre):
     array([0.707, 1.   , 0.707])
     """
 
+    renamed: ClassVar[dict[str, str]] = {"drive": "process_noise"}
+
     frequency: float
-    drive: float = 1e-2
+    process_noise: float = 1e-2
 
     def __post_init__(self) -> None:
         count("n_sensors", self.n_sensors, minimum=2)
         positive("noise_ratio", self.noise_ratio)
-        positive("drive", self.drive)
+        positive("process_noise", self.process_noise)
         if not 0 < number("frequency", self.frequency) < 0.5:
             raise ValueError(
                 "frequency must lie above 0 and below half the sampling rate, 0.5 cycles per "
@@ -280,8 +287,8 @@ class Phasor(SourceAtCentre):
 
     @property
     def innovation(self) -> Float:
-        """The same drive of both."""
-        return self.drive * np.eye(2)
+        """Process noise of both quadratures."""
+        return self.process_noise * np.eye(2)
 
     @property
     def covariance(self) -> Float:

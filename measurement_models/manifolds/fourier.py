@@ -51,8 +51,8 @@ class FourierManifold:
     """A response a(θ) = G d(θ), d_k = exp(jkθ), k = -K..K, in the direction itself.
 
     θ is the azimuth, or, of a line, the direction from broadside continued to the whole circle,
-    where β and π - β have one response (`mirror`). Phases are counted at the centroid of the
-    sensors, or at the first of them.
+    where β and π - β have one response (`front_back_ambiguous`).
+    Phases are counted at the centroid of the sensors, or at the first of them.
 
     Parameters
     ----------
@@ -92,8 +92,8 @@ class FourierManifold:
         return np.arange(-degree, degree + 1)
 
     @property
-    def mirror(self) -> bool:
-        """Whether two angles stand for one direction: on a line."""
+    def front_back_ambiguous(self) -> bool:
+        """True if two angles stand for one direction: on a line."""
         return self.waves.is_line
 
     @property
@@ -114,7 +114,7 @@ class FourierManifold:
     def to_doa(self, theta: ArrayLike, slack: ArrayLike = 0.0) -> Float:
         """Return directions, rad; of a line, those in front. Every angle has one."""
         doa = (np.asarray(theta, dtype=np.float64) + np.pi) % (2 * np.pi) - np.pi
-        if not self.mirror:
+        if not self.front_back_ambiguous:
             return np.asarray(doa)
         return np.where(np.abs(doa) > np.pi / 2, np.copysign(np.pi, doa) - doa, doa)
 

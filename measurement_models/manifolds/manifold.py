@@ -47,8 +47,8 @@ class Manifold(Protocol):
         """The matrices G; None stands for the identity, and no product is formed."""
 
     @property
-    def mirror(self) -> bool:
-        """Whether two angles stand for one direction."""
+    def front_back_ambiguous(self) -> bool:
+        """True if two angles stand for one direction."""
 
     @property
     def nuisance_weights(self) -> Float:

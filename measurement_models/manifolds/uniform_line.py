@@ -24,7 +24,7 @@ class UniformLineManifold:
 
     Parameters
     ----------
-    places : ndarray of int, shape (n_sensors,)
+    grid_index : ndarray of int, shape (n_sensors,)
         Grid points of the sensors, in their order.
     step : float
         Largest electrical angle of a plane wave, 2π d/λ, rad.
@@ -43,7 +43,7 @@ class UniformLineManifold:
     array([30.])
     """
 
-    places: Int
+    grid_index: Int
     step: float
     origin: float
     reference: Reference = "middle"
@@ -54,7 +54,7 @@ class UniformLineManifold:
     @property
     def n_sensors(self) -> int:
         """Number of sensors."""
-        return len(self.places)
+        return len(self.grid_index)
 
     @property
     def n_bins(self) -> int:
@@ -62,17 +62,17 @@ class UniformLineManifold:
         return 1
 
     @property
-    def reference_place(self) -> int:
+    def reference_index(self) -> int:
         """Grid point at which the phase is counted."""
         if self.reference == "first":
-            return int(self.places[0])
-        off = np.abs(self.places - (self.places.mean() + 1e-9))
-        return int(self.places[np.argmin(off)])
+            return int(self.grid_index[0])
+        off = np.abs(self.grid_index - (self.grid_index.mean() + 1e-9))
+        return int(self.grid_index[np.argmin(off)])
 
     @property
     def harmonics(self) -> Int:
         """Grid points of the sensors, counted from the reference."""
-        return self.places - self.reference_place
+        return self.grid_index - self.reference_index
 
     @property
     def coefficients(self) -> None:
@@ -80,7 +80,7 @@ class UniformLineManifold:
         return
 
     @property
-    def mirror(self) -> bool:
+    def front_back_ambiguous(self) -> bool:
         """Return False: each electrical angle has one direction."""
         return False
 
@@ -125,7 +125,7 @@ class UniformLineManifold:
 
     def to_amplitude(self, w: ArrayLike, theta: ArrayLike) -> Complex:
         """Return amplitudes at the origin of the array's coordinates."""
-        shift = self.origin - self.reference_place
+        shift = self.origin - self.reference_index
         return np.asarray(np.asarray(w) * np.exp(1j * shift * np.asarray(theta)))
 
     def without(self, sensors: Sequence[int] | Int) -> UniformLineManifold:
@@ -142,8 +142,8 @@ class UniformLineManifold:
 @lru_cache(maxsize=256)
 def _line_without(line: UniformLineManifold, sensors: tuple[int, ...]) -> UniformLineManifold:
     """Return a line without some sensors; cached, as are the results derived from it."""
-    places = np.delete(line.places, sensors)
-    return UniformLineManifold(places, line.step, line.origin, line.reference)
+    grid_index = np.delete(line.grid_index, sensors)
+    return UniformLineManifold(grid_index, line.step, line.origin, line.reference)
 
 
 @lru_cache(maxsize=256)
@@ -155,6 +155,6 @@ def grid_line(
     if spacing is None or wavelength < 2 * spacing * (1 - 1e-6):
         return None
     coordinates = array.positions[:, 0]
-    places = np.rint((coordinates - coordinates.min()) / spacing).astype(np.int64)
+    grid_index = np.rint((coordinates - coordinates.min()) / spacing).astype(np.int64)
     step = min(2 * np.pi * spacing / wavelength, np.pi)
-    return UniformLineManifold(places, step, -float(coordinates.min()) / spacing, reference)
+    return UniformLineManifold(grid_index, step, -float(coordinates.min()) / spacing, reference)

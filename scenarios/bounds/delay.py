@@ -106,9 +106,9 @@ def exact_bound(measurement: ArraySamples, doa: float, n_steps: int) -> float:
     >>> round(float(np.rad2deg(exact_bound(model, np.deg2rad(60.0), 25))), 3)
     0.71
     """
-    k, j = np.divmod(np.arange(count("n_steps", n_steps) * len(measurement.places)),
-                     len(measurement.places))  # fmt: skip
-    apart = np.subtract.outer(measurement.places[j], measurement.places[j])
+    k, j = np.divmod(np.arange(count("n_steps", n_steps) * len(measurement.grid_index)),
+                     len(measurement.grid_index))  # fmt: skip
+    apart = np.subtract.outer(measurement.grid_index[j], measurement.grid_index[j])
     lag = np.subtract.outer(k, k) - apart * measurement.delay(doa)
     C = measurement.correlation.rho(lag) + measurement.noise_ratio * np.eye(len(k))
     slope = -apart * measurement.correlation.drho(lag)
@@ -118,8 +118,8 @@ def exact_bound(measurement: ArraySamples, doa: float, n_steps: int) -> float:
 
 def _aperture(measurement: ArraySamples) -> float:
     """Return Σ (j - mean)², which is N(N²-1)/12 for a line without gaps."""
-    places: Float = measurement.places.astype(np.float64)
-    return float(((places - places.mean()) ** 2).sum())
+    grid_index: Float = measurement.grid_index.astype(np.float64)
+    return float(((grid_index - grid_index.mean()) ** 2).sum())
 
 
 def _angle_std(measurement: ArraySamples, doa: float, information: float) -> float:

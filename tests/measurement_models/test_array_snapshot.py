@@ -46,9 +46,7 @@ def dense_log_likelihood(model: ArraySnapshot, z: Complex, doa: ArrayLike) -> fl
 
 @every_model
 @pytest.mark.parametrize("doa", [[0.3], [0.3, -1.1], [-0.9, 0.3, 0.35]])
-def test_log_likelihood_is_that_of_the_dense_gaussian(
-    model: ArraySnapshot, doa: list[float]
-) -> None:
+def test_log_likelihood_equals_the_dense_gaussian(model: ArraySnapshot, doa: list[float]) -> None:
     z = snapshot(model)
     expected = dense_log_likelihood(model, z, doa)
     assert model.log_likelihood(z, doa) == pytest.approx(expected, rel=1e-10)
@@ -64,7 +62,7 @@ def test_log_likelihood_leaves_missing_sensors_out(model: ArraySnapshot) -> None
 
 
 @every_model
-def test_log_likelihood_takes_batches_of_directions(model: ArraySnapshot) -> None:
+def test_log_likelihood_accepts_batches_of_directions(model: ArraySnapshot) -> None:
     z = snapshot(model)
     doa = np.random.default_rng(1).uniform(-1.5, 1.5, (3, 4, 2))
     values = model.log_likelihood(z, doa)
@@ -72,13 +70,13 @@ def test_log_likelihood_takes_batches_of_directions(model: ArraySnapshot) -> Non
     assert values[2, 1] == pytest.approx(dense_log_likelihood(model, z, doa[2, 1]), rel=1e-10)
 
 
-def test_log_likelihood_of_no_source_is_that_of_noise() -> None:
+def test_log_likelihood_without_source_equals_that_of_noise() -> None:
     model, z = MODELS[0], snapshot(MODELS[0])
     expected = multivariate_normal(np.zeros(10), model.R).logpdf(composite(z))
     assert model.log_likelihood(z, []) == pytest.approx(expected, rel=1e-12)
 
 
-def test_log_likelihood_of_a_strong_prior_keeps_its_digits() -> None:
+def test_log_likelihood_of_a_large_power_keeps_its_digits() -> None:
     model = MODELS[0].replace(power=1e5, noise=1e-2)
     expected = dense_log_likelihood(model, snapshot(model), [0.3])
     assert model.log_likelihood(snapshot(model), [0.3]) == pytest.approx(expected, rel=1e-7)
@@ -88,7 +86,7 @@ def test_log_likelihood_of_a_strong_prior_keeps_its_digits() -> None:
 
 
 @every_model
-def test_jacobian_is_the_slope(model: ArraySnapshot) -> None:
+def test_jacobian_equals_numerical_slope(model: ArraySnapshot) -> None:
     x = np.array([0.4, 1.2, -0.7])
     steps = 1e-6 * np.eye(3)
     slope = (model.h(x + steps) - model.h(x - steps)).T / 2e-6
@@ -96,7 +94,7 @@ def test_jacobian_is_the_slope(model: ArraySnapshot) -> None:
 
 
 @every_model
-def test_gaussian_face_is_one_source(model: ArraySnapshot) -> None:
+def test_gaussian_interface_is_that_of_one_source(model: ArraySnapshot) -> None:
     x = np.array([[0.4, 1.2, -0.7], [-0.2, 0.0, 1.0]])
     quiet = model.replace(noise=1e-30)
     z = quiet.simulate(x[:, :1], x[:, 1:2] + 1j * x[:, 2:], np.random.default_rng(0))
@@ -110,7 +108,7 @@ def test_column_state_is_refused_with_the_cure() -> None:
         MODELS[0].h(np.zeros((3, 1)))
 
 
-def test_noise_has_the_covariance_that_R_says() -> None:
+def test_noise_has_covariance_R() -> None:
     model = MODELS[0]
     rng = np.random.default_rng(0)
     drawn = composite(model.simulate(np.zeros((20000, 1)), 0.0, rng))
@@ -120,7 +118,7 @@ def test_noise_has_the_covariance_that_R_says() -> None:
     np.testing.assert_allclose(np.cov(sampled.T), model.R, atol=0.012)
 
 
-def test_silent_sources_are_left_out_of_a_simulation() -> None:
+def test_inactive_sources_are_excluded_from_a_simulation() -> None:
     quiet = MODELS[0].replace(noise=1e-30)
     z = quiet.simulate([[0.3, np.nan], [np.nan, np.nan]], [1.0, np.nan], np.random.default_rng(0))
     np.testing.assert_allclose(z[0], LINE.steering_vector(0.3, 1.3), atol=1e-12)
@@ -130,7 +128,7 @@ def test_silent_sources_are_left_out_of_a_simulation() -> None:
 # what comes in
 
 
-def test_snapshot_keeps_its_argument_and_masks_what_is_no_number() -> None:
+def test_snapshot_copies_its_argument_and_sets_invalid_numbers_to_nan() -> None:
     given = np.array([1.0, np.inf, np.nan, 2j, 3.0])
     kept = given.copy()
     z = MODELS[0].snapshot(given)
@@ -150,7 +148,7 @@ def test_snapshot_keeps_its_argument_and_masks_what_is_no_number() -> None:
         (np.full(5, np.inf), ValueError, "no sensor of the snapshot gave a finite number"),
     ],
 )
-def test_bad_snapshot_is_refused(z: ArrayLike, error: type[Exception], message: str) -> None:
+def test_invalid_snapshot_is_refused(z: ArrayLike, error: type[Exception], message: str) -> None:
     with pytest.raises(error, match=message):
         MODELS[0].snapshot(z)
 
@@ -165,7 +163,7 @@ def test_bad_snapshot_is_refused(z: ArrayLike, error: type[Exception], message: 
         ({"wavelength": None}, TypeError, "wavelength must be a number"),
     ],
 )
-def test_bad_parameters_are_refused(
+def test_invalid_parameters_are_refused(
     changes: dict[str, Any], error: type[Exception], message: str
 ) -> None:
     with pytest.raises(error, match=message):
@@ -173,7 +171,7 @@ def test_bad_parameters_are_refused(
 
 
 @every_model
-def test_model_survives_pickle_and_configuration(model: ArraySnapshot) -> None:
+def test_model_makes_the_round_trip_of_pickle_and_configuration(model: ArraySnapshot) -> None:
     assert pickle.loads(pickle.dumps(model)) == model
     assert ArraySnapshot.from_dict(model.to_dict()) == model
     assert hash(ArraySnapshot.from_dict(model.to_dict())) == hash(model)
@@ -185,7 +183,7 @@ def test_model_survives_pickle_and_configuration(model: ArraySnapshot) -> None:
 @both_references
 @pytest.mark.parametrize("missing", [[], [0], [2, 3], [6]])
 @pytest.mark.parametrize("shift", [0.0, 0.7])
-def test_manifold_is_the_steering_vector_up_to_the_phase_of_the_amplitude(
+def test_manifold_equals_the_steering_vector_up_to_the_amplitude(
     reference: Reference, missing: list[int], shift: float
 ) -> None:
     """w a(θ) of the manifold and to_amplitude(w) a(β) of the array are the same snapshot."""
@@ -220,7 +218,7 @@ def test_order_of_the_sensors_is_kept() -> None:
 
 @settings(deadline=None)
 @given(st.floats(-np.pi / 2, np.pi / 2), st.floats(1.0, 4.0))
-def test_direction_and_angle_are_one_another(doa: float, wavelength: float) -> None:
+def test_to_doa_inverts_from_doa(doa: float, wavelength: float) -> None:
     manifold = ArraySnapshot(LINE, wavelength).manifold()
     # arcsin loses half the digits at endfire
     assert manifold.to_doa(manifold.from_doa(doa)) == pytest.approx(doa, abs=5e-5)
@@ -239,14 +237,14 @@ def test_angle_without_direction_is_nan_unless_within_its_slack() -> None:
 
 @settings(deadline=None)
 @given(st.floats(-1.2, 1.2))
-def test_std_of_the_direction_is_that_of_the_angle_by_the_slope(doa: float) -> None:
+def test_doa_std_is_the_angle_std_divided_by_the_slope(doa: float) -> None:
     manifold = MODELS[0].manifold()
     slope = 2 * np.pi * 0.5 / 1.3 * np.cos(doa)
     std = manifold.doa_std(manifold.from_doa(doa), 1e-5)
     assert std == pytest.approx(1e-5 / slope, rel=1e-4)
 
 
-def test_std_of_the_direction_is_finite_at_endfire() -> None:
+def test_doa_std_is_finite_at_endfire() -> None:
     manifold = MODELS[0].manifold()
     std = manifold.doa_std(manifold.from_doa([np.pi / 2, -np.pi / 2]), [0.01, 10.0])
     assert (std > 0).all()
@@ -254,7 +252,7 @@ def test_std_of_the_direction_is_finite_at_endfire() -> None:
 
 
 @both_references
-def test_manifold_without_sensors_hears_the_rest_alike(reference: Reference) -> None:
+def test_manifold_without_sensors_keeps_the_response_of_the_others(reference: Reference) -> None:
     whole = MODELS[0].manifold(reference)
     part = whole.without([0, 3])
     theta, w = np.array([0.3, -1.0]), np.array([1.0, 1j])
@@ -270,16 +268,16 @@ def test_manifold_without_sensors_hears_the_rest_alike(reference: Reference) -> 
     np.testing.assert_allclose(part.to_doa(theta), whole.to_doa(theta))
 
 
-def test_half_a_wavelength_is_the_widest_grid_with_an_electrical_angle() -> None:
+def test_electrical_angle_requires_at_most_half_a_wavelength() -> None:
     half: Float = ArraySnapshot(SensorArray.ula(5, 0.5), wavelength=1.0).manifold().from_doa(1.57)
     assert half == pytest.approx(np.pi, abs=1e-5)
 
 
-def test_manifold_has_room_for_more_axes() -> None:
+def test_manifold_arrays_have_nuisance_and_bin_axes() -> None:
     manifold = MODELS[0].manifold()
     assert manifold.steering(np.zeros(4)).shape == (1, manifold.n_bins, 5, 4)
     assert manifold.coefficients is None
-    assert not manifold.mirror
+    assert not manifold.front_back_ambiguous
     assert manifold.nuisance_weights.tolist() == [1.0]
     with pytest.raises(ValueError, match="reference must be one of"):
         MODELS[0].manifold("last")  # type: ignore[arg-type]

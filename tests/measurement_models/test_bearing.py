@@ -23,7 +23,7 @@ def slope(model: MeasurementModel, x: Float, step: float = 1e-6) -> Float:
 
 
 @given(coordinates, coordinates)
-def test_jacobian_of_bearings_is_the_slope(px: float, py: float) -> None:
+def test_bearing_jacobian_equals_numerical_slope(px: float, py: float) -> None:
     x = np.array([px, 1.0, py, -1.0, 0.2])
     model = Bearing(PLACES, 0.01)
     if np.hypot(*(PLACES - x[[0, 2]]).T).min() > 0.5:
@@ -31,7 +31,7 @@ def test_jacobian_of_bearings_is_the_slope(px: float, py: float) -> None:
 
 
 @given(st.floats(-np.pi, np.pi), coordinates, coordinates)
-def test_turning_the_scene_turns_the_bearings(turn: float, px: float, py: float) -> None:
+def test_rotated_scene_rotates_the_bearings(turn: float, px: float, py: float) -> None:
     R = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
     x = np.array([px, py])
     one, other = (Bearing(places, 0.01, (0, 1)) for places in (PLACES, PLACES @ R.T))
@@ -41,13 +41,13 @@ def test_turning_the_scene_turns_the_bearings(turn: float, px: float, py: float)
 
 
 @given(st.floats(-20, 20), st.floats(-20, 20))
-def test_residual_is_the_shorter_way_round(a: float, b: float) -> None:
+def test_residual_is_wrapped(a: float, b: float) -> None:
     d = Bearing(PLACES[:1], 0.01).residual([a], [b])
     assert -np.pi <= d[0] <= np.pi
     assert np.cos(d[0] - (a - b)) == pytest.approx(1.0)
 
 
-def test_bearings_take_leading_axes_and_any_layout_of_the_state() -> None:
+def test_bearings_accept_leading_axes_and_any_state_layout() -> None:
     x = np.random.default_rng(0).normal(size=(2, 5, 4))
     wide = Bearing(PLACES, 0.01)
     narrow = Bearing(PLACES, 0.01, position=(0, 1))
@@ -56,7 +56,7 @@ def test_bearings_take_leading_axes_and_any_layout_of_the_state() -> None:
     assert narrow.H(x[0, 0, :2]).shape == (3, 2)
 
 
-def test_a_sensors_own_place_has_no_slope() -> None:
+def test_bearing_at_the_sensor_position_has_zero_slope() -> None:
     assert not Bearing(PLACES[:1], 0.01, (0, 1)).H([0.0, 0.0]).any()
 
 
@@ -68,7 +68,7 @@ MODELS: list[FrozenModel] = [
 
 
 @pytest.mark.parametrize("model", MODELS, ids=["linear", "variance", "covariance"])
-def test_models_with_the_same_numbers_are_interchangeable(model: Any) -> None:
+def test_models_with_equal_numbers_are_equal(model: Any) -> None:
     twin = type(model)(**model.get_params())
     assert twin == model
     assert hash(twin) == hash(model)
@@ -99,6 +99,6 @@ def test_models_with_the_same_numbers_are_interchangeable(model: Any) -> None:
         (lambda: LinearMeasurement([[np.nan]], [[1.0]]), "matrix must be finite"),
     ],
 )
-def test_bad_numbers_are_refused(call: Any, message: str) -> None:
+def test_invalid_parameters_are_refused(call: Any, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         call()

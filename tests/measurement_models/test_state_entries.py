@@ -95,7 +95,7 @@ def test_needs_of_shipped_measurements(measurement: MeasurementModel, needs: str
     assert measurement.for_state(measurement.needs).h is not None
 
 
-def test_a_missing_entry_is_named() -> None:
+def test_missing_entry_raises_with_its_name() -> None:
     message = (
         r"measurement must read entries of the state: Phasor needs 'amplitude_re'; "
         r"got 'delay', 'delay_rate'$"
@@ -107,7 +107,7 @@ def test_a_missing_entry_is_named() -> None:
 
 
 @pytest.mark.parametrize("model", [BEARING, RSS], ids=["bearing", "rss"])
-def test_position_is_where_the_names_say(model: Bearing | LogNormalRSS) -> None:
+def test_position_follows_the_state_names(model: Bearing | LogNormalRSS) -> None:
     located = model.for_state(("vx", "y", "vy", "x"))
     assert located.position == (3, 1)
     assert located.for_state(("x", "y")) is located
@@ -124,7 +124,7 @@ def test_position_without_names_follows_the_size(model: Bearing | LogNormalRSS) 
         assert model.H(x).shape == (model.dim_z, len(x))
 
 
-def test_amplitude_is_where_the_names_say() -> None:
+def test_amplitude_follows_the_state_names() -> None:
     located = RSS.for_state(("log_amplitude", "x", "y"))
     assert (located.position, located.amplitude) == ((1, 2), 0)
     assert RSS.for_state(("x", "y")).amplitude is None
@@ -150,7 +150,7 @@ def test_entries_are_selected_from_a_longer_state() -> None:
     assert pickle.loads(pickle.dumps(model)) == model
 
 
-def test_models_whose_entries_stand_in_place_are_returned_as_they_are() -> None:
+def test_model_with_entries_in_order_is_returned_unchanged() -> None:
     assert DELAY.for_state(DelayDrift().state_names) is DELAY
     assert PHASOR.for_state(("delay", "delay_rate", "amplitude_re", "amplitude_im")) is PHASOR
     moved = PHASOR.for_state(("amplitude_re", "amplitude_im", "delay"))
@@ -189,7 +189,7 @@ class Walk(MotionModel):
         return dt * np.eye(self.dim_x)
 
 
-def test_fields_of_a_dataclass_serve_as_r_dim_z_dim_x() -> None:
+def test_dataclass_fields_implement_r_dim_z_dim_x() -> None:
     near, walk = Range(np.array([[0.01]])), Walk(2)
     ekf = EKF(walk, near, [3.0, 4.0], np.eye(2))
     for _ in range(5):
@@ -200,7 +200,7 @@ def test_fields_of_a_dataclass_serve_as_r_dim_z_dim_x() -> None:
     assert pickle.loads(pickle.dumps(near)).R == 0.01
 
 
-def test_a_model_without_r_or_dim_z_is_refused() -> None:
+def test_model_without_r_or_dim_z_is_refused() -> None:
     class NoNoise(MeasurementModel):
         dim_z = 1
 

@@ -49,7 +49,7 @@ def test_stationary_covariance_solves_lyapunovs_equation(model: AutoregressiveSo
     assert model.scaled([1.0, 2.0, 3.0]).power == pytest.approx([1.0, 2.0, 3.0])
 
 
-def test_samples_have_the_power_that_is_said() -> None:
+def test_samples_have_the_stationary_power() -> None:
     model, rng = RAGGED.scaled(2.0), np.random.default_rng(2)
     x = np.zeros((4000, model.dim_x))
     for _ in range(60):
@@ -60,7 +60,7 @@ def test_samples_have_the_power_that_is_said() -> None:
     assert abs((real * imaginary).mean(axis=0)).max() < 0.1
 
 
-def test_it_is_a_motion_of_filterpys_filter() -> None:
+def test_model_runs_in_filterpy_kalman_filter() -> None:
     kf = KalmanFilter(SPEECH.dim_x, 1)
     kf.F, kf.Q = SPEECH.F(kf.x), SPEECH.Q()
     kf.x, kf.P = np.ones((SPEECH.dim_x, 1)), SPEECH.stationary_covariance()
@@ -68,7 +68,7 @@ def test_it_is_a_motion_of_filterpys_filter() -> None:
     np.testing.assert_allclose(kf.P, SPEECH.stationary_covariance(), atol=1e-12)
 
 
-def test_lags_counted_in_either_order_are_the_same_state() -> None:
+def test_both_layouts_have_equal_models_up_to_permutation() -> None:
     one, other = companion_layout(RAGGED.orders), companion_layout(RAGGED.orders, lag_by_lag=True)
     F = one.transition(RAGGED.coefficient_matrix)
     G = other.transition(RAGGED.coefficient_matrix)
@@ -78,7 +78,7 @@ def test_lags_counted_in_either_order_are_the_same_state() -> None:
 
 
 @given(st.lists(st.floats(-2, 2), min_size=1, max_size=5))
-def test_stabilised_models_are_stable_and_stable_ones_stay(a: list[float]) -> None:
+def test_stabilised_models_are_stable_and_stable_ones_unchanged(a: list[float]) -> None:
     coefficients = np.array(a)
     found = stabilised(coefficients)
     # the poles of nearly degenerate companions carry eps^(1/p) of rounding
@@ -87,7 +87,7 @@ def test_stabilised_models_are_stable_and_stable_ones_stay(a: list[float]) -> No
         np.testing.assert_array_equal(found, coefficients)
 
 
-def test_models_are_equal_by_number_and_survive_copies() -> None:
+def test_models_with_equal_numbers_are_equal_after_copies() -> None:
     same = AutoregressiveSources(([0.7, -0.4, 0.2], [0.9], np.array([0.3, 0.3])), (0.5, 1.0, 2.0))
     assert same == RAGGED
     assert hash(same) == hash(RAGGED)
@@ -127,7 +127,7 @@ WRONG: list[tuple[Callable[[], object], type[Exception], str]] = [
 
 
 @pytest.mark.parametrize(("call", "error", "message"), WRONG, ids=[w[2][:25] for w in WRONG])
-def test_bad_input_is_told(
+def test_invalid_input_raises_with_message(
     call: Callable[[], object], error: type[Exception], message: str
 ) -> None:
     with pytest.raises(error, match=message):
@@ -148,7 +148,7 @@ def test_yule_walker_solves_its_toeplitz_equations(order: int) -> None:
         assert noise == pytest.approx(one[0] - expected @ one[1:])
 
 
-def test_yule_walker_finds_complex_sources_too() -> None:
+def test_yule_walker_estimates_complex_sources() -> None:
     signal = ar([0.96, -0.77], 20_000) + 1j * ar([0.96, -0.77], 20_000, seed=1)
     a, q = yule_walker(signal, 2)
     np.testing.assert_allclose(a, [0.96, -0.77], atol=0.02)
@@ -161,6 +161,6 @@ def test_partial_autocorrelation_is_the_last_coefficient_of_each_order() -> None
     np.testing.assert_allclose(partial_autocorrelation(signal, 6), last, atol=1e-14)
 
 
-def test_order_of_a_long_signal_is_found() -> None:
+def test_select_order_of_a_long_signal_is_its_order() -> None:
     assert select_order(ar([0.77, -0.45, 0.2], 5000, seed=3), 3) == 3
     assert select_order(ar([0.9], 5000, seed=3), 1) == 1

@@ -14,7 +14,7 @@ probabilities = st.floats(0, 1)
 
 
 @given(probabilities, probabilities, probabilities, st.integers(0, 6))
-def test_existence_over_whole_steps_is_the_chain_step_by_step(
+def test_existence_over_whole_steps_equals_the_chain_of_steps(
     p_activate: float, p_deactivate: float, existence: float, n: int
 ) -> None:
     model = BernoulliVonMises(148.0, p_activate, p_deactivate)
@@ -26,7 +26,7 @@ def test_existence_over_whole_steps_is_the_chain_step_by_step(
 
 
 @given(st.floats(0, 0.5), st.floats(0, 0.5), probabilities, steps, steps)
-def test_existence_over_two_steps_is_that_over_one(
+def test_existence_over_two_durations_equals_that_over_their_sum(
     p_activate: float, p_deactivate: float, existence: float, a: float, b: float
 ) -> None:
     model = BernoulliVonMises(148.0, p_activate, p_deactivate)
@@ -34,12 +34,12 @@ def test_existence_over_two_steps_is_that_over_one(
     assert found == pytest.approx(model.predict_existence(existence, a + b), abs=1e-12)
 
 
-def test_existence_forgets_towards_its_balance() -> None:
+def test_existence_converges_to_its_stationary_probability() -> None:
     model = BernoulliVonMises()
     np.testing.assert_allclose(model.predict_existence([[0.0], [1.0]], dt=500), 0.1 / 0.35)
 
 
-def test_an_alternating_chain_has_no_half_steps() -> None:
+def test_alternating_chain_refuses_half_steps() -> None:
     model = BernoulliVonMises(p_activate=0.9, p_deactivate=0.8)
     with pytest.raises(ValueError, match=r"dt must be whole .* exceeds 1; got dt=0\.5"):
         model.predict_existence(0.5, dt=0.5)
@@ -47,7 +47,7 @@ def test_an_alternating_chain_has_no_half_steps() -> None:
         model.sample_active([True], np.random.default_rng(0), dt=2.5)
 
 
-def test_existence_refuses_nonsense() -> None:
+def test_existence_refuses_invalid_arguments() -> None:
     model = BernoulliVonMises()
     for wrong in (-0.1, 1.1, np.nan):
         with pytest.raises(ValueError, match=r"existence must lie in \[0, 1\]; got"):
@@ -59,7 +59,7 @@ def test_existence_refuses_nonsense() -> None:
 
 
 @pytest.mark.parametrize("dt", [0.0, 1.0, 2.5])
-def test_sources_switch_as_often_as_predicted(dt: float) -> None:
+def test_sampled_switching_has_the_predicted_frequency(dt: float) -> None:
     model = BernoulliVonMises()
     before = np.tile([True, False], (20_000, 1))
     after = model.sample_active(before, np.random.default_rng(2), dt)
@@ -69,7 +69,7 @@ def test_sources_switch_as_often_as_predicted(dt: float) -> None:
     assert before.all(axis=0).tolist() == [True, False]
 
 
-def test_the_angle_of_a_source_is_that_of_its_walk() -> None:
+def test_angle_motion_equals_that_of_the_walk() -> None:
     model, walk = BernoulliVonMises(kappa=20.0), VonMisesWalk(20.0)
     assert model.walk == walk
     np.testing.assert_array_equal(model.blur([3.0, 90.0], 0.5), walk.blur([3.0, 90.0], 0.5))

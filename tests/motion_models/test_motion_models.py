@@ -59,20 +59,20 @@ def test_states_may_have_any_leading_axes(model: MotionModel) -> None:
 
 
 @every_model
-def test_jacobian_is_the_slope(model: MotionModel) -> None:
+def test_jacobian_equals_numerical_slope(model: MotionModel) -> None:
     x = states(model)
     np.testing.assert_allclose(model.F(x), slope(model, x, 1.0), atol=1e-9)
 
 
 @every_model
-def test_noise_is_a_covariance(model: MotionModel) -> None:
+def test_noise_is_symmetric_and_semidefinite(model: MotionModel) -> None:
     Q = model.Q()
     np.testing.assert_array_equal(Q, Q.T)
     assert np.linalg.eigvalsh(Q).min() > 0
 
 
 @every_model
-def test_samples_scatter_by_the_noise(model: MotionModel) -> None:
+def test_samples_have_covariance_Q(model: MotionModel) -> None:
     x = np.tile(states(model), (20_000, 1))
     drawn = model.sample(x, np.random.default_rng(0)) - model.f(x)
     Q = model.Q()
@@ -90,7 +90,7 @@ def test_samples_repeat_with_the_generator(model: MotionModel) -> None:
 
 
 @every_model
-def test_a_column_is_refused_and_the_cure_named(model: MotionModel) -> None:
+def test_column_state_is_refused_with_the_cure(model: MotionModel) -> None:
     column = np.ones((model.dim_x, 1))
     if model.dim_x == 1:
         assert model.f(column).shape == (1, 1)  # also one state of one entry
@@ -102,7 +102,7 @@ def test_a_column_is_refused_and_the_cure_named(model: MotionModel) -> None:
 
 
 @every_model
-def test_arguments_stay_as_they_were(model: MotionModel) -> None:
+def test_arguments_are_not_modified(model: MotionModel) -> None:
     x = states(model, 4)
     kept = x.copy()
     for moved in (model.f(x), model.sample(x, np.random.default_rng(0))):
@@ -117,7 +117,7 @@ def test_arguments_stay_as_they_were(model: MotionModel) -> None:
 
 
 @every_model
-def test_a_model_survives_its_travels(model: MotionModel) -> None:
+def test_model_makes_the_round_trip_of_copies_and_configuration(model: MotionModel) -> None:
     for twin in (
         pickle.loads(pickle.dumps(model)),
         copy.deepcopy(model),
@@ -131,19 +131,19 @@ def test_a_model_survives_its_travels(model: MotionModel) -> None:
 
 
 @every_model
-def test_a_model_is_frozen(model: MotionModel) -> None:
+def test_model_is_frozen(model: MotionModel) -> None:
     name = next(iter(model.get_params()))
     with pytest.raises(AttributeError, match="cannot assign to field"):
         setattr(model, name, 1.0)
 
 
 @every_model
-def test_noise_of_a_step_into_the_past_is_refused(model: MotionModel) -> None:
+def test_negative_duration_is_refused(model: MotionModel) -> None:
     with pytest.raises(ValueError, match="dt"):
         model.Q(dt=-1.0)
 
 
-def test_replacing_a_parameter_makes_another_model() -> None:
+def test_replace_returns_another_model() -> None:
     model = ConstantVelocity(q=0.1)
     other = model.replace(q=0.2)
     assert (model.q, other.q) == (0.1, 0.2)
@@ -156,27 +156,27 @@ def test_replacing_a_parameter_makes_another_model() -> None:
 
 
 @given(steps, st.floats(0, 10), st.integers(1, 4))
-def test_constant_velocity_is_filterpys(dt: float, q: float, n_dims: int) -> None:
+def test_constant_velocity_equals_filterpy(dt: float, q: float, n_dims: int) -> None:
     theirs = Q_continuous_white_noise(2, dt, q, block_size=n_dims)
     np.testing.assert_allclose(ConstantVelocity(q, n_dims).Q(dt), theirs, rtol=1e-14)
 
 
 @pytest.mark.parametrize("model", [RandomWalk(0.3, 3), ConstantVelocity(0.3)])
 @given(steps, steps)
-def test_noise_of_two_steps_is_the_noise_of_one(model: MotionModel, a: float, b: float) -> None:
+def test_noise_of_two_steps_equals_that_of_one(model: MotionModel, a: float, b: float) -> None:
     F = model.F(np.zeros(model.dim_x), b)
     np.testing.assert_allclose(F @ model.Q(a) @ F.T + model.Q(b), model.Q(a + b), rtol=1e-12)
     np.testing.assert_allclose(F @ model.F(states(model), a), model.F(states(model), a + b))
     assert not model.Q(dt=0.0).any()
 
 
-def test_velocity_stands_beside_its_coordinate() -> None:
+def test_velocity_follows_its_coordinate() -> None:
     moved = ConstantVelocity(q=1.0, n_dims=3).f([0, 1, 10, 2, 20, 3], dt=2.0)
     assert moved.tolist() == [2, 1, 14, 2, 26, 3]
 
 
 @pytest.mark.parametrize("kind", [RandomWalk, ConstantVelocity])
-def test_linear_models_refuse_nonsense(kind: type[RandomWalk]) -> None:
+def test_linear_models_refuse_invalid_parameters(kind: type[RandomWalk]) -> None:
     with pytest.raises(ValueError, match="q must be finite and not negative; got nan"):
         kind(q=np.nan)
     with pytest.raises(ValueError, match="n_dims must be at least 1; got 0"):
@@ -185,7 +185,7 @@ def test_linear_models_refuse_nonsense(kind: type[RandomWalk]) -> None:
         kind(q=1.0, n_dims=1.5)  # type: ignore[arg-type]
 
 
-def test_own_matrices_are_copied_and_locked() -> None:
+def test_linear_motion_copies_matrices_read_only() -> None:
     transition = np.array([[0.5]])
     model = LinearMotion(transition, [[1.0]])
     transition[0, 0] = 9.0
@@ -195,7 +195,7 @@ def test_own_matrices_are_copied_and_locked() -> None:
             twin.transition[0, 0] = 9.0
 
 
-def test_own_matrices_are_compared_by_content() -> None:
+def test_linear_motion_is_compared_by_content() -> None:
     model = LinearMotion([[0.5]], [[1.0]])
     assert model == LinearMotion([[0.5]], [[1]])
     assert model != LinearMotion([[0.5]], [[1.0]], control=[[1.0]])
@@ -217,14 +217,14 @@ def test_own_matrices_are_compared_by_content() -> None:
         (np.eye(2), np.eye(2), [[1.0, 2.0]], r"control must have shape \(2, 2\); got \(1, 2\)"),
     ],
 )
-def test_own_matrices_must_fit(
+def test_linear_motion_refuses_invalid_matrices(
     transition: ArrayLike, noise: ArrayLike, control: ArrayLike, message: str
 ) -> None:
     with pytest.raises(ValueError, match=message):
         LinearMotion(transition, noise, control)
 
 
-def test_own_matrices_hold_for_one_step_only() -> None:
+def test_linear_motion_refuses_other_durations() -> None:
     model = LinearMotion([[0.5]], [[1.0]])
     for method, x in (("f", [[1.0]]), ("F", [[1.0]]), ("Q", [])):
         with pytest.raises(ValueError, match=r"hold for dt=1 only; got dt=0\.5"):
@@ -235,7 +235,7 @@ def test_own_matrices_hold_for_one_step_only() -> None:
 
 
 @given(turn_rates, st.floats(0.1, 2))
-def test_turning_keeps_to_a_circle(omega: float, dt: float) -> None:
+def test_coordinated_turn_stays_on_a_circle(omega: float, dt: float) -> None:
     x = np.array([3.0, 2.0, -1.0, 0.5, omega])
     moved = CoordinatedTurn(0.1, 0.1).f(x, dt)
     velocity = (2 + 0.5j) * np.exp(1j * omega * dt)
@@ -247,7 +247,7 @@ def test_turning_keeps_to_a_circle(omega: float, dt: float) -> None:
 
 
 @given(turn_rates, st.floats(0.1, 2))
-def test_turning_has_the_slope_of_the_exact_path(omega: float, dt: float) -> None:
+def test_coordinated_turn_jacobian_is_the_slope_of_the_exact_path(omega: float, dt: float) -> None:
     x = np.array([3.0, 2.0, -1.0, 0.5, omega])
     F = CoordinatedTurn(0.1, 0.1).F(x, dt)
     # d/dω of the integral above: another integral, without any division by ω.
@@ -259,12 +259,12 @@ def test_turning_has_the_slope_of_the_exact_path(omega: float, dt: float) -> Non
 
 
 @given(turn_rates, steps, steps)
-def test_two_turns_are_one(omega: float, a: float, b: float) -> None:
+def test_two_coordinated_turns_equal_one(omega: float, a: float, b: float) -> None:
     model, x = CoordinatedTurn(0.1, 0.1), np.array([3.0, 2.0, -1.0, 0.5, omega])
     np.testing.assert_allclose(model.f(model.f(x, a), b), model.f(x, a + b), rtol=0, atol=1e-11)
 
 
-def test_straight_on_is_constant_velocity() -> None:
+def test_coordinated_turn_without_rate_is_constant_velocity() -> None:
     x = np.array([3.0, 2.0, -1.0, 0.5, 0.0])
     turn, straight = CoordinatedTurn(q=0.3, q_turn=0.2), ConstantVelocity(q=0.3)
     np.testing.assert_allclose(turn.f(x, 2.0)[:4], straight.f(x[:4], 2.0), rtol=1e-15)
@@ -273,7 +273,7 @@ def test_straight_on_is_constant_velocity() -> None:
     assert turn.Q(2.0)[4].tolist() == [0, 0, 0, 0, 0.4]
 
 
-def test_turning_is_linearised_at_one_state() -> None:
+def test_coordinated_turn_jacobian_requires_one_state() -> None:
     with pytest.raises(ValueError, match=r"x must have shape \(5,\); got \(2, 5\)"):
         CoordinatedTurn(0.1, 0.1).F(np.zeros((2, 5)))
     with pytest.raises(ValueError, match="q_turn must be finite and not negative; got -1"):
@@ -283,7 +283,7 @@ def test_turning_is_linearised_at_one_state() -> None:
 # in filterpy's filters
 
 
-def test_filterpys_filters_take_our_methods_and_agree() -> None:
+def test_filterpy_filters_with_our_models_agree() -> None:
     walk, H, R = ConstantVelocity(q=0.2), np.eye(4)[::2], 0.3 * np.eye(2)
     kalman = KalmanFilter(dim_x=4, dim_z=2)
     kalman.x, kalman.F, kalman.Q, kalman.H, kalman.R = np.zeros(4), walk.F(), walk.Q(), H, R

@@ -61,7 +61,7 @@ def test_wrap_keeps_the_direction(angle: float) -> None:
 
 
 @given(angles.filter(lambda angle: angle < np.pi))
-def test_wrap_leaves_wrapped_angles_alone(angle: float) -> None:
+def test_wrap_of_wrapped_angles_is_exact(angle: float) -> None:
     assert wrap(angle) == angle
 
 
@@ -76,12 +76,12 @@ def test_wrap_at_the_seam() -> None:
 
 
 @given(st.floats(0, 600))
-def test_log_i0_is_the_logarithm(kappa: float) -> None:
+def test_log_i0_equals_the_logarithm_of_i0(kappa: float) -> None:
     expected = np.log(scipy.special.i0(kappa))
     assert log_i0(kappa) == pytest.approx(expected, rel=1e-13, abs=1e-14)
 
 
-def test_log_i0_far_beyond_overflow() -> None:
+def test_log_i0_is_finite_where_i0_overflows() -> None:
     assert log_i0(1e8) == pytest.approx(1e8 - np.log(2 * np.pi * 1e8) / 2, rel=1e-15)
     assert log_i0([1e308, np.inf]).tolist() == [1e308, np.inf]
 
@@ -100,7 +100,7 @@ def test_log_bessel_ratio_keeps_its_digits_near_zero(kappa: float) -> None:
 
 
 @pytest.mark.parametrize("kappa", KAPPAS)
-def test_inverse_bessel_ratio_loses_only_what_the_double_has_lost(kappa: float) -> None:
+def test_inverse_bessel_ratio_has_the_error_of_rounding_only(kappa: float) -> None:
     # Half a unit in the last place of R moves κ by 1.1e-16 κ, relative.
     found = inverse_bessel_ratio(float(EXACT[kappa]))
     assert found == pytest.approx(kappa, rel=1e-12 + 1.2e-16 * kappa)
@@ -111,14 +111,14 @@ def test_inverse_bessel_ratio_inverts(ratio: float) -> None:
     assert bessel_ratio(inverse_bessel_ratio(ratio)) == pytest.approx(ratio, rel=2e-15, abs=1e-300)
 
 
-def test_bessel_ratio_and_its_inverse_at_the_ends() -> None:
+def test_bessel_ratio_and_its_inverse_at_zero_and_infinity() -> None:
     assert bessel_ratio([0.0, 1e300, np.inf]).tolist() == [0.0, 1.0, 1.0]
     assert log_bessel_ratio([0.0, np.inf]).tolist() == [-np.inf, 0.0]
     assert inverse_bessel_ratio([0.0, 1.0]).tolist() == [0.0, np.inf]
     assert np.isnan(bessel_ratio(np.nan))
 
 
-def test_nothing_jumps_where_the_expansions_take_over() -> None:
+def test_bessel_ratio_is_continuous_at_the_change_of_expansion() -> None:
     ratio = 0.998 + np.linspace(-1e-9, 1e-9, 41)
     assert np.ptp(np.diff(inverse_bessel_ratio(ratio))) < 1e-8 * 250
     kappa = 500 + np.linspace(-1e-4, 1e-4, 41)
@@ -126,13 +126,13 @@ def test_nothing_jumps_where_the_expansions_take_over() -> None:
 
 
 @pytest.mark.parametrize("ratio", [-0.1, 1.1, np.nan, [0.5, 1 + 1e-15]])
-def test_a_resultant_longer_than_one_is_refused(ratio: float) -> None:
+def test_resultant_above_one_is_refused(ratio: float) -> None:
     with pytest.raises(ValueError, match=r"a mean resultant length must lie in \[0, 1\]; got"):
         inverse_bessel_ratio(ratio)
 
 
 @given(st.floats(1e-2, 1e5), st.integers(0, 40))
-def test_bessel_ratios_are_scipys(kappa: float, n: int) -> None:
+def test_bessel_ratios_equal_scipy(kappa: float, n: int) -> None:
     scaled = scipy.special.ive(np.arange(n + 1), kappa)
     np.testing.assert_allclose(bessel_ratios(n, kappa), scaled / scaled[0], rtol=2e-12)
 
@@ -143,7 +143,7 @@ def test_bessel_ratios_are_exact_at_any_concentration(kappa: float) -> None:
     np.testing.assert_allclose(bessel_ratios(14, kappa)[1:], expected, rtol=1e-12)
 
 
-def test_bessel_ratios_at_the_ends() -> None:
+def test_bessel_ratios_at_zero_and_infinity() -> None:
     assert bessel_ratios(2, [0.0, 1e-200, 1e308, np.inf]).tolist() == [
         [1, 0, 0],
         [1, 5e-201, 0],
@@ -155,7 +155,7 @@ def test_bessel_ratios_at_the_ends() -> None:
         bessel_ratios(-1, 3.0)
 
 
-def test_kernels_treat_each_element_on_its_own() -> None:
+def test_kernels_are_elementwise() -> None:
     kappa = np.array([[0.0, 3.0, 600.0], [40.0, 1e6, 2.0]])
     ratio = bessel_ratio(kappa)
     assert bessel_ratios(7, kappa).shape == (2, 3, 8)
@@ -170,7 +170,7 @@ def test_kernels_treat_each_element_on_its_own() -> None:
 
 
 @given(angles, angles, concentrations)
-def test_log_density_is_scipys(theta: float, mu: float, kappa: float) -> None:
+def test_log_density_equals_scipy(theta: float, mu: float, kappa: float) -> None:
     expected = scipy.stats.vonmises(kappa, loc=mu).logpdf(theta)
     assert log_density(theta, mu, kappa) == pytest.approx(expected, rel=1e-9, abs=1e-9)
 
@@ -196,7 +196,7 @@ def test_mfold_concentration_is_the_root_of_the_resultant(kappa: float, m: int) 
     assert m**2 * log_bessel_ratio(narrow) == pytest.approx(log_bessel_ratio(kappa), rel=1e-11)
 
 
-def test_mfold_concentration_has_its_limits() -> None:
+def test_mfold_concentration_at_zero_and_infinity() -> None:
     assert mfold_concentration([0.0, 1e8, np.inf], 14)[[0, 2]].tolist() == [0.0, np.inf]
     # ln A = -1/2κ - 1/4κ² - ..., so m²κ is approached from below by (m² - 1)/2.
     assert mfold_concentration(1e8, 14) - 196e8 == pytest.approx(-195 / 2, rel=1e-2)
@@ -205,9 +205,7 @@ def test_mfold_concentration_has_its_limits() -> None:
 
 
 @given(st.floats(0.5, 1e4), angles, st.integers(1, 12))
-def test_modes_together_have_only_the_harmonics_of_the_mfold_density(
-    kappa: float, mu: float, m: int
-) -> None:
+def test_mixture_of_modes_has_only_harmonics_of_m(kappa: float, mu: float, m: int) -> None:
     modes = mfold_modes([kappa * np.exp(1j * mu)], m)[0]
     assert modes.shape == (m,)
     np.testing.assert_allclose(np.exp(1j * m * np.angle(modes)), np.exp(1j * mu), atol=1e-12)
@@ -218,7 +216,7 @@ def test_modes_together_have_only_the_harmonics_of_the_mfold_density(
     np.testing.assert_allclose(moments.mean(axis=0), 0, atol=1e-12)
 
 
-def test_modes_stand_for_the_mfold_density() -> None:
+def test_mixture_of_modes_approximates_the_mfold_density() -> None:
     theta = np.linspace(-np.pi, np.pi, 2000, endpoint=False)
     eta = 60.0 * np.exp(0.8j)
     modes = mfold_modes(eta, 3)
@@ -245,7 +243,9 @@ def test_blur_is_symmetric_and_loses_concentration(a: float, b: float) -> None:
 
 
 @given(concentrations, concentrations, st.floats(0.01, 10), st.floats(0.01, 10))
-def test_blur_of_two_steps_is_that_of_one(step: float, kappa: float, a: float, b: float) -> None:
+def test_blur_of_two_steps_equals_that_of_one(
+    step: float, kappa: float, a: float, b: float
+) -> None:
     walk = VonMisesWalk(step)
     assert walk.blur(walk.blur(kappa, a), b) == pytest.approx(walk.blur(kappa, a + b), rel=1e-9)
 
@@ -260,7 +260,7 @@ def test_blur_keeps_the_first_moment_of_the_convolution() -> None:
     assert scipy.special.i1e(blurred) / scipy.special.i0e(blurred) == pytest.approx(resultant)
 
 
-def test_blur_at_the_ends() -> None:
+def test_blur_at_zero_and_infinity() -> None:
     walk = VonMisesWalk(5.0)
     np.testing.assert_allclose(walk.blur([0.0, np.inf]), [0.0, 5.0], rtol=1e-13)
     np.testing.assert_allclose(walk.blur([0.0, 3.0, np.inf], dt=0), [0.0, 3.0, np.inf], rtol=1e-13)
@@ -270,7 +270,7 @@ def test_blur_at_the_ends() -> None:
 
 
 @pytest.mark.parametrize("method", ["Q", "blur", "sample"])
-def test_time_does_not_run_backwards(method: str) -> None:
+def test_negative_duration_is_refused(method: str) -> None:
     rng = np.random.default_rng(0)
     call = {"Q": (), "blur": (1.0,), "sample": ([0.0], rng)}[method]
     with pytest.raises(ValueError, match=r"dt must be finite and not negative; got -0\.5"):
@@ -296,7 +296,7 @@ def test_resultant_of_the_steps_is_a_power_of_the_duration(dt: float) -> None:
     assert resultant == pytest.approx(bessel_ratio(4.0) ** dt, abs=0.02)  # 5 standard errors
 
 
-def test_no_time_no_step() -> None:
+def test_sample_of_zero_duration_is_the_identity() -> None:
     assert (drawn(4.0, dt=0.0, n=5) == 3.0).all()
 
 
@@ -313,10 +313,10 @@ def test_walk_wraps_its_states() -> None:
 # a walk in direction
 
 
-def test_a_walk_in_direction_widens_by_the_same_angle_everywhere() -> None:
+def test_sigma_doa_has_equal_width_at_all_directions() -> None:
     """σ_θ = σ_β dθ/dβ: the concentration of the step is of each component."""
     walk, slope = VonMisesWalk(sigma_doa=0.02), np.array([3.0, 1.0, 0.3])
-    np.testing.assert_allclose(walk.step(slope), (0.02 * slope) ** -2.0)
+    np.testing.assert_allclose(walk.step_concentration(slope), (0.02 * slope) ** -2.0)
     widened = walk.blur([np.inf] * 3, slope=slope)
     np.testing.assert_allclose(1 / np.sqrt(widened) / slope, 0.02, rtol=1e-3)
     twice = walk.blur(walk.blur([50.0, 500.0, 5000.0], slope=slope), slope=slope)
@@ -324,19 +324,19 @@ def test_a_walk_in_direction_widens_by_the_same_angle_everywhere() -> None:
     np.testing.assert_allclose(once, twice, rtol=1e-9)
 
 
-def test_a_walk_of_its_own_width_asks_for_no_slope() -> None:
+def test_kappa_of_the_walk_does_not_depend_on_the_slope() -> None:
     walk = VonMisesWalk(50.0)
     np.testing.assert_array_equal(walk.blur([1.0, 100.0], slope=7.0), walk.blur([1.0, 100.0]))
     np.testing.assert_allclose(VonMisesWalk(sigma_doa=0.1).Q(), VonMisesWalk(100.0).Q())
 
 
 @pytest.mark.parametrize("params", [{}, {"kappa": 3.0, "sigma_doa": 0.1}])
-def test_a_walk_has_one_width(params: dict[str, float]) -> None:
+def test_walk_requires_one_of_kappa_and_sigma_doa(params: dict[str, float]) -> None:
     with pytest.raises(ValueError, match="exactly one of kappa and sigma_doa must be given"):
         VonMisesWalk(**params)
 
 
 @pytest.mark.parametrize("params", [{"sigma_doa": 0.0}, {"sigma_doa": -1.0}, {"kappa": np.inf}])
-def test_a_width_is_positive(params: dict[str, float]) -> None:
+def test_walk_width_must_be_positive(params: dict[str, float]) -> None:
     with pytest.raises(ValueError, match="must be finite and positive"):
         VonMisesWalk(**params)

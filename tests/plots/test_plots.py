@@ -48,7 +48,7 @@ def dots(ax: Any) -> Any:
     return scatter
 
 
-def test_a_label_is_one_line_of_one_colour_and_another_label_has_another() -> None:
+def test_each_label_is_one_line_of_its_own_colour() -> None:
     ax = plot_bearing_time(found([[(10, 0, 1), (-40, 1, 1)], [(11, 0, 1), (-41, 1, 1)]]))
     _, tracks = lines(ax)
     np.testing.assert_allclose(tracks.get_segments()[0], [[0, 10], [1, 11]])
@@ -57,14 +57,14 @@ def test_a_label_is_one_line_of_one_colour_and_another_label_has_another() -> No
     assert len(dots(ax).get_offsets()) == 0
 
 
-def test_a_track_on_a_line_is_not_drawn_from_endfire_to_endfire() -> None:
+def test_track_of_a_line_is_not_joined_across_endfire() -> None:
     steps: list[list[tuple[float, int, float]]] = [[(d, 0, 1)] for d in (85, 88, -87, -85)]
     _, tracks = lines(plot_bearing_time(found(steps)))
     ends = [segment[:, 1] for segment in tracks.get_segments()]
     np.testing.assert_allclose(ends, [[85, 88], [-87, -85]])
 
 
-def test_existence_is_opacity_and_without_it_all_is_opaque() -> None:
+def test_existence_sets_the_opacity() -> None:
     ax = plot_bearing_time(found([[(10, 0, 0.25), (20, -1, np.nan)]]))
     assert dots(ax).get_facecolors()[:, 3].tolist() == [1.0, 0.25]
 
@@ -75,7 +75,7 @@ def test_directions_without_label_and_across_gaps_are_not_joined() -> None:
     assert len(dots(ax).get_offsets()) == 4
 
 
-def test_a_track_through_180_degrees_is_not_drawn_across_the_picture() -> None:
+def test_track_through_180_degrees_is_split() -> None:
     run = found([[(178, 0, 1)], [(-178, 0, 1)], [(-175, 0, 1)]])
     ax = plot_bearing_time(run)
     assert len(lines(ax)[1].get_segments()) == 1
@@ -83,7 +83,7 @@ def test_a_track_through_180_degrees_is_not_drawn_across_the_picture() -> None:
 
 
 @pytest.mark.parametrize(("model", "limit"), [(LINE, 90), (CIRCLE, 180)])
-def test_the_beam_is_highest_where_the_source_is(model: ArraySnapshot, limit: int) -> None:
+def test_beam_power_is_highest_at_the_source(model: ArraySnapshot, limit: int) -> None:
     z = scene(model)
     ax = plot_bearing_time(CBF(model).run(z), snapshots=z, measurement=model)
     (image,) = [c for c in ax.collections if isinstance(c, QuadMesh)]
@@ -97,27 +97,27 @@ def test_the_beam_is_highest_where_the_source_is(model: ArraySnapshot, limit: in
     assert ax.figure.axes[-1].get_ylabel() == "beam power, dB re maximum"
 
 
-def test_a_long_recording_is_drawn_in_a_bounded_number_of_columns() -> None:
+def test_long_recording_has_a_bounded_number_of_columns() -> None:
     z = scene(LINE, 4000)
     ax = plot_bearing_time(found([[]] * 4000), snapshots=z, measurement=LINE)
     (image,) = [c for c in ax.collections if isinstance(c, QuadMesh)]
     assert np.asarray(image.get_array()).shape[1] <= 1500
 
 
-def test_time_stands_on_the_axis_where_it_is_given() -> None:
+def test_axis_shows_time_if_given() -> None:
     ax = plot_bearing_time(found([[(1, 0, 1)]] * 3), time=[10.0, 12.0, 14.0])
     assert ax.get_xlabel() == "time, s"
     assert ax.get_xlim() == (9, 15)
 
 
-def test_plots_draw_into_the_axes_they_are_given() -> None:
+def test_plots_draw_into_the_given_axes() -> None:
     ax = Figure().add_subplot()
     assert plot_bearing_time(found([[(1, 0, 1)]]), ax=ax) is ax
     assert plot_array(SensorArray.ula(3, 0.5), ax=ax) is ax
 
 
 @pytest.mark.parametrize("n_steps", [0, 1, 2])
-def test_silence_and_few_steps_make_a_picture(n_steps: int, tmp_path: Path) -> None:
+def test_runs_without_sources_and_few_steps_are_drawn(n_steps: int, tmp_path: Path) -> None:
     z = np.zeros((n_steps, 8))
     ax = plot_bearing_time(CBF(LINE).run(z), snapshots=z, measurement=LINE)
     save(ax, tmp_path / "a.png")
@@ -128,13 +128,13 @@ def test_silence_and_few_steps_make_a_picture(n_steps: int, tmp_path: Path) -> N
     "array",
     [SensorArray.ula(9, 0.5), SensorArray.uca(40, 2.0), SensorArray(np.eye(3))],
 )
-def test_an_array_of_any_dimension_is_drawn(array: SensorArray, tmp_path: Path) -> None:
+def test_array_of_any_dimension_is_drawn(array: SensorArray, tmp_path: Path) -> None:
     ax = plot_array(array)
     assert len(ax.texts) == (9 if array.dim == 1 else 0)
     save(ax, tmp_path / "array.png")
 
 
-def test_what_does_not_fit_the_run_is_refused() -> None:
+def test_invalid_arguments_are_refused() -> None:
     run = found([[(1, 0, 1)]] * 3)
     with pytest.raises(ValueError, match="wants a measurement"):
         plot_bearing_time(run, snapshots=np.ones((3, 8)))
@@ -148,7 +148,7 @@ def test_what_does_not_fit_the_run_is_refused() -> None:
         plot_bearing_time(RunRecorder(PositionEstimate).run(1.0, 0.0))
 
 
-def test_a_picture_that_fails_leaves_nothing_behind(tmp_path: Path) -> None:
+def test_failed_picture_leaves_no_file(tmp_path: Path) -> None:
     ax = Figure().add_subplot()
     with pytest.raises(ValueError, match="suffix"):
         save(ax, tmp_path / "a.xyz")
@@ -158,7 +158,7 @@ def test_a_picture_that_fails_leaves_nothing_behind(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_plots_import_no_matplotlib_and_drawing_no_pyplot() -> None:
+def test_plots_import_no_matplotlib_and_drawing_no_pyplot() -> None:
     code = (
         "import sys, arrivals.plots.bearing_time as p; assert 'matplotlib' not in sys.modules;"
         "from arrivals.measurement_models import SensorArray as A; p.plot_array(A.ula(3, 1.0));"

@@ -112,7 +112,7 @@ class InterpolationEKF(GaussianFilter):
     >>> from arrivals.measurement_models import SensorArray, Tones
     >>> array = SensorArray.ula(10, spacing=0.5, speed=1000.0)
     >>> model = ArraySamples(array, rate=4000.0, correlation=Tones(0.25), snr_db=20.0)
-    >>> lag = model.places * model.delay(np.deg2rad(40.0))
+    >>> lag = model.grid_index * model.delay(np.deg2rad(40.0))
     >>> z = np.cos(np.pi / 2 * (np.arange(30)[:, None] - lag))
     >>> tracker = InterpolationEKF(model, doa=np.deg2rad(30.0))
     >>> np.rad2deg(tracker.run(z).doa[-1]).round(1), tracker.latency
@@ -157,7 +157,7 @@ class InterpolationEKF(GaussianFilter):
         std = initial_std(assembly, self.doa, self.std)
         self.x, self.P = assembly.initial_belief(delay, std**2, self.rate_std)
         self.initialize_record()
-        self.buffer = SampleBuffer.empty(assembly.span, assembly.n_places)
+        self.buffer = SampleBuffer.empty(assembly.span, assembly.n_grid_points)
 
     def predict(
         self,
@@ -240,7 +240,7 @@ class InterpolationEKF(GaussianFilter):
     @property
     def dim_z(self) -> int:
         """Number of sensors."""
-        return len(self.measurement.places)
+        return len(self.measurement.grid_index)
 
     @property
     def H(self) -> Float:
@@ -272,7 +272,7 @@ class InterpolationEKF(GaussianFilter):
             params["variant"] = to_variant(params["variant"])
         super().set_params(**params)
         assembly = self.assembly
-        shape = (assembly.span, assembly.n_places)
+        shape = (assembly.span, assembly.n_grid_points)
         if self.buffer.frames.shape != shape or len(self.x) != assembly.motion.dim_x:
             self.restart()
         return self
@@ -293,6 +293,6 @@ class InterpolationEKF(GaussianFilter):
 
     def _observe(self, x: Float, P: Float, samples: Float, n: int) -> DelayObservation:
         """Return the residuals of the n-th snapshot near a belief, in the order of the sensors."""
-        places = self.measurement.places
+        grid_index = self.measurement.grid_index
         y, H, R = self.assembly.stage(n).linearize(x, P, samples)
-        return DelayObservation(y[places], H[places], R[places])
+        return DelayObservation(y[grid_index], H[grid_index], R[grid_index])

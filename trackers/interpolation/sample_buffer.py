@@ -19,7 +19,7 @@ class SampleBuffer:
 
     Parameters
     ----------
-    frames : ndarray, shape (..., span, n_places)
+    frames : ndarray, shape (..., span, n_grid_points)
         Snapshots on the grid of the line, the newest last; NaN where data are missing.
     energy, n_samples : ndarray, shape (...)
         Sum of squares and number of all samples so far.
@@ -28,7 +28,7 @@ class SampleBuffer:
 
     Examples
     --------
-    >>> buffer = SampleBuffer.empty(span=2, n_places=3).append(np.array([2.0, np.nan, -2.0]))
+    >>> buffer = SampleBuffer.empty(span=2, n_grid_points=3).append(np.array([2.0, np.nan, -2.0]))
     >>> buffer.n_snapshots, buffer.scaled(power=None, noise_ratio=0.0)[-1]
     (1, array([ 1., nan, -1.]))
     """
@@ -39,9 +39,9 @@ class SampleBuffer:
     n_snapshots: int = 0
 
     @classmethod
-    def empty(cls, span: int, n_places: int) -> SampleBuffer:
+    def empty(cls, span: int, n_grid_points: int) -> SampleBuffer:
         """Return the buffer before the first snapshot."""
-        return cls(np.full((span, n_places), np.nan), np.zeros(()), np.zeros(()))
+        return cls(np.full((span, n_grid_points), np.nan), np.zeros(()), np.zeros(()))
 
     def broadcast(self, shape: tuple[int, ...]) -> SampleBuffer:
         """Return the same buffer for recordings of leading axes `shape`."""
@@ -50,7 +50,7 @@ class SampleBuffer:
         return SampleBuffer(frames, energy, n_samples, self.n_snapshots)
 
     def append(self, frame: Float) -> SampleBuffer:
-        """Return the buffer after another snapshot, (..., n_places)."""
+        """Return the buffer after another snapshot, (..., n_grid_points)."""
         return SampleBuffer(
             np.concatenate([self.frames[..., 1:, :], frame[..., None, :]], axis=-2),
             self.energy + np.nansum(frame * frame, axis=-1),

@@ -217,7 +217,7 @@ class FilterAssembly(FrozenModel):
     final : PairwiseUpdate or JointUpdate
         Update of the other snapshots.
     kappa : float
-    n_places : int
+    n_grid_points : int
         Grid points of the line.
     acquisition : int
     """
@@ -226,7 +226,7 @@ class FilterAssembly(FrozenModel):
     acquire: PairwiseUpdate | None
     final: PairwiseUpdate | JointUpdate
     kappa: float
-    n_places: int
+    n_grid_points: int
     acquisition: int
 
     @property
@@ -258,7 +258,7 @@ class FilterAssembly(FrozenModel):
         return x, P
 
     def update(self, x: Float, P: Float, frames: Float, n: int) -> tuple[Float, Float]:
-        """Update beliefs by the n-th snapshot, the newest of `frames`, (..., span, n_places)."""
+        """Update beliefs by snapshot n, the newest of `frames`, (..., span, n_grid_points)."""
         x, P = self.stage(n).update(x, P, frames)
         if self.acquire is not None and n == self.acquisition:
             return self._replay(x, P, frames[..., -n:, :])

@@ -145,11 +145,11 @@ def assemble_filter(
     )  # fmt: skip
     source = _source_model(measurement, variant)
     if source is None:
-        return FilterAssembly(motion, None, pairwise, kappa, measurement.n_places, acquisition)
+        return FilterAssembly(motion, None, pairwise, kappa, measurement.n_grid_points, acquisition)
     motion = CombinedMotion(motion, LinearMotion(source.transition, source.innovation))
     return FilterAssembly(
         motion, pairwise if variant.acquire else None, JointUpdate(source, kappa, gate), kappa,
-        measurement.n_places, acquisition,
+        measurement.n_grid_points, acquisition,
     )  # fmt: skip
 
 
@@ -167,7 +167,7 @@ def initial_std(assembly: FilterAssembly, doa: float, std: float | None) -> floa
     delay_std = slope * (np.deg2rad(15.0) if std is None else std)
     if assembly.source is None or assembly.acquire is not None:
         return delay_std
-    lobe = 2 / assembly.n_places
+    lobe = 2 / assembly.n_grid_points
     if std is not None and delay_std > lobe * kappa:
         warnings.warn(
             "a joint filter converges only from inside the main lobe, |sin doa - sin truth| < "
@@ -179,7 +179,7 @@ def initial_std(assembly: FilterAssembly, doa: float, std: float | None) -> floa
 
 def _source_model(measurement: ArraySamples, variant: Variant) -> SourceAtCentre | None:
     """Return the model of all sensors, None for a pairwise variant."""
-    n, ratio, source = measurement.n_places, measurement.noise_ratio, measurement.correlation
+    n, ratio, source = measurement.n_grid_points, measurement.noise_ratio, measurement.correlation
     q = variant.process_noise
     if variant.joint is None:
         return None
@@ -197,7 +197,7 @@ def _baseline_models(measurement: ArraySamples, variant: Variant) -> tuple[Inter
     inflation = 3.0 if len(variant.baselines) > 1 else 1.0  # residuals share samples
     models = []
     for m in variant.baselines:
-        if m >= measurement.n_places:
+        if m >= measurement.n_grid_points:
             continue
         offsets = variant.offsets if m == 1 else None
         offsets = window(m * kappa) if offsets is None else tuple(offsets)
@@ -205,7 +205,7 @@ def _baseline_models(measurement: ArraySamples, variant: Variant) -> tuple[Inter
             _check_reach(source, offsets, m * kappa)
         taps = DelayInterpolator(source, offsets, loading)
         models += [
-            InterpolationDelay(taps, measurement.n_places, ratio, direction * m, inflation)
+            InterpolationDelay(taps, measurement.n_grid_points, ratio, direction * m, inflation)
             for direction in ((1, -1) if variant.bidirectional else (1,))
         ]
     return tuple(models)

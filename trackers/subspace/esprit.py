@@ -83,18 +83,18 @@ class ShiftInvariance:
     def shift(self) -> int:
         """Shift between the subarrays, in grid points."""
         widest = int(np.pi / self.line.step * (1 + 1e-9))
-        pairs = [len(shifted_pairs(self.line.places, s)[0]) for s in range(1, widest + 1)]
+        pairs = [len(shifted_pairs(self.line.grid_index, s)[0]) for s in range(1, widest + 1)]
         return max(range(1, widest + 1), key=lambda s: (pairs[s - 1], s))
 
     @property
     def max_sources(self) -> int:
         """Number of pairs of sensors."""
-        return len(shifted_pairs(self.line.places, self.shift)[0])
+        return len(shifted_pairs(self.line.grid_index, self.shift)[0])
 
     def directions(self, subspaces: Subspaces) -> Float:
         """Return directions, rad."""
         shift = self.shift
-        phase = esprit_angles(subspaces.signal, *shifted_pairs(self.line.places, shift))
+        phase = esprit_angles(subspaces.signal, *shifted_pairs(self.line.grid_index, shift))
         doa = self.line.to_doa(phase / shift, ENDFIRE_TOLERANCE * self.line.step)
         return doa[~np.isnan(doa)]
 

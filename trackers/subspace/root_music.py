@@ -153,7 +153,7 @@ class PolynomialRooting:
         """Return directions, rad."""
         tolerance = ENDFIRE_TOLERANCE * self.line.step
         n_sources, max_angle = subspaces.signal.shape[-1], self.line.step + tolerance
-        theta = root_music_angles(subspaces.noise, self.line.places, n_sources, max_angle)
+        theta = root_music_angles(subspaces.noise, self.line.grid_index, n_sources, max_angle)
         doa = self.line.to_doa(theta, tolerance)
         return doa[~np.isnan(doa)]
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.direction_measurement import DirectionMeasurement
 from arrivals.measurement_models.manifolds.manifold import Reference
-from arrivals.measurement_models.observed import ObservedSnapshots, updated
+from arrivals.measurement_models.observed import ObservedSnapshots, merge_noise
 from arrivals.motion_models.bernoulli_von_mises import BernoulliVonMises
 from arrivals.motion_models.bessel import bessel_ratio, bessel_ratios
 from arrivals.trackers.direction_tracker import padded
@@ -252,7 +252,7 @@ class SVALSE(VALSE):
         )
         self._keep_densities(posterior, order)
         self.expected_snr_db = posterior.snr_db
-        self.bin_noise = updated(self.bin_noise, observed.bins, posterior.bin_noise)
+        self.bin_noise = merge_noise(self.bin_noise, observed.bins, posterior.bin_noise)
 
     def _keep(self, mu: Float, kappa: Float, existence: Float | Bool, label: Int, age: Int) -> None:
         """Track components, as many as there are slots."""

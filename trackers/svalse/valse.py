@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.direction_measurement import DirectionMeasurement
 from arrivals.measurement_models.manifolds.manifold import Manifold, Reference
-from arrivals.measurement_models.observed import ObservedSnapshots, updated
+from arrivals.measurement_models.observed import ObservedSnapshots, merge_noise
 from arrivals.trackers.direction_tracker import BatchDirectionTracker
 from arrivals.trackers.registry import register
 from arrivals.trackers.svalse.components import (
@@ -165,7 +165,7 @@ class VALSE(BatchDirectionTracker):
 
     def store(self, posterior: ComponentPosterior, observed: ObservedSnapshots) -> None:
         """Report the active components, and keep the noise of each bin."""
-        self.bin_noise = updated(self.bin_noise, observed.bins, posterior.bin_noise)
+        self.bin_noise = merge_noise(self.bin_noise, observed.bins, posterior.bin_noise)
         manifold = observed.manifold
         self.report_posterior(posterior, manifold, detected(manifold, posterior))
 

@@ -12,7 +12,7 @@ from arrivals.measurement_models import ElementResponse
 
 @settings(deadline=None)
 @given(st.floats(-7, 7), st.integers(0, 1))
-def test_gains_pass_through_their_table_and_have_its_slope(azimuth: float, even: int) -> None:
+def test_gains_interpolate_their_table_with_its_slope(azimuth: float, even: int) -> None:
     gains = np.random.default_rng(5).normal(size=(7 + even, 3, 2)) @ np.array([1, 0.5j])
     response = ElementResponse(gains)
     np.testing.assert_allclose(response(2 * np.pi * np.arange(7 + even) / (7 + even))[0], gains,
@@ -36,6 +36,6 @@ def test_first_order_elements_are_omni_plus_cosine() -> None:
         ([["loud"]], "gains must be numbers"),
     ],
 )
-def test_bad_gains_are_refused(gains: Any, message: str) -> None:
+def test_invalid_gains_are_refused(gains: Any, message: str) -> None:
     with pytest.raises((ValueError, TypeError), match=message):
         ElementResponse(gains)

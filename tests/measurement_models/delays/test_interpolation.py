@@ -106,7 +106,7 @@ def test_golden_bounds(name: str, wanted: tuple[float, ...]) -> None:
     np.testing.assert_allclose(ours, wanted, rtol=4e-5 if name == "band" else 0, atol=5.1e-6)
 
 
-def test_the_exact_bound_is_above_the_formula_and_nears_it() -> None:
+def test_exact_bound_is_above_the_formula_and_converges_to_it() -> None:
     model = SOURCES["band"].measurement
     ours = [np.rad2deg(exact_bound(model, np.deg2rad(60), n)) for n in (25, 50)]
     np.testing.assert_allclose(ours, (0.710, 0.467), atol=5e-4)
@@ -118,7 +118,7 @@ def test_the_exact_bound_is_above_the_formula_and_nears_it() -> None:
 
 @every_source
 @given(tau=delays)
-def test_the_derivative_of_a_correlation_is_its_slope(
+def test_correlation_derivative_equals_numerical_slope(
     source: SourceCorrelation, tau: float
 ) -> None:
     step = 1e-5
@@ -130,20 +130,20 @@ def test_the_derivative_of_a_correlation_is_its_slope(
 
 @every_source
 @given(tau=delays)
-def test_the_jacobian_of_the_taps_is_their_slope(source: SourceCorrelation, tau: float) -> None:
+def test_taps_jacobian_equals_numerical_slope(source: SourceCorrelation, tau: float) -> None:
     taps, step = DelayInterpolator(source, range(-1, 3), loading=0.1), 1e-5
     slope = (taps.coefficients(tau + step) - taps.coefficients(tau - step)) / (2 * step)
     np.testing.assert_allclose(taps.jacobian(tau), slope, atol=1e-6)
 
 
 @pytest.mark.parametrize("tap", [-1, 0, 1, 2])
-def test_at_a_tap_the_tap_is_taken(tap: int) -> None:
+def test_coefficients_at_a_tap_select_that_tap(tap: int) -> None:
     c = DelayInterpolator(BAND, range(-1, 3)).coefficients(float(tap))
     np.testing.assert_allclose(c, np.arange(-1, 3) == tap, atol=1e-12)
 
 
 @given(tau=delays, frequency=st.floats(0.05, 0.45))
-def test_two_taps_give_a_tone_at_any_delay(tau: float, frequency: float) -> None:
+def test_two_taps_reproduce_a_tone_at_any_delay(tau: float, frequency: float) -> None:
     omega = 2 * np.pi * frequency
     wanted = np.sin(omega * np.array([1 - tau, tau])) / np.sin(omega)
     np.testing.assert_allclose(DelayInterpolator(Tones(frequency)).coefficients(tau), wanted,
@@ -151,7 +151,7 @@ def test_two_taps_give_a_tone_at_any_delay(tau: float, frequency: float) -> None
 
 
 @given(tau=delays, ratio=st.floats(0.01, 10))
-def test_taps_that_know_their_noise_are_orthogonal_to_the_error(tau: float, ratio: float) -> None:
+def test_taps_with_true_loading_are_orthogonal_to_the_error(tau: float, ratio: float) -> None:
     """Section 5: with ε_c = ε the noise moves no stationary point."""
     taps = DelayInterpolator(BAND, (0, 1), loading=ratio)
     c, dc = taps.coefficients(tau), taps.jacobian(tau)
@@ -165,7 +165,7 @@ def test_taps_that_know_their_noise_are_orthogonal_to_the_error(tau: float, rati
     ids=["band", "tone", "phasor"],
 )
 @given(seed=st.integers(0, 1000))
-def test_the_jacobian_of_a_delay_line_is_its_slope(line: SourceAtCentre, seed: int) -> None:
+def test_delay_line_jacobian_equals_numerical_slope(line: SourceAtCentre, seed: int) -> None:
     x = np.random.default_rng(seed).standard_normal(2 + line.dim_source)
     numeric = np.array(
         [(line.h(x + step) - line.h(x - step)) / 2e-5 for step in 1e-5 * np.eye(x.size)]
@@ -174,7 +174,7 @@ def test_the_jacobian_of_a_delay_line_is_its_slope(line: SourceAtCentre, seed: i
     assert (line.H(x)[:, 1] == 0).all()
 
 
-def test_a_delay_line_of_a_tone_and_the_phasor_foretell_the_same() -> None:
+def test_delay_line_of_a_tone_and_phasor_predict_equal_samples() -> None:
     line, phasor = DelayLine(5, 0.1, Tones(0.2), 2.0), Phasor(5, 0.1, 0.2)
     omega = 2 * np.pi * 0.2
     u, v, delay = 0.7, -0.4, 1.3
@@ -182,7 +182,7 @@ def test_a_delay_line_of_a_tone_and_the_phasor_foretell_the_same() -> None:
     np.testing.assert_allclose(line.h([delay, *s]), phasor.h([delay, u, v]), atol=1e-8)
 
 
-def test_the_delay_is_read_alone_whatever_moves_beside_it() -> None:
+def test_measurement_depends_on_the_delay_only() -> None:
     X = np.random.default_rng(0).standard_normal((3, 2))
     model = InterpolationDelay(DelayInterpolator(BAND), 4, 0.1, regressors=X)
     np.testing.assert_array_equal(model.h([0.3]), model.h([0.3, 7.0]))
@@ -190,7 +190,7 @@ def test_the_delay_is_read_alone_whatever_moves_beside_it() -> None:
     assert model.sample([0.3], np.random.default_rng(0)).shape == (3,)
 
 
-def test_delays_move_as_the_linear_models_they_are() -> None:
+def test_delay_motions_equal_linear_motions() -> None:
     x = np.array([1.0, 0.1])
     np.testing.assert_array_equal(DelayDrift(0.3).f(x), ConstantVelocity(0.3, 1).f(x))
     assert DelayWalk(0.3).dim_x == 1
@@ -199,21 +199,21 @@ def test_delays_move_as_the_linear_models_they_are() -> None:
     np.testing.assert_allclose(both.F(np.zeros(3)) @ [1.0, 0.1, 4.0], both.f([1.0, 0.1, 4.0]))
 
 
-def test_an_asymmetric_scene_keeps_the_packages_sign() -> None:
+def test_asymmetric_scene_has_the_steering_sign() -> None:
     """Three sensors, one on the left missing, a source on the right: it arrives there first."""
     array = SensorArray.ula(5, spacing=0.4, missing=[1], speed=1.0)
     model = ArraySamples(array, 1.0, BAND)
     doa = np.deg2rad(35.0)
     arrival = -array.positions[:, 0] * np.sin(doa)  # s after the origin
     assert arrival.argmin() == 3
-    lag = model.places * model.delay(doa)
+    lag = model.grid_index * model.delay(doa)
     np.testing.assert_allclose(lag - lag.min(), arrival - arrival.min(), atol=1e-12)
-    assert model.places.tolist() == [4, 2, 1, 0]
+    assert model.grid_index.tolist() == [4, 2, 1, 0]
     frame = model.frame(np.array([1.0, 2.0, 3.0, 4.0]))
     np.testing.assert_array_equal(frame, [4.0, 3.0, 2.0, np.nan, 1.0])
 
 
-def test_autoregressive_correlation_obeys_yule_and_walker() -> None:
+def test_autoregressive_correlation_satisfies_yule_walker() -> None:
     source = Autoregressive([1.2, -0.8])
     rho = source.rho(np.arange(4))
     np.testing.assert_allclose(rho[2:], 1.2 * rho[1:-1] - 0.8 * rho[:-2], atol=1e-10)
@@ -223,7 +223,7 @@ def test_autoregressive_correlation_obeys_yule_and_walker() -> None:
 # -- bad input ---------------------------------------------------------------------------------
 
 
-def test_nonsense_is_refused_with_a_message() -> None:
+def test_invalid_parameters_raise_with_message() -> None:
     with pytest.raises(ValueError, match=r"half the sampling rate.*singular"):
         Tones(0.5)
     with pytest.raises(ValueError, match="powers must be 2"):
@@ -242,7 +242,7 @@ def test_nonsense_is_refused_with_a_message() -> None:
         Phasor(4, 0.1, 0.5)
 
 
-def test_measurements_that_do_not_fit_are_refused() -> None:
+def test_measurements_of_wrong_shape_are_refused() -> None:
     model = InterpolationDelay(DelayInterpolator(BAND), 4, 0.1)
     with pytest.raises(ValueError, match="pass or bind regressors"):
         model.h([0.3])
@@ -262,8 +262,6 @@ def test_measurements_that_do_not_fit_are_refused() -> None:
         (SensorArray.ula(5, 2.0, speed=1.0), "alias limit, 0.25 Hz"),
     ],
 )
-def test_arrays_without_a_delay_between_neighbours_are_refused(
-    array: SensorArray, message: str
-) -> None:
+def test_array_without_common_neighbour_delay_is_refused(array: SensorArray, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         ArraySamples(array, 1.0, BAND)

@@ -47,9 +47,7 @@ def directions(model: ArraySnapshot, n: int = 41) -> Float:
 
 @every_model
 @pytest.mark.parametrize("reference", ["middle", "first"])
-def test_the_series_is_the_response_to_a_phase_of_each_direction(
-    model: ArraySnapshot, reference: Any
-) -> None:
+def test_series_equals_the_response_up_to_a_phase(model: ArraySnapshot, reference: Any) -> None:
     manifold = model.manifold(reference)
     assert isinstance(manifold, FourierManifold)
     doa = directions(model)
@@ -62,7 +60,7 @@ def test_the_series_is_the_response_to_a_phase_of_each_direction(
 
 
 @pytest.mark.parametrize("radius", [0.3, 0.65, 2.0, 5.0])
-def test_the_series_of_a_circle_is_short_and_exact(radius: float) -> None:
+def test_series_of_a_circle_is_short_and_exact(radius: float) -> None:
     """Specification: about 2πr/λ plus 10 to 25 harmonics, errors below 4e-10."""
     array = SensorArray.uca(9, radius)
     manifold = ArraySnapshot(array, 1.0).manifold()
@@ -73,7 +71,7 @@ def test_the_series_of_a_circle_is_short_and_exact(radius: float) -> None:
 
 
 @every_model
-def test_the_norm_is_that_of_the_response(model: ArraySnapshot) -> None:
+def test_norm_squared_equals_that_of_the_response(model: ArraySnapshot) -> None:
     manifold = model.manifold()
     theta = directions(model)
     exact = (np.abs(manifold.steering(theta)) ** 2).sum(axis=2)  # (S, F, n)
@@ -86,7 +84,7 @@ def test_the_norm_is_that_of_the_response(model: ArraySnapshot) -> None:
 
 
 @every_model
-def test_amplitudes_are_those_at_the_origin(model: ArraySnapshot) -> None:
+def test_to_amplitude_refers_to_the_origin(model: ArraySnapshot) -> None:
     manifold, doa = model.manifold(), np.array([0.4])
     w = manifold.to_amplitude([2j], doa)
     if model.n_bins == 1 and not model.slowness and not model.elevation:
@@ -97,7 +95,9 @@ def test_amplitudes_are_those_at_the_origin(model: ArraySnapshot) -> None:
 
 
 @every_model
-def test_fewer_sensors_and_bins_are_the_smaller_array(model: ArraySnapshot) -> None:
+def test_manifold_without_sensors_and_bins_equals_that_of_the_smaller_array(
+    model: ArraySnapshot,
+) -> None:
     manifold = model.manifold()
     part = manifold.without([0, 3])
     assert manifold.without([]) is manifold
@@ -112,9 +112,9 @@ def test_fewer_sensors_and_bins_are_the_smaller_array(model: ArraySnapshot) -> N
                                    atol=1e-7)  # fmt: skip
 
 
-def test_a_line_s_angle_folds_to_the_front() -> None:
+def test_to_doa_of_a_line_folds_angles_to_the_front() -> None:
     manifold = ArraySnapshot(SPARSE, [1.0, 1.7]).manifold()
-    assert manifold.mirror
+    assert manifold.front_back_ambiguous
     theta = np.deg2rad([0.0, 80.0, 100.0, 180.0, -100.0, 260.0])
     np.testing.assert_allclose(
         np.rad2deg(manifold.to_doa(theta)), [0, 80, 80, 0, -80, -80], atol=1e-9
@@ -135,7 +135,7 @@ def test_a_line_s_angle_folds_to_the_front() -> None:
         (ArraySnapshot(SensorArray(np.sqrt([0.0, 0.2, 0.7, 1.9])), 1.0), False),
     ],
 )
-def test_only_a_grid_within_half_of_one_wavelength_has_an_electrical_angle(
+def test_electrical_angle_requires_a_grid_within_half_a_wavelength(
     model: ArraySnapshot, fast: bool
 ) -> None:
     assert isinstance(model.manifold(), UniformLineManifold) is fast
@@ -145,7 +145,7 @@ def test_only_a_grid_within_half_of_one_wavelength_has_an_electrical_angle(
 
 
 @every_model
-def test_model_survives_pickle_json_and_configuration(model: ArraySnapshot) -> None:
+def test_model_makes_the_round_trip_of_pickle_json_and_configuration(model: ArraySnapshot) -> None:
     assert pickle.loads(pickle.dumps(model)) == model
     again = ArraySnapshot.from_dict(json.loads(json.dumps(model.to_dict())))
     assert again == model
@@ -153,7 +153,7 @@ def test_model_survives_pickle_json_and_configuration(model: ArraySnapshot) -> N
     assert fourier_manifold(again.waves) is fourier_manifold(model.waves)
 
 
-def test_responses_are_parts_of_the_gaussian_interface() -> None:
+def test_responses_equal_parts_of_the_gaussian_interface() -> None:
     model = MODELS["cardioids"]
     x, steps = np.array([0.4, 1.2, -0.7]), 1e-6 * np.eye(3)
     slope = (model.h(x + steps) - model.h(x - steps)).T / 2e-6
@@ -164,7 +164,7 @@ def test_responses_are_parts_of_the_gaussian_interface() -> None:
 
 
 @every_model
-def test_shape_and_snapshots_agree(model: ArraySnapshot) -> None:
+def test_measurement_has_the_shape_of_the_model(model: ArraySnapshot) -> None:
     rng = np.random.default_rng(0)
     z = model.simulate(np.zeros((5, 2)), 1.0, rng)
     assert z.shape == (5, *model.shape)
@@ -173,7 +173,7 @@ def test_shape_and_snapshots_agree(model: ArraySnapshot) -> None:
     assert np.array_equal(np.swapaxes(Y, 1, 2).reshape(model.shape), z[0])
 
 
-def test_simulated_snapshots_are_waves_of_their_amplitudes() -> None:
+def test_simulated_snapshots_without_noise_equal_the_waves() -> None:
     model = ArraySnapshot(PLANE, [1.0, 1.3], n_snapshots=3, noise=1e-30)
     w = np.random.default_rng(0).normal(size=(4, 2, 3, 2)) + 0j
     doa = np.array([[0.1, np.nan], [0.2, 1.0], [0.3, 1.0], [0.4, -2.0]])
@@ -183,7 +183,7 @@ def test_simulated_snapshots_are_waves_of_their_amplitudes() -> None:
     np.testing.assert_allclose(z, np.einsum("tfnk,tkfm->tfnm", w * on, a), atol=1e-12)
 
 
-def test_the_likelihood_of_snapshots_is_the_product_of_theirs() -> None:
+def test_likelihood_of_several_snapshots_is_the_product() -> None:
     several = ArraySnapshot(PLANE, [1.0, 1.3], n_snapshots=2, noise=0.3, power=2.0)
     z = several.simulate([0.4, -1.0], 1.0, np.random.default_rng(0))
     z[1, 0, 2] = np.nan
@@ -196,7 +196,7 @@ def test_the_likelihood_of_snapshots_is_the_product_of_theirs() -> None:
     np.testing.assert_allclose(several.log_likelihood(z, doa), alone, rtol=1e-12)
 
 
-def test_an_unknown_slowness_is_averaged_over() -> None:
+def test_likelihood_averages_over_an_unknown_slowness() -> None:
     slow = ArraySnapshot(PLANE, 1.0, noise=0.3, slowness=[0.8, 1.0])
     z = ArraySnapshot(PLANE, 1.0, noise=0.3).simulate([0.4], 1.0, np.random.default_rng(0))
     doa = np.array([[0.4], [2.0]])
@@ -205,7 +205,7 @@ def test_an_unknown_slowness_is_averaged_over() -> None:
     np.testing.assert_allclose(found, logsumexp(each, axis=0) - np.log(2), rtol=1e-12)
 
 
-def test_elevated_waves_come_over_a_shorter_ground_path_and_by_height() -> None:
+def test_elevated_waves_have_shorter_ground_phases_and_height_phases() -> None:
     waves = PlaneWaves(SPACE, (1.0,), elevation=(0.5,))
     u = np.array([np.cos(0.5) * np.cos(0.3), np.cos(0.5) * np.sin(0.3), np.sin(0.5)])
     expected = np.exp(2j * np.pi * SPACE.positions @ u)
@@ -236,7 +236,9 @@ def alike(model: ArraySnapshot, pair: tuple[float, float]) -> float:
         (ArraySnapshot(SensorArray(SQUARE), 2.1), False),
     ],
 )
-def test_ambiguous_directions_are_found(model: ArraySnapshot, is_ambiguous: bool) -> None:
+def test_ambiguity_returns_a_pair_of_equal_response(
+    model: ArraySnapshot, is_ambiguous: bool
+) -> None:
     pair = model.ambiguity()
     assert (pair is not None) is is_ambiguous
     if pair is not None:
@@ -244,7 +246,7 @@ def test_ambiguous_directions_are_found(model: ArraySnapshot, is_ambiguous: bool
         assert abs(pair[0] - pair[1]) > 0.1
 
 
-def test_the_first_image_of_a_sparse_line_is_that_of_endfire() -> None:
+def test_ambiguity_of_a_sparse_line_is_at_endfire() -> None:
     pair = ArraySnapshot(SensorArray.ula(8, 0.8), 1.0).ambiguity()
     assert pair is not None
     np.testing.assert_allclose(
@@ -270,7 +272,9 @@ def test_the_first_image_of_a_sparse_line_is_that_of_endfire() -> None:
         ),
     ],
 )
-def test_arrays_that_give_no_directions_are_refused(array: SensorArray, message: str) -> None:
+def test_arrays_without_identifiable_directions_are_refused(
+    array: SensorArray, message: str
+) -> None:
     with pytest.raises(ValueError, match=message):
         ArraySnapshot(array, 1.0).manifold()
 
@@ -305,7 +309,7 @@ def test_directional_elements_resolve_front_and_back() -> None:
         ({"array": SPARSE, "response": ElementResponse.first_order([0.0] * 5)}, "in a plane"),
     ],
 )
-def test_bad_parts_are_refused(changes: dict[str, Any], message: str) -> None:
+def test_invalid_parameters_are_refused(changes: dict[str, Any], message: str) -> None:
     with pytest.raises((ValueError, TypeError), match=message):
         MODELS["circle"].replace(**changes)
 

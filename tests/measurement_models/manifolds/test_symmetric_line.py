@@ -14,7 +14,7 @@ every_size = pytest.mark.parametrize("array", ARRAYS, ids=lambda a: f"M{a.n_sens
 
 
 @every_size
-def test_transformed_response_is_real_and_as_the_formula_says(array: SensorArray) -> None:
+def test_transformed_response_is_real_and_equals_the_formula(array: SensorArray) -> None:
     manifold, doa = ArrayManifold(array, 1.0), np.linspace(-1.5, 1.5, 61)
     turned = manifold.transform(array.steering_vector(doa, 1.0))
     assert abs(turned.imag).max() < 1e-15
@@ -23,20 +23,20 @@ def test_transformed_response_is_real_and_as_the_formula_says(array: SensorArray
 
 
 @every_size
-def test_transformation_is_unitary_so_that_noise_stays_white(array: SensorArray) -> None:
+def test_transformation_is_unitary(array: SensorArray) -> None:
     T = ArrayManifold(array, 1.0).T
     np.testing.assert_allclose(T.conj().T @ T, np.eye(array.n_sensors), atol=1e-15)
 
 
 @given(st.floats(-1.5, 1.5))
-def test_phases_lead_back_to_the_direction(doa: float) -> None:
+def test_doa_inverts_phases(doa: float) -> None:
     manifold = ArrayManifold(SensorArray.symmetric([0.5, 1.5, 2.5]), 1.0)
     a = manifold.real_steering(doa)
     known = manifold.doa(np.arctan2(a[4:], a[:3]))
     assert np.sin(known) == pytest.approx(np.sin(doa), abs=1e-12)
 
 
-def test_pairs_are_weighted_as_least_squares_does() -> None:
+def test_doa_weights_pairs_by_least_squares() -> None:
     manifold = ArrayManifold(SensorArray.symmetric([0.25, 0.5, 0.75]), 1.0)
     d, rng = manifold.distances, np.random.default_rng(0)
     phi = manifold.phases(0.4) + 0.05 * rng.standard_normal((1000, 3))
@@ -44,7 +44,7 @@ def test_pairs_are_weighted_as_least_squares_does() -> None:
     np.testing.assert_allclose(np.sin(manifold.doa(phi)), fitted, atol=1e-12)
 
 
-def test_order_of_the_sensors_and_place_of_the_array_do_not_matter() -> None:
+def test_manifold_is_invariant_to_sensor_order_and_array_position() -> None:
     places = np.array([0.5, -0.25, 0.0, 0.25, -0.5])
     manifold = ArrayManifold(SensorArray(places), 1.0)
     a = manifold.array.steering_vector(0.7, 1.0)
@@ -54,7 +54,7 @@ def test_order_of_the_sensors_and_place_of_the_array_do_not_matter() -> None:
     np.testing.assert_allclose(shifted.transform(z / z[2]), manifold.real_steering(0.7), atol=1e-14)
 
 
-def test_gaussian_face_is_the_snapshots_turned() -> None:
+def test_gaussian_interface_equals_transformed_snapshots() -> None:
     array = SensorArray.symmetric([0.2, 0.45])
     manifold, snapshot = ArrayManifold(array, 1.0, noise=0.3), ArraySnapshot(array, 1.0, noise=0.3)
     x = np.array([0.4, 1.0, -0.5])
@@ -93,7 +93,7 @@ WRONG: list[tuple[Callable[[], object], type[Exception], str]] = [
 
 
 @pytest.mark.parametrize(("call", "error", "message"), WRONG, ids=[w[2][:25] for w in WRONG])
-def test_bad_input_is_told(
+def test_invalid_input_raises_with_message(
     call: Callable[[], object], error: type[Exception], message: str
 ) -> None:
     with pytest.raises(error, match=message):

@@ -28,7 +28,7 @@ def grid_posterior(zs: Any, walk: VonMisesWalk, start: float, variance: float) -
     away = (grid - start + np.pi) % (2 * np.pi) - np.pi
     turns = 2 * np.pi * np.arange(-1, 2)[:, None]
     p = np.exp(-((away + turns) ** 2) / (2 * variance)).sum(axis=0)
-    step = np.exp(log_density(grid[:, None], grid, walk.step()))
+    step = np.exp(log_density(grid[:, None], grid, walk.step_concentration()))
     for z in zs:
         p = step @ (p / p.sum())
         log = CIRCLE.log_likelihood(z, grid[:, None])

@@ -196,10 +196,12 @@ def test_d5_residuals_of_two_taps_equal_those_of_the_model() -> None:
     tracker.predict()
     tracker.update(z[10])
     model = tracker.assembly.final.baseline_models[0]  # type: ignore[union-attr]  # of "B"
-    scaled = z[:11, np.argsort(TONE.measurement.places)] / np.sqrt(TONE.measurement.power or 1.0)
+    scaled = z[:11, np.argsort(TONE.measurement.grid_index)] / np.sqrt(
+        TONE.measurement.power or 1.0
+    )
     now, X = model.split(scaled)
-    places = TONE.measurement.places
-    expected = np.concatenate([[0.0], now - model.h(tracker.x_prior, X)])[places]
+    grid_index = TONE.measurement.grid_index
+    expected = np.concatenate([[0.0], now - model.h(tracker.x_prior, X)])[grid_index]
     np.testing.assert_allclose(tracker.y, expected, atol=1e-12)
 
 
@@ -271,12 +273,12 @@ def test_line_with_gaps_has_residuals_in_the_order_of_its_sensors() -> None:
     array = SensorArray(positions(), speed=1000.0)
     model = ArraySamples(array, rate=1000.0, correlation=Tones(0.2), snr_db=20.0, power=0.5)
     tracker = InterpolationEKF(model, variant=VARIANTS["B"].replace(extrapolate=True), doa=0.3)
-    lag = model.places * model.delay(0.4)
+    lag = model.grid_index * model.delay(0.4)
     for k in range(8):
         tracker.predict()
         tracker.update(np.cos(0.4 * np.pi * (k - lag)))
     assert tracker.y.shape == (5,)
-    known = np.isin(model.places - 1, model.places)
+    known = np.isin(model.grid_index - 1, model.grid_index)
     np.testing.assert_array_equal(tracker.H[:, 0] != 0, known)
 
 

@@ -40,7 +40,7 @@ TRUTH = np.array([[-50.0, 10.0], [20.0, -40.0], [35.0, 45.0]])
 U = db_to_neper([82.0, 79.0, 80.0])
 
 
-def test_evidence_is_the_integral() -> None:
+def test_evidence_equals_the_integral() -> None:
     """Compare with quadrature over the three parameters of one source."""
     model = network(0, 6).replace(n_snapshots=400)
     new = NewSourcePrior(float(U[0]), V0, np.array([-45.0, 15.0]), 6.0, 2.0)
@@ -172,7 +172,7 @@ def test_a_source_is_confirmed_after_three_steps_and_deleted_after_three() -> No
     assert np.nanmin(run.existence[5:10, 0]) > 0.98
 
 
-def test_noise_alone_starts_no_track() -> None:
+def test_noise_alone_initiates_no_track() -> None:
     model = network(8)
     z = model.draw(np.zeros((12, 0)), np.zeros((12, 0, 2)), np.random.default_rng(0))
     assert RSSVB(RandomWalk(q=0.5), model, births=True).run(z).n_found.max() == 0

@@ -93,7 +93,7 @@ def test_correlated_readings_have_less_weight() -> None:
 @pytest.mark.parametrize("motion", [
     RandomWalk(q=6.0), ConstantVelocity(q=0.1), CoordinatedTurn(q=0.1, q_turn=1e-4)
 ])  # fmt: skip
-def test_any_motion_keeps_labels_and_finds_speeds(motion: Any) -> None:
+def test_any_motion_keeps_labels_and_estimates_speeds(motion: Any) -> None:
     trial = CrossingSources(n_steps=25).sample(np.random.default_rng(2))
     n, xy = motion.dim_x, (0, 1) if motion.dim_x == 2 else (0, 2)
     x0 = np.zeros((3, n))
@@ -112,7 +112,7 @@ def test_any_motion_keeps_labels_and_finds_speeds(motion: Any) -> None:
         np.testing.assert_allclose(states[:, [1, 3]], speed, atol=1.2)
 
 
-def test_batch_with_gaps_is_the_loop() -> None:
+def test_batch_with_missing_readings_equals_the_loop() -> None:
     trial = CrossingSources(n_steps=6).sample(np.random.default_rng(0))
     tracker = trial.tracker("rss_vb")
     z = trial.measurement.draw(
@@ -143,7 +143,7 @@ def test_one_source_reaches_the_bound() -> None:
     assert np.sqrt(np.mean(far[far < 5] ** 2)) == pytest.approx(bound, rel=0.15)
 
 
-def test_from_a_random_start_vb_beats_the_joint_maximum() -> None:
+def test_vb_from_a_random_start_has_smaller_errors_than_the_joint_maximum() -> None:
     case = Table1K3(start_at="random")
     ours, theirs = rms(case, "vb"), rms(case, "lm")
     assert 7.5 < ours < 13.5
@@ -151,7 +151,7 @@ def test_from_a_random_start_vb_beats_the_joint_maximum() -> None:
     assert ours < 0.9 * theirs
 
 
-def test_from_the_prior_they_are_equal_and_the_literal_refresh_is_worse() -> None:
+def test_vb_and_joint_maximum_from_the_prior_are_equal_and_literal_refresh_is_worse() -> None:
     ours, theirs, literal = (rms(Table1K3(), name) for name in ("vb", "lm", "vb_literal"))
     assert 3.5 < ours < 7.0
     assert ours == pytest.approx(theirs, rel=0.25)

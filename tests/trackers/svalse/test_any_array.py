@@ -68,7 +68,9 @@ def test_turning_array_and_sources_turns_every_angle_of_coordinate_ascent(
 
 @pytest.mark.parametrize("model", [CIRCLE, SEVERAL], ids=["one snapshot", "several"])
 @pytest.mark.parametrize("factor", [1e-7, 3e6 * np.exp(2j)])
-def test_scale_and_common_phase_change_nothing(model: ArraySnapshot, factor: complex) -> None:
+def test_estimates_are_invariant_to_scale_and_common_phase(
+    model: ArraySnapshot, factor: complex
+) -> None:
     z = snapshots_of(model, [[0.3, -2.0, 3.1]] * 3, noise=0.02)
     one, other = SVALSE(model, SLOW).run_batch([z, factor * z])
     np.testing.assert_allclose(other.doa, one.doa, atol=1e-8)
@@ -86,7 +88,7 @@ def test_missing_sensor_equals_the_array_without_it(model: ArraySnapshot) -> Non
     np.testing.assert_allclose(one.amplitude, other.amplitude, atol=1e-12)
 
 
-def test_order_of_bins_and_of_snapshots_does_not_matter() -> None:
+def test_estimates_are_invariant_to_the_order_of_bins_and_snapshots() -> None:
     z = snapshots_of(SEVERAL, [[0.3, -2.0]] * 3, noise=0.05)
     turned = SEVERAL.replace(wavelength=SEVERAL.wavelengths[::-1])
     one, other = SVALSE(SEVERAL, SLOW).run(z), SVALSE(turned, SLOW).run(z[:, ::-1, [2, 0, 1]])
@@ -105,7 +107,7 @@ def test_missing_bin_and_snapshot_equal_the_model_without_them() -> None:
     np.testing.assert_allclose(SVALSE(SEVERAL, SLOW).run(damaged).doa, expected.doa, atol=1e-12)
 
 
-def test_tempering_by_the_number_of_snapshots_decides_like_one() -> None:
+def test_tempering_by_the_number_of_snapshots_equals_one_snapshot() -> None:
     """The same snapshot ten times over, counted once: equal support and angles."""
     z = snapshots_of(CIRCLE, [[0.3, -2.0]], noise=0.05)
     ten = CIRCLE.replace(n_snapshots=10)
@@ -117,7 +119,7 @@ def test_tempering_by_the_number_of_snapshots_decides_like_one() -> None:
 
 
 @pytest.mark.parametrize("reference", ["middle", "first"])
-def test_the_direction_form_of_a_line_finds_what_the_electrical_one_does(reference: Any) -> None:
+def test_fourier_and_electrical_form_of_a_line_agree(reference: Any) -> None:
     line = ArraySnapshot(SensorArray.ula(11, 0.5), 1.0)
     z = snapshots_of(line, [[-0.7, 0.1, 0.9]] * 4, noise=1e-3)
     motion = BernoulliVonMises(sigma_doa=np.deg2rad(1.5))
@@ -132,7 +134,7 @@ def test_the_direction_form_of_a_line_finds_what_the_electrical_one_does(referen
             np.testing.assert_allclose(found, wanted, rtol=rtol)
 
 
-def test_the_whole_posterior_of_a_line_gives_what_its_von_mises_density_does() -> None:
+def test_whole_posterior_and_von_mises_density_of_a_line_agree() -> None:
     """Specification, section 11: 5.57 and 5.57 on Fig. 4; nothing is ambiguous there."""
     trial = create("svalse_fig4", n_steps=6).sample(np.random.default_rng(1))
     one = trial.tracker("svalse", engine="coordinate").run(trial.measurements)
@@ -140,7 +142,7 @@ def test_the_whole_posterior_of_a_line_gives_what_its_von_mises_density_does() -
     np.testing.assert_allclose(np.sort(other.doa[:, :4]), np.sort(one.doa[:, :4]), atol=0.05)
 
 
-def test_amplitudes_rebuild_the_snapshot() -> None:
+def test_amplitudes_reproduce_the_snapshot() -> None:
     array = SensorArray(CIRCLE.array.positions + np.array([3.0, -2.0]))
     model = ArraySnapshot(array, 1.0)
     z = snapshots_of(model, [[0.3, -2.0]], noise=1e-8)[0]
@@ -153,7 +155,7 @@ def test_amplitudes_rebuild_the_snapshot() -> None:
 # -- detected sources ------------------------------------------------------------------------------
 
 
-def test_one_label_goes_through_the_cut() -> None:
+def test_label_is_constant_through_180_degrees() -> None:
     doa = np.deg2rad(160 + 3 * np.arange(14.0))[:, None]
     run = SVALSE(CIRCLE, SLOW).run(snapshots_of(CIRCLE, doa))
     track = np.where(run.label == 0, run.doa, np.nan)[:, 0]
@@ -161,21 +163,21 @@ def test_one_label_goes_through_the_cut() -> None:
     assert track.min() < -2.9 < 2.9 < track.max()
 
 
-def test_two_sources_either_side_of_the_cut_are_merged_if_too_near() -> None:
+def test_near_sources_across_180_degrees_are_merged() -> None:
     z = snapshots_of(CIRCLE, [np.deg2rad([179.6, -179.6])] * 3, noise=1e-7)
     near = SVALSE(CIRCLE, SLOW).run(z).doa
     gaps = np.abs(wrapped(near[:, :, None] - near[:, None])) + 9 * np.eye(near.shape[1])
     assert np.nanmin(gaps) >= np.deg2rad(1.5)
 
 
-def test_zero_data_give_no_source() -> None:
+def test_zero_data_have_no_source() -> None:
     z = snapshots_of(SEVERAL, [[0.3]] * 4)
     z[[0, 2]] = 0
     run = SVALSE(SEVERAL, SLOW).run(z)
     assert run.n_found.tolist() == [0, 1, 0, 1]
 
 
-def test_without_noise_there_is_one_source() -> None:
+def test_snapshot_without_noise_has_one_source() -> None:
     run = SVALSE(SEVERAL, SLOW).run(snapshots_of(SEVERAL, [[0.3]] * 3, noise=1e-30))
     assert run.n_found.tolist() == [1] * 3
     np.testing.assert_allclose(run.doa, 0.3, atol=1e-5)
@@ -229,7 +231,7 @@ def test_one_frequency_a_step_is_ambiguous_until_others_follow() -> None:
     assert np.mean(found["posterior"]) <= np.mean(found["von_mises"]) + 1.0
 
 
-def test_several_frequencies_end_the_ambiguity_at_once() -> None:
+def test_several_frequencies_resolve_the_ambiguity_at_once() -> None:
     trial = create("grating", n_bins=5, n_steps=6, n_sources=2).sample(np.random.default_rng(0))
     run = trial.tracker("svalse").run(trial.measurements)
     g = mean_gospa(np.rad2deg(trial.truth), np.rad2deg(run.doa), c=10.0)
@@ -303,7 +305,7 @@ def test_sparse_line_warns_of_two_ambiguous_directions() -> None:
         (ArraySnapshot(SensorArray.uca(2, 0.5), 1.0), {}, "at least 3 sensors"),
     ],
 )
-def test_parts_that_do_not_fit_are_rejected(
+def test_incompatible_parts_are_rejected(
     model: ArraySnapshot, params: dict[str, Any], message: str
 ) -> None:
     with pytest.raises(ValueError, match=message):

@@ -251,12 +251,12 @@ def test_observed_snapshots_exclude_bins_then_snapshots_then_sensors() -> None:
     Y[:, :, 2] = np.nan
     Y[1, 3, 0] = np.nan
     Y[2] *= 0
-    observed = ObservedSnapshots.of(Y)
+    observed = ObservedSnapshots.from_measurement(Y)
     assert observed.bins.tolist() == [False, True, False]  # the last one has no power
     assert observed.sensors.tolist() == [True, True, True, False]
     assert observed.times.tolist() == [True, True, False, True, True]
     assert observed.snapshots.shape == (1, 3, 4)
-    assert ObservedSnapshots.of(np.zeros((2, 3, 1), dtype=complex)).bins.all()
+    assert ObservedSnapshots.from_measurement(np.zeros((2, 3, 1), dtype=complex)).bins.all()
 
 
 def test_observed_snapshots_without_a_common_sensor_are_refused() -> None:
@@ -265,4 +265,4 @@ def test_observed_snapshots_without_a_common_sensor_are_refused() -> None:
     with pytest.raises(
         ValueError, match="at most 2 of 3 sensors at once, each with a NaN elsewhere"
     ):
-        ObservedSnapshots.of(Y)
+        ObservedSnapshots.from_measurement(Y)

@@ -54,7 +54,7 @@ def slope_of(state: Evaluation, name: str, k: int, h: float, response: ExpectedR
 
 @pytest.mark.parametrize("model", [MODEL, GAPS])
 @pytest.mark.parametrize("seed", [0, 1, 2])
-def test_gradients_are_slopes(seed: int, model: ArraySnapshot) -> None:
+def test_gradients_equal_numerical_slopes(seed: int, model: ArraySnapshot) -> None:
     state, response = scene(seed, model), ExpectedResponse(model.manifold())
     g, curvature = slopes(response, state, *weights(state))
     of_s = 0.5 / state.components.variance[0] - 0.5 * curvature[0]
@@ -69,7 +69,7 @@ def test_gradients_are_slopes(seed: int, model: ArraySnapshot) -> None:
 
 
 @pytest.mark.parametrize("model", [MODEL, GAPS])
-def test_hessian_is_the_slope_of_the_gradient_to_a_hundredth(model: ArraySnapshot) -> None:
+def test_hessian_equals_the_slope_of_the_gradient_to_a_hundredth(model: ArraySnapshot) -> None:
     """At 20 dB; the term left out is a thousandth."""
     state, response = scene(0, model), ExpectedResponse(model.manifold())
     for _ in range(5):
@@ -102,7 +102,7 @@ def written_out(state: Evaluation, w: Complex, C: Complex) -> float:
 
 @settings(deadline=None, max_examples=20)
 @given(st.integers(0, 10**6))
-def test_the_objective_is_the_bound_at_its_best_amplitudes(seed: int) -> None:
+def test_objective_is_the_elbo_at_the_optimal_amplitudes(seed: int) -> None:
     state, rng = scene(seed), np.random.default_rng(seed)
     w, C = state.W[0, 0, :, 0], state.nu[0, 0] * state.G[0, 0]
     assert written_out(state, w, C) == pytest.approx(state.F[0], abs=1e-8)
@@ -112,7 +112,7 @@ def test_the_objective_is_the_bound_at_its_best_amplitudes(seed: int) -> None:
     assert written_out(state, w, C * 0.95) < state.F[0]
 
 
-def test_divergence_is_that_of_a_normal_from_a_von_mises_density() -> None:
+def test_divergence_equals_the_integral_of_its_definition() -> None:
     state = scene(3)
     for k in range(5):
         mu, s, prior, kappa = state.components.packed[0, :4, k]
@@ -125,7 +125,7 @@ def test_divergence_is_that_of_a_normal_from_a_von_mises_density() -> None:
 
 @settings(deadline=None, max_examples=20)
 @given(st.integers(0, 10**6), st.booleans(), st.sampled_from([0.003, 0.01, 0.1, 0.5]))
-def test_the_objective_never_falls_in_a_newton_step(seed: int, learn: bool, nu: float) -> None:
+def test_newton_step_never_decreases_the_objective(seed: int, learn: bool, nu: float) -> None:
     rng, response = np.random.default_rng(seed), ExpectedResponse(MODEL.manifold())
     state = scene(seed)
     components = state.components.copy()
@@ -139,7 +139,7 @@ def test_the_objective_never_falls_in_a_newton_step(seed: int, learn: bool, nu: 
     assert F[-1] > F[0]
 
 
-def test_noise_and_power_end_at_the_fixed_points_of_em() -> None:
+def test_noise_and_power_converge_to_the_fixed_points_of_em() -> None:
     state, response = scene(4), ExpectedResponse(MODEL.manifold())
     for _ in range(40):
         state = newton_step(response, state, np.ones(1, dtype=np.bool_))
@@ -158,7 +158,7 @@ def test_noise_and_power_end_at_the_fixed_points_of_em() -> None:
 
 @settings(deadline=None, max_examples=15)
 @given(st.integers(0, 10**6), st.floats(0, 1))
-def test_a_removal_changes_the_criterion_by_exactly_its_gain(seed: int, kl_weight: float) -> None:
+def test_removal_changes_the_criterion_by_its_gain(seed: int, kl_weight: float) -> None:
     state, response = scene(seed), ExpectedResponse(MODEL.manifold())
     gains = removal_gains(ExpectedResponse(MODEL.manifold()), state, kl_weight)[0]
     for k in range(5):
@@ -168,7 +168,7 @@ def test_a_removal_changes_the_criterion_by_exactly_its_gain(seed: int, kl_weigh
         assert change[0] == pytest.approx(gains[k], abs=1e-7)
 
 
-def test_an_addition_changes_the_evidence_by_exactly_its_gain() -> None:
+def test_addition_changes_the_evidence_by_its_gain() -> None:
     state, response = scene(0), ExpectedResponse(MODEL.manifold())
     grid = CandidateGrid(response, 8, merge=0.0)
     gain = grid_evidence(grid, state)[0][0]
@@ -209,7 +209,7 @@ def test_candidates_keep_the_merge_distance_and_removed_components_return() -> N
 # -- leading axes -----------------------------------------------------------------------------
 
 
-def test_unused_slots_and_other_problems_make_no_difference() -> None:
+def test_unused_slots_and_other_problems_have_no_effect() -> None:
     states = [scene(0, K=5), scene(1, K=3), scene(2, K=4)]
     components = Components.zeros(3, 6)
     for i, state in enumerate(states):
@@ -237,13 +237,13 @@ class Explicit(UniformLineManifold):
 
     @property
     def coefficients(self) -> Any:
-        return np.eye(len(self.places), dtype=np.complex128)[None, None]
+        return np.eye(len(self.grid_index), dtype=np.complex128)[None, None]
 
 
-def test_a_response_with_coefficients_takes_the_same_steps() -> None:
+def test_response_with_coefficients_has_equal_steps() -> None:
     line = GAPS.manifold()
     assert isinstance(line, UniformLineManifold)
-    explicit = Explicit(line.places, line.step, line.origin, line.reference)
+    explicit = Explicit(line.grid_index, line.step, line.origin, line.reference)
     state = scene(0, GAPS)
     one, other = ExpectedResponse(line), ExpectedResponse(explicit)
     assert other.extent == pytest.approx(one.extent)
@@ -265,7 +265,7 @@ def test_extent_of_a_filled_line_is_its_number_of_sensors() -> None:
             assert ExpectedResponse(line).extent == pytest.approx(n)
 
 
-def test_snapshots_fitted_together_are_those_fitted_alone() -> None:
+def test_batch_of_snapshots_equals_single_fits() -> None:
     rng = np.random.default_rng(0)
     Ys, known = [], []
     for n in range(12):

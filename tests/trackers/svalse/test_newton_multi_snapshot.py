@@ -90,7 +90,7 @@ def slope_of(response: ExpectedResponse, state: Evaluation, name: str, k: int, h
 
 @every_model
 @pytest.mark.parametrize("tempering", [1.0, 3.0])
-def test_gradients_are_slopes(model: ArraySnapshot, tempering: float) -> None:
+def test_gradients_equal_numerical_slopes(model: ArraySnapshot, tempering: float) -> None:
     response, state = scene(model, tempering=tempering)
     g, curvature = slopes(response, state, *weights(state))
     of_s = 0.5 / state.components.variance[0] - 0.5 * curvature[0]
@@ -103,7 +103,7 @@ def test_gradients_are_slopes(model: ArraySnapshot, tempering: float) -> None:
 
 
 @every_model
-def test_hessian_is_the_slope_of_the_gradient_to_a_hundredth(model: ArraySnapshot) -> None:
+def test_hessian_equals_the_slope_of_the_gradient_to_a_hundredth(model: ArraySnapshot) -> None:
     response, state = scene(model)
     for _ in range(8):
         state = newton_step(response, state, np.zeros(1, dtype=np.bool_))
@@ -116,7 +116,7 @@ def test_hessian_is_the_slope_of_the_gradient_to_a_hundredth(model: ArraySnapsho
         np.testing.assert_allclose(N[0, :, k], (down - up) / 2e-6, atol=0.01 * np.abs(N).max())
 
 
-def test_mean_responses_and_their_norms_are_those_of_a_dense_sum() -> None:
+def test_mean_responses_and_norms_equal_a_dense_sum() -> None:
     response, mu, s = ExpectedResponse(ELEMENTS.manifold()), np.array([[0.4]]), np.array([[0.02]])
     theta = 0.4 + np.linspace(-1, 1, 4001)
     q = np.exp(-((theta - 0.4) ** 2) / 0.04)
@@ -129,7 +129,7 @@ def test_mean_responses_and_their_norms_are_those_of_a_dense_sum() -> None:
 
 
 @every_model
-def test_a_removal_changes_the_criterion_by_exactly_its_gain(model: ArraySnapshot) -> None:
+def test_removal_changes_the_criterion_by_its_gain(model: ArraySnapshot) -> None:
     response, state = scene(model, tempering=2.0)
     gains = removal_gains(response, state, 0.5)[0]
     for k in range(3):
@@ -140,7 +140,7 @@ def test_a_removal_changes_the_criterion_by_exactly_its_gain(model: ArraySnapsho
 
 
 @every_model
-def test_an_addition_changes_the_evidence_by_exactly_its_gain(model: ArraySnapshot) -> None:
+def test_addition_changes_the_evidence_by_its_gain(model: ArraySnapshot) -> None:
     response, state = scene(model)
     grid = CandidateGrid(response, 4, merge=0.0)
     gain = grid_evidence(grid, state)[0][0]
@@ -168,7 +168,7 @@ def test_relearning_gains_are_not_negative() -> None:
         (SPARSE, [1.40, 0.4, -1.40], -1),
     ],
 )
-def test_first_duplicate_across_the_cut_and_in_the_mirror(
+def test_first_duplicate_across_pi_and_of_ambiguous_angles(
     model: ArraySnapshot, doa: list[float], nearest: int
 ) -> None:
     response, state = scene(model)
@@ -184,7 +184,7 @@ def test_first_duplicate_across_the_cut_and_in_the_mirror(
 
 @settings(deadline=None, max_examples=25)
 @given(st.sampled_from(MODELS), st.integers(0, 10**6), st.booleans())
-def test_the_objective_never_falls_in_a_newton_step(
+def test_newton_step_never_decreases_the_objective(
     model: ArraySnapshot, seed: int, learn: bool
 ) -> None:
     response, state = scene(model, seed)
@@ -227,7 +227,7 @@ def wrapped_normal_bound(
 
 
 @pytest.mark.parametrize("numbers", [{"n_bins": 5}, {"n_snapshots": 5}], ids=["bins", "snapshots"])
-def test_the_bound_is_no_lower_than_that_of_coordinate_ascent(numbers: dict[str, int]) -> None:
+def test_elbo_is_at_least_that_of_coordinate_ascent(numbers: dict[str, int]) -> None:
     """From the same tracked components, in at least nine of ten steps; half KL charged."""
     gain: list[float] = []
     for seed in range(2):

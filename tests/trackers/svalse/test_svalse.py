@@ -19,7 +19,7 @@ from arrivals.trackers import SVALSE, VALSE, NewtonSolver
 
 @settings(deadline=None, max_examples=8)
 @given(st.floats(-8, 8), st.floats(0, 6.28), st.sampled_from([{}, COORDINATE, MIXTURE]))
-def test_scale_and_common_phase_change_nothing(
+def test_estimates_are_invariant_to_scale_and_common_phase(
     log10: float, phase: float, form: dict[str, Any]
 ) -> None:
     trial = short(1, 2)
@@ -41,7 +41,7 @@ def test_conjugation_mirrors_every_direction(form: dict[str, Any], reference: An
     np.testing.assert_array_equal(other.label, one.label)
 
 
-def test_turning_the_line_round_mirrors_every_direction() -> None:
+def test_reversed_line_mirrors_every_direction() -> None:
     """Array and source together: the reversed line hears from -β what the line hears from β."""
     trial = short(3, 3)
     reversed_line = LINE.replace(array=SensorArray(-LINE.array.positions))
@@ -50,7 +50,7 @@ def test_turning_the_line_round_mirrors_every_direction() -> None:
     np.testing.assert_allclose(-other.doa, one.doa, atol=1e-9)
 
 
-def test_an_array_moved_along_its_line_finds_the_same() -> None:
+def test_array_shifted_along_its_line_has_equal_estimates() -> None:
     trial = short(3, 3)
     moved = LINE.replace(array=SensorArray(LINE.array.positions + 12.3))
     one, other = SVALSE(LINE).run(trial.measurements), SVALSE(moved).run(trial.measurements)
@@ -70,7 +70,7 @@ def test_missing_sensor_equals_the_array_without_it(dead: list[int]) -> None:
 
 
 @pytest.mark.parametrize("reference", ["first", "middle"])
-def test_amplitudes_rebuild_the_snapshot(reference: Reference) -> None:
+def test_amplitudes_reproduce_the_snapshot(reference: Reference) -> None:
     model = LINE.replace(array=SensorArray.ula(14, 0.5, missing=[2]))
     y = tone([-0.6, 0.1, 0.9], noise=1e-8, model=model)[0]
     tracker = VALSE(model, reference=reference, solver=NewtonSolver(tolerance=1e-8))
@@ -81,7 +81,7 @@ def test_amplitudes_rebuild_the_snapshot(reference: Reference) -> None:
 
 
 @pytest.mark.parametrize("scale", [1e-200, 1e-130, 1e130, 1e200])
-def test_data_near_the_limits_of_floats_give_the_same(scale: float) -> None:
+def test_data_near_the_limits_of_floats_have_equal_estimates(scale: float) -> None:
     z = tone([0.3], noise=1e-3)[0]
     for tracker in (SVALSE(LINE), VALSE(LINE)):
         if scale > 1e140:
@@ -95,12 +95,12 @@ def test_data_near_the_limits_of_floats_give_the_same(scale: float) -> None:
 # -- detected sources ----------------------------------------------------------------------------
 
 
-def test_an_asymmetric_scene_keeps_its_sign() -> None:
+def test_asymmetric_scene_has_the_steering_sign() -> None:
     run = SVALSE(LINE).run(tone([[0.2, 0.9]] * 3, noise=1e-3))
     np.testing.assert_allclose(np.sort(run.doa[-1, :2]), [0.2, 0.9], atol=5e-3)
 
 
-def test_without_noise_there_is_one_source_and_no_division_by_zero() -> None:
+def test_snapshot_without_noise_has_one_source_and_no_warning() -> None:
     z = LINE.array.steering_vector(np.full(5, 0.4), 1.0)
     run = SVALSE(LINE).run(z)
     assert run.n_found.tolist() == [1] * 5
@@ -108,7 +108,7 @@ def test_without_noise_there_is_one_source_and_no_division_by_zero() -> None:
 
 
 @pytest.mark.parametrize("n_sensors", [2, 3, 4, 8])
-def test_few_and_even_numbers_of_sensors_run(n_sensors: int) -> None:
+def test_arrays_of_few_and_even_numbers_of_sensors_run(n_sensors: int) -> None:
     model = LINE.replace(array=SensorArray.ula(n_sensors, spacing=0.5))
     for tracker in (SVALSE(model), SVALSE(model, **COORDINATE), SVALSE(model, **MIXTURE),
                     VALSE(model), VALSE(model, **COORDINATE)):  # fmt: skip
@@ -118,13 +118,13 @@ def test_few_and_even_numbers_of_sensors_run(n_sensors: int) -> None:
             np.testing.assert_allclose(run.doa[-1, 0], 0.3, atol=0.05)
 
 
-def test_zero_data_give_no_source_and_no_warning() -> None:
+def test_zero_data_have_no_source_and_no_warning() -> None:
     run = SVALSE(LINE).run([np.zeros(15), tone([0.1], 1e-3)[0], np.zeros(15), np.zeros(15)])
     assert run.n_found.tolist() == [0, 1, 0, 0]
     assert run.converged.all()
 
 
-def test_a_line_with_gaps_resolves_with_its_whole_aperture() -> None:
+def test_line_with_gaps_resolves_by_its_whole_aperture() -> None:
     """Six sensors with high sidelobes: 11 of 20 seeds with the Newton solver, 16 with the other."""
     array = SensorArray(np.array([0, 1, 4, 9, 11, 14]) * 0.5)  # a sparse ruler
     model = LINE.replace(array=array)
@@ -138,7 +138,7 @@ def test_a_line_with_gaps_resolves_with_its_whole_aperture() -> None:
         np.testing.assert_allclose(np.sort(run.doa[-1, :4]), doa, atol=0.01)
 
 
-def test_below_half_a_wavelength_nothing_unphysical_is_reported() -> None:
+def test_unphysical_angles_below_half_a_wavelength_are_not_reported() -> None:
     close = ArraySnapshot(SensorArray.ula(16, spacing=0.2), wavelength=1.0)
     rng = np.random.default_rng(0)
     noise = rng.standard_normal((30, 16)) + 1j * rng.standard_normal((30, 16))
@@ -155,7 +155,7 @@ def test_below_half_a_wavelength_nothing_unphysical_is_reported() -> None:
     assert beyond > 0  # there was something to leave out
 
 
-def test_a_source_at_endfire_is_reported_at_endfire() -> None:
+def test_source_at_endfire_is_reported_at_endfire() -> None:
     close = ArraySnapshot(SensorArray.ula(16, spacing=0.25), wavelength=1.0)
     run = SVALSE(close).run(tone([[np.pi / 2]] * 10, noise=0.03, model=close))
     assert (run.n_found >= 1).all()
@@ -163,7 +163,7 @@ def test_a_source_at_endfire_is_reported_at_endfire() -> None:
     assert np.isfinite(run.std[:, 0]).all()
 
 
-def test_a_prediction_that_left_the_physical_range_is_not_reported() -> None:
+def test_prediction_outside_the_physical_range_is_not_reported() -> None:
     close = ArraySnapshot(SensorArray.ula(16, spacing=0.2), wavelength=1.0)
     tracker = SVALSE(close)
     tracker.run(tone([[0.3]] * 2, noise=1e-3, model=close))
@@ -177,7 +177,7 @@ def test_a_prediction_that_left_the_physical_range_is_not_reported() -> None:
 # -- reported estimates ---------------------------------------------------------------------
 
 
-def test_existence_ranks_and_standard_deviations_shrink_with_the_noise() -> None:
+def test_existence_and_standard_deviations_follow_the_noise() -> None:
     z = tone([[-0.5, 0.5]] * 10, noise=1e-4)
     z += 0.2 * tone([[1.1]] * 10, noise=1e-9, seed=1)
     run = SVALSE(LINE).run(z)
@@ -190,7 +190,7 @@ def test_existence_ranks_and_standard_deviations_shrink_with_the_noise() -> None
     np.testing.assert_allclose(np.median(loud) / np.median(quiet), 10, rtol=0.3)
 
 
-def test_for_a_single_source_the_standard_deviation_is_right() -> None:
+def test_standard_deviation_of_a_single_source_is_consistent() -> None:
     """Phase reference in mid array; with the first sensor it would be too small by half."""
     errors = {}
     references: list[Reference] = ["middle", "first"]
@@ -213,7 +213,7 @@ def test_step_that_does_not_converge_is_reported() -> None:
     assert SVALSE(LINE).run(z).converged.all()
 
 
-def test_a_limit_cycle_of_merging_is_cut_short_and_reported() -> None:
+def test_limit_cycle_of_merging_is_stopped_and_reported() -> None:
     """Two sources half a degree apart: the search revives what merging removes."""
     z = tone([[0.0, np.deg2rad(0.5)]] * 5, noise=1e-3)
     run = SVALSE(LINE, BernoulliVonMises(), **COORDINATE).run(z)
@@ -222,7 +222,7 @@ def test_a_limit_cycle_of_merging_is_cut_short_and_reported() -> None:
     assert SVALSE(LINE).run(z).converged.all()  # the Newton solver cannot cycle: its record rises
 
 
-def test_at_0_db_components_without_power_stay_and_the_step_is_reported() -> None:
+def test_components_without_power_at_0_db_remain_and_the_step_is_reported() -> None:
     """Section 12.4 lays these steps to merging; but nothing merges in them.
 
     Carried components whose source has gone share a variance τ that shrinks to nothing and takes

@@ -30,7 +30,7 @@ def test_grid_wider_than_half_a_wavelength_warns_of_two_ambiguous_directions() -
         ({"solver": "fast"}, "solver must be a NewtonSolver or a CoordinateSolver; got 'fast'"),
     ],
 )
-def test_arguments_that_do_not_fit_are_rejected(params: dict[str, Any], message: str) -> None:
+def test_invalid_arguments_are_rejected(params: dict[str, Any], message: str) -> None:
     with pytest.raises((ValueError, TypeError), match=message):
         SVALSE(**{"measurement": LINE} | params)
 

@@ -65,7 +65,7 @@ def test_circle_turned_by_any_angle_turns_the_estimates() -> None:
 
 
 @every_model
-def test_scale_and_common_phase_change_nothing(model: ArraySnapshot) -> None:
+def test_estimates_are_invariant_to_scale_and_common_phase(model: ArraySnapshot) -> None:
     z = snapshots_of(model, [[0.3, -0.9]] * 3)
     one, other = SVALSE(model, SLOW).run(z), SVALSE(model, SLOW).run(-3e5j * z)
     assert one.iterations.tolist() == other.iterations.tolist()
@@ -88,7 +88,7 @@ def test_missing_sensor_equals_the_array_without_it(model: ArraySnapshot) -> Non
     np.testing.assert_allclose(a.doa[:, :2], b.doa[:, :2], atol=1e-9)
 
 
-def test_a_batch_is_its_runs() -> None:
+def test_run_batch_equals_single_runs() -> None:
     """Missing sensors, missing measurements, zero data, and sequences of unequal length."""
     draws = [
         create("circle", n_bins=3, n_snapshots=2, n_steps=6).sample(np.random.default_rng(seed))
@@ -154,7 +154,9 @@ def test_noise_of_many_snapshots_is_that_of_the_small_eigenvalues() -> None:
         ("grating", {"n_bins": 10, "hopping": True, "n_sources": 2}, 6.28),
     ],
 )
-def test_gospa_of_the_specification(scenario: str, numbers: dict[str, Any], limit: float) -> None:
+def test_gospa_equals_the_specification(
+    scenario: str, numbers: dict[str, Any], limit: float
+) -> None:
     """Over six seeds 4.3, 10.7, 4.3, 0.20 and 2.0; the last limit is of whole posteriors."""
     draws = [create(scenario, **numbers).sample(np.random.default_rng(n)) for n in range(4)]
     runs = draws[0].tracker("svalse").run_batch([trial.measurements for trial in draws])

@@ -58,7 +58,7 @@ def same(one: Run, other: Run) -> None:
 # -- section 10 of the method's note -----------------------------------------------------------
 
 
-def test_scale_phase_and_conjugation_change_no_step_of_figure_4() -> None:
+def test_estimates_of_figure_4_are_invariant_to_scale_phase_and_conjugation() -> None:
     """50 steps: the same numbers of sources and of Newton steps; 1e-9 of a degree."""
     z = trials("svalse_fig4", range(1, 2))[0].measurements
     one, scaled, mirrored = SVALSE(LINE).run_batch([z, 1e4 * np.exp(0.7j) * z, z.conj()])
@@ -69,7 +69,7 @@ def test_scale_phase_and_conjugation_change_no_step_of_figure_4() -> None:
 
 
 @pytest.mark.parametrize("name", FIGURES)
-def test_every_step_of_three_runs_ends_before_the_cap(name: str) -> None:
+def test_every_step_of_three_runs_converges_before_the_limit(name: str) -> None:
     data = [trial.measurements for trial in trials(name, range(1, 4))]
     for tracker, sequences in ((SVALSE(LINE), data), (VALSE(LINE), data[:1])):
         for run in tracker.run_batch(sequences):
@@ -77,7 +77,7 @@ def test_every_step_of_three_runs_ends_before_the_cap(name: str) -> None:
             assert run.iterations.max() < 60
 
 
-def test_a_source_without_noise_is_one_source() -> None:
+def test_snapshot_without_noise_has_one_source() -> None:
     z = LINE.array.steering_vector(np.full(5, 0.4), 1.0)
     run = SVALSE(LINE).run(z)
     assert run.n_found.tolist() == [1] * 5
@@ -88,9 +88,7 @@ def test_a_source_without_noise_is_one_source() -> None:
     ("name", "plain", "walk"),
     [("svalse_fig4", 5.4, 4.8), ("svalse_fig5", 3.15, 3.1), ("svalse_fig6", 2.6, 2.3)],
 )
-def test_gospa_of_six_seeds_and_less_with_the_walk_in_direction(
-    name: str, plain: float, walk: float
-) -> None:
+def test_gospa_of_six_seeds_is_smaller_with_sigma_doa(name: str, plain: float, walk: float) -> None:
     """Limits of the 20-seed means; over 20 seeds 5.09, 2.81, 2.42 and 4.00, 2.42, 1.77."""
     draws = trials(name, range(1, 7))
     electrical, direction = gospa_deg(draws, SVALSE(LINE, ELECTRICAL)), gospa_deg(
@@ -122,7 +120,7 @@ def test_gospa_from_0_to_40_db(name: str, snr_db: float, limit: float) -> None:
     assert gospa_deg(trials(name, range(1, 4), snr_db), SVALSE(LINE, ELECTRICAL)) < limit
 
 
-def test_a_leap_of_40_db_is_a_transient_of_some_steps() -> None:
+def test_power_step_of_40_db_is_a_transient_of_some_steps() -> None:
     """The start of the noise is kept: 11.7° in the first five steps in the note, 2.1° after ten."""
     early, late = [], []
     for seed in (1, 2):
@@ -140,7 +138,7 @@ def test_a_leap_of_40_db_is_a_transient_of_some_steps() -> None:
     assert np.mean(late) < np.mean(early)
 
 
-def test_it_takes_a_tenth_of_coordinate_ascent_or_less() -> None:
+def test_time_is_at_most_a_tenth_of_coordinate_ascent() -> None:
     """Interleaved, in the paper's form; the benchmark has the times themselves."""
     z = trials("svalse_fig4", range(1, 2), n_steps=4)[0].measurements
     paper: dict[str, Any] = {"solver": CoordinateSolver(tolerance=1e-5), "reference": "first"}
@@ -165,7 +163,7 @@ def bound(y: Complex, manifold: Any, known: ComponentPrior, fit: ComponentPoster
     return float(evaluate(ExpectedResponse(manifold), z, components, K, nu, tau, np.zeros(1)).F[0])
 
 
-def test_the_bound_is_no_lower_than_that_of_coordinate_ascent() -> None:
+def test_elbo_is_at_least_that_of_coordinate_ascent() -> None:
     """From the same tracked components; the note has 94 to 100 % of the steps, 0.64 nats each."""
     gain: list[float] = []
     for name in FIGURES:
@@ -187,7 +185,7 @@ def test_the_bound_is_no_lower_than_that_of_coordinate_ascent() -> None:
 # -- together -----------------------------------------------------------------------------------
 
 
-def test_a_batch_is_its_runs() -> None:
+def test_run_batch_equals_single_runs() -> None:
     """Missing sensors, missing measurements, zero data, and sequences of unequal length."""
     draws = trials("svalse_fig5", range(1, 6), n_steps=12)
     data: list[list[Any]] = [list(trial.measurements) for trial in draws]
@@ -201,14 +199,14 @@ def test_a_batch_is_its_runs() -> None:
             same(copy.deepcopy(tracker).run(z), run)
 
 
-def test_a_batch_of_a_full_run_is_its_runs_to_1e_9() -> None:
+def test_run_batch_of_full_runs_equals_single_runs_to_1e_9() -> None:
     data = [trial.measurements for trial in trials("svalse_fig4", range(1, 9))]
     tracker = SVALSE(LINE)
     for z, run in list(zip(data, tracker.run_batch(data), strict=True))[::3]:
         same(copy.deepcopy(tracker).run(z), run)
 
 
-def test_a_batch_goes_on_from_the_present_belief_and_leaves_it() -> None:
+def test_run_batch_starts_from_the_present_belief_and_keeps_it() -> None:
     z = trials("svalse_fig4", range(1, 2), n_steps=6)[0].measurements
     tracker = SVALSE(LINE)
     tracker.run(z[:3])
@@ -246,7 +244,7 @@ def test_zero_data_age_the_tracked_components() -> None:
     assert not tracker.tracked.any()
 
 
-def test_age_counts_the_steps_out_of_use() -> None:
+def test_age_counts_the_inactive_steps() -> None:
     tracker = SVALSE(LINE)
     z = tone([[-0.5, 0.3]] * 3 + [[-0.5, np.nan]] * 3, noise=1e-3)
     ages = []
@@ -259,7 +257,7 @@ def test_age_counts_the_steps_out_of_use() -> None:
 
 
 @pytest.mark.parametrize("snr_db", [6.0, 30.0])
-def test_the_noise_start_settles_at_the_signal_to_noise_ratio(snr_db: float) -> None:
+def test_initial_noise_converges_to_the_signal_to_noise_ratio(snr_db: float) -> None:
     trial = trials("svalse_scenario1", range(1, 2), snr_db, n_steps=20)[0]
     tracker = SVALSE(LINE)
     tracker.run(trial.measurements)
@@ -267,7 +265,7 @@ def test_the_noise_start_settles_at_the_signal_to_noise_ratio(snr_db: float) -> 
     assert tracker.expected_snr_db == pytest.approx(expected, abs=1.5)
 
 
-def test_predicted_widths_are_those_of_a_step_in_direction() -> None:
+def test_predicted_widths_equal_those_of_a_step_in_direction() -> None:
     tracker = SVALSE(LINE)
     tracker.run(tone([[-1.1, 0.0, 0.8]] * 4, noise=1e-6))
     tracker.predict()
@@ -279,7 +277,7 @@ def test_predicted_widths_are_those_of_a_step_in_direction() -> None:
     np.testing.assert_allclose(std / std[0], 1 / np.cos([0, 0.8, 1.1]), rtol=0.05)
 
 
-def test_share_of_the_divergence_trades_missed_for_false() -> None:
+def test_kl_weight_trades_missed_for_false_sources() -> None:
     draws = trials("svalse_scenario1", range(1, 4), 0.0, n_steps=30)
     data = [trial.measurements for trial in draws]
     found = []

@@ -12,7 +12,7 @@ from arrivals.trackers import SVALSE, CoordinateSolver, NewtonSolver
 # -- tracked components ------------------------------------------------------------------------
 
 
-def test_a_label_stays_with_its_source_and_a_new_source_gets_a_new_one() -> None:
+def test_label_follows_its_source_and_new_sources_have_new_labels() -> None:
     first, second = np.full(12, -0.4), np.where(np.arange(12) < 5, np.nan, 0.6)
     run = SVALSE(LINE).run(tone(np.stack([first, second], axis=1), noise=1e-3))
     of_first = run.label[np.abs(run.doa + 0.4) < 0.1]
@@ -24,7 +24,7 @@ def test_a_label_stays_with_its_source_and_a_new_source_gets_a_new_one() -> None
     assert of_second[0] > 0
 
 
-def test_source_lost_for_long_returns_under_a_new_label() -> None:
+def test_source_returning_after_a_long_gap_has_a_new_label() -> None:
     doa = np.where((np.arange(12) >= 4) & (np.arange(12) < 8), np.nan, 0.3)
     run = SVALSE(LINE).run(tone(np.stack([doa, np.full(12, -0.5)], axis=1), noise=1e-3))
     before = run.label[:4][np.abs(run.doa[:4] - 0.3) < 0.1]
@@ -32,7 +32,7 @@ def test_source_lost_for_long_returns_under_a_new_label() -> None:
     assert set(before).isdisjoint(after)
 
 
-def test_prediction_is_the_motion_model_s() -> None:
+def test_prediction_equals_that_of_the_motion_model() -> None:
     motion = BernoulliVonMises(kappa=200.0, p_activate=0.2, p_deactivate=0.3)
     tracker = SVALSE(LINE, motion)
     tracker.predict()
@@ -87,7 +87,7 @@ def test_certain_births_and_deaths_are_allowed(
         assert set(run.label[0][run.label[0] >= 0]) <= set(run.label[-1])
 
 
-def test_certain_birth_is_the_limit_of_one_that_is_nearly_so() -> None:
+def test_certain_birth_is_the_limit_of_probable_birth() -> None:
     """Coordinate ascent, the paper's form; Fig. 7 (d) has a probability of 1."""
     trial = short(5, 5, "svalse_fig6")
     found = [

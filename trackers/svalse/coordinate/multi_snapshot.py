@@ -65,7 +65,7 @@ class MultiSnapshotAscent(MultiSnapshotAmplitudes):
         M = Y.shape[1]
         self.settings, self.manifold = settings, manifold
         self._read_manifold()
-        initial = InitialSupport.of(prior, settings.n_components(M))
+        initial = InitialSupport.from_prior(prior, settings.n_components(M))
         self.n_moments = 0 if prior is None else prior.n_moments
         power = (Y.real**2 + Y.imag**2).sum(axis=(1, 2)) / (M * Y.shape[2])
         nu = self.initial_noise(Y, power, prior)
@@ -110,7 +110,7 @@ class MultiSnapshotAscent(MultiSnapshotAmplitudes):
 
     def _read_prior(self, prior: ComponentPrior) -> None:
         n, L, n_moments = self.n_tracked, len(self.rho), self.n_moments
-        weights, mirror = self.manifold.nuisance_weights, self.manifold.mirror
+        weights, ambiguous = self.manifold.nuisance_weights, self.manifold.front_back_ambiguous
         self.eta = np.zeros(L, dtype=np.complex128)
         self.eta[:n] = prior.kappa[:n] * np.exp(1j * prior.mu[:n])
         self.mean = np.exp(1j * np.angle(self.eta)) * (np.arange(L) < n)
@@ -119,12 +119,14 @@ class MultiSnapshotAscent(MultiSnapshotAmplitudes):
             self.nuisance[:n] = prior.nuisance[:n]
         self.prior_nuisance = self.nuisance.copy()
         self.moments = np.zeros((L, n_moments), dtype=np.complex128)
-        self.priors: list[CirclePrior] = [VonMisesPrior(complex(eta), mirror) for eta in self.eta]
+        self.priors: list[CirclePrior] = [
+            VonMisesPrior(complex(eta), ambiguous) for eta in self.eta
+        ]
         if prior.moments is not None:
             step = (max(n_moments - 8, 1) / 7) ** 2
             self.priors[:n] = [SeriesPrior(moments, step) for moments in prior.moments[:n]]
         # one unknown angle whose prior is a von Mises density
-        self.is_simple = len(weights) == 1 and not mirror and n_moments == 0
+        self.is_simple = len(weights) == 1 and not ambiguous and n_moments == 0
 
     # -- initialization (sec. 7) ------------------------------------------------------------------
 
@@ -241,7 +243,7 @@ class MultiSnapshotAscent(MultiSnapshotAmplitudes):
             self.priors[k],
             self.prior_nuisance[k],
             max(self.degree + 1, self.n_moments),
-            front_only=self.manifold.mirror,
+            front_only=self.manifold.front_back_ambiguous,
         )
         self.nuisance[k] = moments[:, 0].real
         self.moments[k] = moments[:, : self.n_moments].sum(axis=0)

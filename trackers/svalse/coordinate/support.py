@@ -43,12 +43,12 @@ class InitialSupport:
     estimate_rho: bool
 
     @classmethod
-    def of(cls, prior: ComponentPrior | None, L: int) -> InitialSupport:
+    def from_prior(cls, prior: ComponentPrior | None, L: int) -> InitialSupport:
         """Return the initial support of a step.
 
         Examples
         --------
-        >>> InitialSupport.of(None, 4).rho
+        >>> InitialSupport.from_prior(None, 4).rho
         array([0.5, 0.5, 0.5, 0.5])
         """
         half = max(L // 2, 1)

@@ -40,7 +40,7 @@ class CandidateGrid:
         self.theta = -np.pi + 2 * np.pi * np.arange(n) / n
         # uniform over all angles that differ
         self.log_range = LOG_2PI
-        if self.manifold.mirror:  # the front half is enough
+        if self.manifold.front_back_ambiguous:  # the front half is enough
             self.theta = (self.theta + np.pi / n) / 2
             self.log_range = LOG_2PI - np.log(2)
         self.A, self.slope2, self.norm2 = response.at(self.theta)
@@ -49,9 +49,11 @@ class CandidateGrid:
         two_beams = 4 * np.pi / response.extent
         self.cos_apart = np.cos(two_beams) + 1e-9 if two_beams < np.pi + 1e-9 else -2.0
         self.merge, self.cos_merge = merge, np.cos(min(merge, np.pi))
-        # of angles whose directions may be near: with a mirror, of any
+        # of angles whose directions may be near: any where front and back are ambiguous
         largest = 1.01 * merge * float(self.manifold.slope(self.theta).max())
-        self.cos_near = -2.0 if self.manifold.mirror else np.cos(min(largest, np.pi)) - 1e-12
+        self.cos_near = (
+            -2.0 if self.manifold.front_back_ambiguous else np.cos(min(largest, np.pi)) - 1e-12
+        )
 
     def near(self, doa: Float) -> Bool:
         """Return which angles are too near to directions (..., n): (..., n, n_angles)."""
