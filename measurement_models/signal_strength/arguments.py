@@ -5,12 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.measurement_models.signal_strength.decibels import neper_to_db
 from arrivals.measurement_models.signal_strength.envelope import AveragedEnvelope
 from arrivals.typing import Float
 from arrivals.validation import count, number, real
 
-FARTHEST = 40.0  # Np, 347 dB: values beyond are in another unit
 
 
 def per_sensor(name: str, value: ArrayLike, n: int) -> float | Float:
@@ -76,27 +74,3 @@ def reading_error(
         variance[:] = np.square(checked)
     variance.setflags(write=False)
     return checked, bias, variance
-
-
-def check_unit(z: Float, xi: Float, log_noise: float, std: float) -> None:
-    """Raise a ValueError if readings are in another unit than neper, by their size.
-
-    Parameters
-    ----------
-    z, xi : ndarray, shape (..., n_sensors)
-        Readings, and the same without offsets and bias, Np; NaN where missing.
-    log_noise, std : float
-        Largest log amplitude of the noise, and standard deviation of readings, Np.
-    """
-    low, high = (np.nan, np.nan) if np.isnan(z).all() else (np.nanmin(z), np.nanmax(z))
-    worst = low if low < -FARTHEST else high
-    if low < -FARTHEST or high > FARTHEST:
-        raise ValueError(
-            f"readings are in neper, within ±{FARTHEST:g}; got {worst:g}: "
-            "convert dB and dBm by db_to_neper"
-        )
-    if np.nanmin(xi, initial=np.inf) < log_noise - 5 * std - 5.0:
-        raise ValueError(
-            f"a reading lies {neper_to_db(log_noise - np.nanmin(xi)):.0f} dB below "
-            "the noise: readings are in neper, convert dB and dBm by db_to_neper"
-        )

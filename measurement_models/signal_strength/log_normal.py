@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.base import MeasurementModel, default_position, locate
 from arrivals.measurement_models.signal_strength.arguments import (
-    check_unit,
     entries,
     per_sensor,
     reading_error,
@@ -21,7 +20,7 @@ from arrivals.measurement_models.signal_strength.envelope import (
     sample_log_envelope,
 )
 from arrivals.measurement_models.signal_strength.gains import LogGains
-from arrivals.measurement_models.signal_strength.path_loss import Levels, PropagationModel, slopes
+from arrivals.measurement_models.signal_strength.path_loss import Levels, PropagationModel, check_unit, slopes
 from arrivals.typing import Float
 from arrivals.validation import constant, count, instance, number, positive, real
 

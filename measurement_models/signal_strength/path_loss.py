@@ -1,4 +1,4 @@
-"""Levels that several sources of power falling as R^-α make at sensors: kernels on arrays."""
+"""Received levels of several sources whose power falls as R^-α, and their gradients."""
 
 from __future__ import annotations
 
@@ -7,7 +7,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from arrivals.measurement_models.signal_strength.decibels import neper_to_db
 from arrivals.typing import Float
+
+FARTHEST = 40.0  # Np, 347 dB: values beyond are in another unit
 
 
 class Offsets(NamedTuple):
@@ -249,3 +252,27 @@ def doppler_log_gain(
     if not np.linalg.norm(v, axis=-1).max(initial=0.0) < speed:
         raise ValueError(f"sources must be slower than the waves, {speed} m/s; got {v.tolist()}")
     return np.asarray(-2 * np.log1p(-towards / speed))
+
+
+def check_unit(z: Float, xi: Float, log_noise: float, std: float) -> None:
+    """Raise a ValueError if readings are in another unit than neper, by their size.
+
+    Parameters
+    ----------
+    z, xi : ndarray, shape (..., n_sensors)
+        Readings, and the same without offsets and bias, Np; NaN where missing.
+    log_noise, std : float
+        Largest log amplitude of the noise, and standard deviation of readings, Np.
+    """
+    low, high = (np.nan, np.nan) if np.isnan(z).all() else (np.nanmin(z), np.nanmax(z))
+    worst = low if low < -FARTHEST else high
+    if low < -FARTHEST or high > FARTHEST:
+        raise ValueError(
+            f"readings are in neper, within ±{FARTHEST:g}; got {worst:g}: "
+            "convert dB and dBm by db_to_neper"
+        )
+    if np.nanmin(xi, initial=np.inf) < log_noise - 5 * std - 5.0:
+        raise ValueError(
+            f"a reading lies {neper_to_db(log_noise - np.nanmin(xi)):.0f} dB below "
+            "the noise: readings are in neper, convert dB and dBm by db_to_neper"
+        )
