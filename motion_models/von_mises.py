@@ -259,9 +259,8 @@ class VonMisesWalk(MotionModel):
 
     def Q(self, dt: float = 1.0) -> Float:
         """Return the variance of the wrapped normal step of the same A, -2 ln A(κ) dt, in rad²."""
-        return np.full(
-            (1, 1), -2 * log_bessel_ratio(self.step_concentration()) * not_negative("dt", dt)
-        )
+        log_ratio = log_bessel_ratio(self.step_concentration())
+        return np.full((1, 1), -2 * log_ratio * not_negative("dt", dt))
 
     def blur(self, kappa: ArrayLike, dt: float = 1.0, slope: ArrayLike = 1.0) -> Float:
         """Return the concentration after a step of densities that had concentration `kappa`.

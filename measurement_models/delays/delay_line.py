@@ -28,6 +28,8 @@ class SourceAtCentre(MeasurementModel):
     τ_j = (j - (N-1)/2) Δ. The data are scaled to a source of power 1.
     """
 
+    renamed: ClassVar[dict[str, str]] = {"drive": "process_noise"}
+
     @property
     @abstractmethod
     def dim_source(self) -> int:
@@ -91,8 +93,7 @@ class SourceAtCentre(MeasurementModel):
     @property
     def R(self) -> Float:
         """Covariance of the noise at broadside."""
-        x = np.zeros(1 + self.dim_source)
-        return np.diag(self.linearise(x)[2])
+        return np.diag(self.linearise(np.zeros(1 + self.dim_source))[2])
 
     def _states(self, x: ArrayLike) -> Float:
         x = real("x", x)
@@ -138,8 +139,6 @@ class DelayLine(SourceAtCentre):
     array([0.707, 1.   , 0.707])
     """
 
-    renamed: ClassVar[dict[str, str]] = {"drive": "process_noise"}
-
     correlation: SourceCorrelation
     kappa: float
     process_noise: float | None = None
@@ -164,7 +163,7 @@ class DelayLine(SourceAtCentre):
     @property
     def interpolator(self) -> DelayInterpolator:
         """Interpolator over the delay line, with a little loading for the sake of the inverse."""
-        return _line_interpolator(self.correlation, self.offsets)
+        return _interpolator(self.correlation, self.offsets)
 
     @property
     def dim_source(self) -> int:
@@ -189,9 +188,7 @@ class DelayLine(SourceAtCentre):
         """Error of that prediction, and q_s, on the newest sample."""
         n = self.dim_source
         tones = self.correlation.order is not None
-        process_noise = (
-            (1e-2 if tones else 1e-3) if self.process_noise is None else self.process_noise
-        )
+        process_noise = self.process_noise or (1e-2 if tones else 1e-3)
         Q = np.zeros((n, n))
         predicted = float(self.transition[0] @ self.correlation.rho(np.arange(1, n + 1)))
         Q[0, 0] = max(1 - predicted, 0.0) + process_noise
@@ -214,11 +211,9 @@ class DelayLine(SourceAtCentre):
 
 
 @lru_cache(maxsize=64)
-def _line_interpolator(
-    correlation: SourceCorrelation, offsets: tuple[int, ...]
-) -> DelayInterpolator:
-    loading = 1e-4 if correlation.order is None else 1e-9
-    return DelayInterpolator(correlation, offsets, loading)
+def _interpolator(source: SourceCorrelation, offsets: tuple[int, ...]) -> DelayInterpolator:
+    loading = 1e-4 if source.order is None else 1e-9
+    return DelayInterpolator(source, offsets, loading)
 
 
 @dataclass(frozen=True)
@@ -248,8 +243,6 @@ class Phasor(SourceAtCentre):
     >>> Phasor(3, 0.1, frequency=0.25).h([0.5, 1.0, 0.0]).round(3)
     array([0.707, 1.   , 0.707])
     """
-
-    renamed: ClassVar[dict[str, str]] = {"drive": "process_noise"}
 
     frequency: float
     process_noise: float = 1e-2

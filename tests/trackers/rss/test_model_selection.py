@@ -42,7 +42,7 @@ U = db_to_neper([82.0, 79.0, 80.0])
 
 def test_evidence_equals_the_integral() -> None:
     """Compare with quadrature over the three parameters of one source."""
-    model = network(0, 6).replace(n_snapshots=400)
+    model = network(0, 6).replace(sigma__n_snapshots=400)
     new = NewSourcePrior(float(U[0]), V0, np.array([-45.0, 15.0]), 6.0, 2.0)
     xi = model.levels(U[:1], TRUTH[:1]).log_sigma
     problem = JointPosterior(model.propagation, xi, 1 / model.variance, new.prior(1))
