@@ -64,14 +64,14 @@ class Bearing(MeasurementModel):
         noise: float | ArrayLike,
         position: tuple[int, int] | None = None,
     ) -> None:
-        places = constant("sensor_positions", sensor_positions)
-        if places.shape[1] != 2:
-            raise ValueError(f"sensor_positions must have shape (n, 2); got {places.shape}")
-        noise = _bearing_noise(noise, len(places))
-        object.__setattr__(self, "sensor_positions", places)
+        positions = constant("sensor_positions", sensor_positions)
+        if positions.shape[1] != 2:
+            raise ValueError(f"sensor_positions must have shape (n, 2); got {positions.shape}")
+        noise = _bearing_noise(noise, len(positions))
+        object.__setattr__(self, "sensor_positions", positions)
         object.__setattr__(self, "noise", noise)
         object.__setattr__(self, "position", _two_entries(position))
-        R = noise if isinstance(noise, np.ndarray) else noise * np.eye(len(places))
+        R = noise if isinstance(noise, np.ndarray) else noise * np.eye(len(positions))
         object.__setattr__(self, "_R", R)
 
     @property
@@ -144,8 +144,8 @@ class Bearing(MeasurementModel):
 
     def _from_sensors(self, x: Float, position: tuple[int, int]) -> tuple[Float, Float]:
         i, j = position
-        places = self.sensor_positions
-        return x[..., i, None] - places[:, 0], x[..., j, None] - places[:, 1]
+        positions = self.sensor_positions
+        return x[..., i, None] - positions[:, 0], x[..., j, None] - positions[:, 1]
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Bearing):

@@ -1,4 +1,4 @@
-"""Pairs of directions with equal response, found before tracking."""
+"""Pairs of directions with equal response."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from arrivals.measurement_models.arrays.plane_waves import PlaneWaves
 from arrivals.typing import Complex, Float
 
-ALIKE = 0.99  # coherence from which two responses count as the same
+MIN_COHERENCE = 0.99  # of two responses that count as equal
 FINEST = 1024  # directions of a search at most
 
 
@@ -39,11 +39,11 @@ def _pair_of_line(waves: PlaneWaves) -> tuple[float, float] | None:
     x = waves.array.positions[:, 0]
     reach = waves.wavenumber.max() * max(waves.slowness or (1.0,)) * np.ptp(x)
     apart = np.linspace(0, 2, max(64, min(int(16 * reach), 1 << 16)) + 1)[1:]
-    alike = _coherence_of_line(waves, apart) > ALIKE
+    is_ambiguous = _coherence_of_line(waves, apart) > MIN_COHERENCE
     beyond = np.flatnonzero(
-        np.logical_not(alike).cumsum(),
+        np.logical_not(is_ambiguous).cumsum(),
     )  # past the main lobe
-    beyond = beyond[alike[beyond] & (apart[beyond] < 2 - 2 / max(reach, 1.0))]
+    beyond = beyond[is_ambiguous[beyond] & (apart[beyond] < 2 - 2 / max(reach, 1.0))]
     if len(beyond) == 0:
         return None
     near = apart[beyond[0]] + np.linspace(0, 1, 200) * 2 / max(reach, 1.0)
@@ -79,10 +79,10 @@ def _pair_of_plane(waves: PlaneWaves) -> tuple[float, float] | None:
         return -float(_coherence(waves.steering(pair))[0, 1])
 
     for start in sorted(angle[best].tolist()):
-        found = minimize(unlike, start, method="Nelder-Mead", options={"xatol": 1e-4})
-        distance = abs((found.x[1] - found.x[0] + np.pi) % (2 * np.pi) - np.pi)
-        if -found.fun > ALIKE and distance > angle[lobe] - angle[0]:
-            return float(found.x[0]), float(found.x[1])
+        optimum = minimize(unlike, start, method="Nelder-Mead", options={"xatol": 1e-4})
+        distance = abs((optimum.x[1] - optimum.x[0] + np.pi) % (2 * np.pi) - np.pi)
+        if -optimum.fun > MIN_COHERENCE and distance > angle[lobe] - angle[0]:
+            return float(optimum.x[0]), float(optimum.x[1])
     return None
 
 
@@ -94,7 +94,7 @@ def _coherence(a: Complex) -> Float:
 
 
 def in_a_line(waves: PlaneWaves) -> float | None:
-    """Return the azimuth, rad, of the line that sensors in a plane or in space stand on, or None.
+    """Return the azimuth, rad, of the line through sensors in a plane or in space, or None.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""What an element answers to a wave beyond the phase of its place: its pattern over the azimuth."""
+"""Complex gains of array elements over the azimuth."""
 
 from __future__ import annotations
 

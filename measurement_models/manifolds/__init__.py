@@ -1,1 +1,1 @@
-"""Manifolds."""
+"""Array responses as Fourier series of an angle."""

@@ -79,8 +79,8 @@ class ArrayManifold(SingleSourceSnapshot):
     def distances(self) -> Float:
         """Distances of the pairs from the centre in wavelengths, (n_pairs,), the inner first."""
         left, _, right = _pairs(self.array)
-        places = self.array.positions[:, 0]
-        return np.asarray((places[right] - places[left]) / (2 * self.wavelength))
+        positions = self.array.positions[:, 0]
+        return np.asarray((positions[right] - positions[left]) / (2 * self.wavelength))
 
     @property
     def n_pairs(self) -> int:
@@ -178,8 +178,8 @@ def _pairs(array: SensorArray) -> tuple[Int, int, Int]:
     """
     if array.dim != 1:
         raise ValueError(f"the array must be a line; its sensors lie in {array.dim} dimensions")
-    places = array.positions[:, 0]
-    order = np.argsort(places)
+    positions = array.positions[:, 0]
+    order = np.argsort(positions)
     n = len(order)
     if n < 3 or n % 2 == 0:
         raise ValueError(
@@ -187,13 +187,13 @@ def _pairs(array: SensorArray) -> tuple[Int, int, Int]:
         )
     middle = int(order[n // 2])
     left, right = order[: n // 2][::-1], order[n // 2 + 1 :]
-    off = np.abs(places[left] + places[right] - 2 * places[middle])
+    off = np.abs(positions[left] + positions[right] - 2 * positions[middle])
     worst = int(np.argmax(off))
-    if off[worst] > 1e-6 * np.ptp(places):
+    if off[worst] > 1e-6 * np.ptp(positions):
         raise ValueError(
             "the array must be symmetric about its centre sensor; those at "
-            f"{places[left[worst]]:g} and {places[right[worst]]:g} m are not, about "
-            f"{places[middle]:g} m"
+            f"{positions[left[worst]]:g} and {positions[right[worst]]:g} m are not, about "
+            f"{positions[middle]:g} m"
         )
     return left, middle, right
 

@@ -1,1 +1,1 @@
-"""Signal strength."""
+"""Received signal strength: path loss, envelope statistics, log-normal readings."""

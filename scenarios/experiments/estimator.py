@@ -72,7 +72,7 @@ class TrackerEstimator(BaseEstimator):  # type: ignore[misc]  # scikit-learn has
         planar = getattr(getattr(self.tracker, "measurement", None), "array", None)
         period = 360.0 if planar is not None and planar.dim > 1 else None
         scores = [
-            mean_gospa(np.rad2deg(truth), np.rad2deg(found), c=self.c_deg_, period=period).total
-            for truth, found in zip(y, self.predict(X), strict=True)
+            mean_gospa(np.rad2deg(truth), np.rad2deg(estimate), c=self.c_deg_, period=period).total
+            for truth, estimate in zip(y, self.predict(X), strict=True)
         ]
         return -float(np.mean(scores))

@@ -28,12 +28,14 @@ class Matches(NamedTuple):
     error: Float
 
 
-def matches(truth: ArrayLike, found: ArrayLike, c: float, period: float | None = None) -> Matches:
+def matches(
+    truth: ArrayLike, estimate: ArrayLike, c: float, period: float | None = None
+) -> Matches:
     """Assign estimates nearer than `c` to true points, in each step, as GOSPA with p = 1.
 
     Parameters
     ----------
-    truth, found : array_like, shapes (n_steps, n_sources[, dim]), (n_steps, n_slots[, dim])
+    truth, estimate : array_like, shapes (n_steps, n_sources[, dim]), (n_steps, n_slots[, dim])
         True and estimated directions or positions; NaN for inactive and undetected.
     c : float
         Cut-off, in the same unit.
@@ -58,22 +60,22 @@ def matches(truth: ArrayLike, found: ArrayLike, c: float, period: float | None =
     """
     from scipy.optimize import linear_sum_assignment
 
-    t, f = real("truth", truth), real("found", found)
+    t, f = real("truth", truth), real("estimate", estimate)
     if t.ndim not in (2, 3) or f.ndim != t.ndim or len(t) != len(f) or t.shape[2:] != f.shape[2:]:
         raise ValueError(
-            "truth and found must have shapes (n_steps, n_sources) and (n_steps, n_slots), or "
+            "truth and estimate must have shapes (n_steps, n_sources) and (n_steps, n_slots), or "
             f"(..., dim) of positions; got {t.shape} and {f.shape}"
         )
     error = f[:, None] - t[:, :, None]
     if period is not None:
         half = positive("period", period) / 2
         error = (error + half) % period - half
-    far = np.abs(error) if error.ndim == 3 else np.linalg.norm(error, axis=-1)
-    cost = np.where(np.isnan(far), np.inf, far)
-    near = np.minimum(cost, positive("c", c))
+    distance = np.abs(error) if error.ndim == 3 else np.linalg.norm(error, axis=-1)
+    cost = np.where(np.isnan(distance), np.inf, distance)
+    bounded = np.minimum(cost, positive("c", c))
     rows = []
     for step in range(len(t)):
-        source, slot = linear_sum_assignment(near[step])
+        source, slot = linear_sum_assignment(bounded[step])
         kept = cost[step, source, slot] < c
         rows.append(np.stack([np.full(kept.sum(), step), source[kept], slot[kept]]))
     step, source, slot = np.concatenate([np.zeros((3, 0), dtype=np.int64), *rows], axis=1)

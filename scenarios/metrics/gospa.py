@@ -38,7 +38,7 @@ class Gospa:
 
 def gospa(
     truth: ArrayLike,
-    found: ArrayLike,
+    estimate: ArrayLike,
     c: float,
     p: float = 1.0,
     alpha: float = 2.0,
@@ -48,7 +48,7 @@ def gospa(
 
     Parameters
     ----------
-    truth, found : array_like, shape (n,) or (n, dim)
+    truth, estimate : array_like, shape (n,) or (n, dim)
         True and estimated angles or points, in any unit. Rows with a NaN are ignored.
     c : float
         Cut-off, same unit: a true and an estimated point at distance `c` or more are not paired.
@@ -89,7 +89,7 @@ def gospa(
     c, p = positive("c", c), _exponent(p)
     if not 0 < number("alpha", alpha) <= 2:
         raise ValueError(f"alpha must lie in (0, 2]; got {alpha}")
-    d = _distances(truth, found, period)
+    d = _distances(truth, estimate, period)
     pairs = _assigned(d, c, p)
     n_cut, surplus = np.sum(pairs >= c), d.shape[0] - d.shape[1]
     distance = float(np.sum(pairs[pairs < c] ** p))
@@ -99,13 +99,13 @@ def gospa(
 
 
 def ospa(
-    truth: ArrayLike, found: ArrayLike, c: float, p: float = 1.0, period: float | None = None
+    truth: ArrayLike, estimate: ArrayLike, c: float, p: float = 1.0, period: float | None = None
 ) -> float:
     """Compute the OSPA metric: the error per point, where an unpaired point counts as `c`.
 
     Parameters
     ----------
-    truth, found : array_like, shape (n,) or (n, dim)
+    truth, estimate : array_like, shape (n,) or (n, dim)
         True and estimated angles or points, in any unit. Rows with a NaN are ignored.
     c : float
         Cut-off, same unit.
@@ -134,18 +134,18 @@ def ospa(
     >>> ospa([10, 20], [12], c=10)
     6.0
     """
-    c, p, d = positive("c", c), _exponent(p), _distances(truth, found, period)
+    c, p, d = positive("c", c), _exponent(p), _distances(truth, estimate, period)
     size, surplus = max(d.shape), abs(d.shape[0] - d.shape[1])
     powers = np.sum(np.minimum(_assigned(d, c, p), c) ** p) + c**p * surplus
     return float((powers / size) ** (1 / p)) if size else 0.0  # (3)
 
 
-def rmse(truth: ArrayLike, found: ArrayLike, c: float, period: float | None = None) -> float:
+def rmse(truth: ArrayLike, estimate: ArrayLike, c: float, period: float | None = None) -> float:
     """Compute the RMSE per true point: a missed point counts as `c`, false points cost nothing.
 
     Parameters
     ----------
-    truth, found : array_like, shape (n,) or (n, dim)
+    truth, estimate : array_like, shape (n,) or (n, dim)
         True and estimated angles or points, in any unit. Rows with a NaN are ignored.
     c : float
         Cut-off, same unit.
@@ -169,7 +169,7 @@ def rmse(truth: ArrayLike, found: ArrayLike, c: float, period: float | None = No
     >>> rmse([10, 20, 40], [], c=10), rmse([], [1, 2], c=10)
     (10.0, 0.0)
     """
-    c, d = positive("c", c), _distances(truth, found, period)
+    c, d = positive("c", c), _distances(truth, estimate, period)
     if not len(d):
         return 0.0
     pairs = np.minimum(_assigned(d, c, 2.0), c)
@@ -178,7 +178,7 @@ def rmse(truth: ArrayLike, found: ArrayLike, c: float, period: float | None = No
 
 def mean_gospa(
     truth: Sequence[ArrayLike] | Float,
-    found: Sequence[ArrayLike] | Float,
+    estimate: Sequence[ArrayLike] | Float,
     c: float,
     p: float = 1.0,
     alpha: float = 2.0,
@@ -188,7 +188,7 @@ def mean_gospa(
 
     Parameters
     ----------
-    truth, found : array_like, shape (n_steps, n_slots) or (n_steps, n_slots, dim)
+    truth, estimate : array_like, shape (n_steps, n_slots) or (n_steps, n_slots, dim)
         One set in each step, padded with NaN, or lists of sets of different sizes.
     c, p, alpha : float
         As in `gospa`.
@@ -210,13 +210,13 @@ def mean_gospa(
     >>> mean_gospa([[0, 50], [1, np.nan]], [[2, np.nan], [1, np.nan]], c=10)
     Gospa(total=3.5, distance=1.0, missed=2.5, false=0.0)
     """
-    steps = [gospa(t, f, c, p, alpha, period) for t, f in _steps(truth, found)]
+    steps = [gospa(t, f, c, p, alpha, period) for t, f in _steps(truth, estimate)]
     return Gospa(*np.mean([astuple(step) for step in steps], axis=0).tolist())
 
 
 def mean_rmse(
     truth: Sequence[ArrayLike] | Float,
-    found: Sequence[ArrayLike] | Float,
+    estimate: Sequence[ArrayLike] | Float,
     c: float,
     period: float | None = None,
 ) -> float:
@@ -224,7 +224,7 @@ def mean_rmse(
 
     Parameters
     ----------
-    truth, found : array_like, shape (n_steps, n_slots) or (n_steps, n_slots, dim)
+    truth, estimate : array_like, shape (n_steps, n_slots) or (n_steps, n_slots, dim)
         One set in each step, padded with NaN, or lists of sets of different sizes.
     c : float
         As in `rmse`.
@@ -246,7 +246,7 @@ def mean_rmse(
     >>> mean_rmse([[0], [1]], [[2], [np.nan]], c=10)
     6.0
     """
-    return float(np.mean([rmse(t, f, c, period) for t, f in _steps(truth, found)]))
+    return float(np.mean([rmse(t, f, c, period) for t, f in _steps(truth, estimate)]))
 
 
 def _exponent(p: float) -> float:
@@ -256,14 +256,14 @@ def _exponent(p: float) -> float:
 
 
 def _steps(
-    truth: Sequence[ArrayLike] | Float, found: Sequence[ArrayLike] | Float
+    truth: Sequence[ArrayLike] | Float, estimate: Sequence[ArrayLike] | Float
 ) -> list[tuple[ArrayLike, ArrayLike]]:
-    if len(truth) != len(found) or len(truth) == 0:
+    if len(truth) != len(estimate) or len(truth) == 0:
         raise ValueError(
-            f"truth and found must have the same number of steps, at least one; "
-            f"got {len(truth)} and {len(found)}"
+            f"truth and estimate must have the same number of steps, at least one; "
+            f"got {len(truth)} and {len(estimate)}"
         )
-    return list(zip(truth, found, strict=True))
+    return list(zip(truth, estimate, strict=True))
 
 
 def _points(name: str, value: ArrayLike) -> Float:
@@ -277,13 +277,14 @@ def _points(name: str, value: ArrayLike) -> Float:
     return np.asarray(points[~np.any(np.isnan(points), axis=1)])
 
 
-def _distances(truth: ArrayLike, found: ArrayLike, period: float | None) -> Float:
-    """Return Euclidean distances (n_true, n_found), wrapped if there is a period."""
-    t, f = _points("truth", truth), _points("found", found)
+def _distances(truth: ArrayLike, estimate: ArrayLike, period: float | None) -> Float:
+    """Return Euclidean distances (n_true, n_estimates), wrapped if there is a period."""
+    t, f = _points("truth", truth), _points("estimate", estimate)
     if t.shape[1] != f.shape[1]:
         if t.size and f.size:
             raise ValueError(
-                f"truth and found must have the same dimension; got {t.shape[1]} and {f.shape[1]}"
+                "truth and estimate must have the same dimension; "
+                f"got {t.shape[1]} and {f.shape[1]}"
             )
         return np.zeros((len(t), len(f)))
     difference = np.abs(t[:, None] - f)

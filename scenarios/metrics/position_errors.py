@@ -88,7 +88,7 @@ def assign(theta: ArrayLike, truth: ArrayLike, how: Assignment = "nearest") -> I
 
     Parameters
     ----------
-    theta : array_like, shape (n_found, 2)
+    theta : array_like, shape (n_estimates, 2)
         Estimates, m; at least n_sources for "one-to-one".
     truth : array_like, shape (n_sources, 2)
         True positions, m.
@@ -126,7 +126,7 @@ def assign(theta: ArrayLike, truth: ArrayLike, how: Assignment = "nearest") -> I
 
 
 def distances(theta: ArrayLike, truth: ArrayLike) -> Float:
-    """Return distances (n_found, n_sources), m, at most `MAX_DISTANCE`, also of NaN."""
+    """Return distances (n_estimates, n_sources), m, at most `MAX_DISTANCE`, also of NaN."""
     distance = np.linalg.norm(real("theta", theta)[:, None] - real("truth", truth), axis=-1)
     return np.where(np.isfinite(distance), np.minimum(distance, MAX_DISTANCE), MAX_DISTANCE)
 

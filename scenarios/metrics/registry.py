@@ -32,14 +32,14 @@ class Sets(NamedTuple):
 
     Parameters
     ----------
-    truth, found : ndarray, shapes (n_steps, n_sources) and (n_steps, n_slots); positions (..., 2)
+    truth, estimate : ndarray, shapes (n_steps, n_sources[, 2]) and (n_steps, n_slots[, 2])
         Truth and estimates.
     period : float or None
         Period of directions in the plane, degrees.
     """
 
     truth: Float
-    found: Float
+    estimate: Float
     period: float | None
 
 
@@ -63,26 +63,26 @@ def sets(trial: Trial, run: Run) -> Sets:
 @lru_cache(maxsize=1)  # shared by the metrics of its parts
 def gospa_of(trial: Trial, run: Run) -> Gospa:
     """Return GOSPA and its parts, degrees or m, averaged over the steps."""
-    truth, found, period = sets(trial, run)
-    return mean_gospa(truth, found, c=CUT_OFF, period=period)
+    truth, estimate, period = sets(trial, run)
+    return mean_gospa(truth, estimate, c=CUT_OFF, period=period)
 
 
 @lru_cache(maxsize=1)
 def pairs_of(trial: Trial, run: Run) -> Matches:
     """Return the pairs of truth and estimates, errors in rad or m."""
-    truth, found, period = sets(trial, run)
-    pairs = matches(truth, found, CUT_OFF, period)
+    truth, estimate, period = sets(trial, run)
+    pairs = matches(truth, estimate, CUT_OFF, period)
     return pairs if truth.ndim == 3 else pairs._replace(error=np.deg2rad(pairs.error))
 
 
 def _rmse(trial: Trial, run: Run) -> float:
-    truth, found, period = sets(trial, run)
-    return mean_rmse(truth, found, CUT_OFF, period)
+    truth, estimate, period = sets(trial, run)
+    return mean_rmse(truth, estimate, CUT_OFF, period)
 
 
 def _ospa(trial: Trial, run: Run) -> float:
-    truth, found, period = sets(trial, run)
-    steps = [ospa(t, f, CUT_OFF, period=period) for t, f in zip(truth, found, strict=True)]
+    truth, estimate, period = sets(trial, run)
+    steps = [ospa(t, f, CUT_OFF, period=period) for t, f in zip(truth, estimate, strict=True)]
     return float(np.mean(steps))
 
 

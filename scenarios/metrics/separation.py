@@ -8,12 +8,12 @@ from numpy.typing import ArrayLike
 from arrivals.typing import Complex, Float
 
 
-def nmse(truth: ArrayLike, found: ArrayLike, *, db: bool = False) -> Float:
+def nmse(truth: ArrayLike, estimate: ArrayLike, *, db: bool = False) -> Float:
     """Compute the error of each source's signal, normalised by its power.
 
     Parameters
     ----------
-    truth, found : array_like, shape (..., n_steps, n_sources)
+    truth, estimate : array_like, shape (..., n_steps, n_sources)
         True and estimated signals, real or complex, in the same order of sources.
     db : bool
         Return 10 log10 of the error.
@@ -35,17 +35,17 @@ def nmse(truth: ArrayLike, found: ArrayLike, *, db: bool = False) -> Float:
     >>> nmse([[1.0], [1.0]], [[1.1], [0.9]], db=True).round(6)
     array([-20.])
     """
-    s, s_hat = _signals(truth, found)
+    s, s_hat = _signals(truth, estimate)
     ratio = _energy(s_hat - s) / _energy(s)
     return _decibels(ratio) if db else ratio
 
 
-def sdr(truth: ArrayLike, found: ArrayLike) -> Float:
+def sdr(truth: ArrayLike, estimate: ArrayLike) -> Float:
     """Compute the signal-to-distortion ratio of each source, dB, invariant to scale and phase.
 
     Parameters
     ----------
-    truth, found : array_like, shape (..., n_steps, n_sources)
+    truth, estimate : array_like, shape (..., n_steps, n_sources)
         True and estimated signals, real or complex, in the same order of sources.
 
     Returns
@@ -68,21 +68,21 @@ def sdr(truth: ArrayLike, found: ArrayLike) -> Float:
     >>> sdr([[1.0], [1.0]], [[3.3j], [2.7j]]).round(6)
     array([20.])
     """
-    s, s_hat = _signals(truth, found)
+    s, s_hat = _signals(truth, estimate)
     alpha = (s.conj() * s_hat).sum(axis=-2, keepdims=True) / _energy(s)[..., None, :]
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = _energy(alpha * s) / _energy(s_hat - alpha * s)
     return _decibels(np.where(np.isnan(ratio), 0.0, ratio))  # 0/0: the estimate is zero
 
 
-def _signals(truth: ArrayLike, found: ArrayLike) -> tuple[Complex | Float, Complex | Float]:
-    s, s_hat = np.asarray(truth), np.asarray(found)
+def _signals(truth: ArrayLike, estimate: ArrayLike) -> tuple[Complex | Float, Complex | Float]:
+    s, s_hat = np.asarray(truth), np.asarray(estimate)
     if s.shape != s_hat.shape or s.ndim < 2:
         raise ValueError(
-            "truth and found must have the same shape (..., n_steps, n_sources); "
+            "truth and estimate must have the same shape (..., n_steps, n_sources); "
             f"got {s.shape} and {s_hat.shape}"
         )
-    for name, signals in (("truth", s), ("found", s_hat)):
+    for name, signals in (("truth", s), ("estimate", s_hat)):
         if signals.dtype.kind not in "biufc":
             raise TypeError(f"{name} must hold numbers; got {signals.dtype}")
         if not np.isfinite(signals).all():

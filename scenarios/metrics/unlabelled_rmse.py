@@ -9,7 +9,9 @@ from arrivals.typing import Float
 from arrivals.validation import positive, real
 
 
-def best_assignment_rmse(truth: ArrayLike, found: ArrayLike, period: float | None = None) -> Float:
+def best_assignment_rmse(
+    truth: ArrayLike, estimate: ArrayLike, period: float | None = None
+) -> Float:
     """Compute the RMSE of unlabelled angles, a fixed number of them in each step.
 
     In each step the estimates are assigned to the true angles so that the sum of squares is
@@ -17,7 +19,7 @@ def best_assignment_rmse(truth: ArrayLike, found: ArrayLike, period: float | Non
 
     Parameters
     ----------
-    truth, found : array_like, shape (..., n_steps, n_sources)
+    truth, estimate : array_like, shape (..., n_steps, n_sources)
         True and estimated angles, in any unit; leading axes broadcast.
     period : float, optional
         Period of the angles; differences are wrapped.
@@ -47,14 +49,14 @@ def best_assignment_rmse(truth: ArrayLike, found: ArrayLike, period: float | Non
     >>> best_assignment_rmse([[10, 20], [10, 20]], [[21, 10], [11, 20]]).round(3)
     np.float64(0.707)
     """
-    t, f = real("truth", truth), real("found", found)
+    t, f = real("truth", truth), real("estimate", estimate)
     if t.ndim < 2 or t.shape[-2:] != f.shape[-2:] or 0 in t.shape[-2:]:
         raise ValueError(
-            "truth and found must have shape (..., n_steps, n_sources), the same and not empty; "
+            "truth and estimate must have shape (..., n_steps, n_sources), the same and not empty; "
             f"got {t.shape} and {f.shape}"
         )
     if not (np.isfinite(t).all() and np.isfinite(f).all()):
-        raise ValueError("truth and found must be finite; got NaN: use rmse for missed sources")
+        raise ValueError("truth and estimate must be finite; got NaN: use rmse for missed sources")
     if period is None:
         return np.asarray(np.sqrt(((np.sort(f) - np.sort(t)) ** 2).mean(axis=(-2, -1))))
     length = positive("period", period)

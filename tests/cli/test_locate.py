@@ -137,7 +137,7 @@ def test_map_shows_tracks_and_truth_and_rejects_directions() -> None:
     assert texts == ["sensors", "truth", "source 0", "source 1", "source 2"]
     assert len(ax.lines) == 3 * (1 + 1 + 3)
     line = create("svalse_fig4", n_steps=2).sample(np.random.default_rng(0))
-    with pytest.raises(TypeError, match="the run must hold positions; it holds DirectionEstimate"):
+    with pytest.raises(TypeError, match="run must contain positions; got DirectionEstimate"):
         plot_map(line.tracker("cbf").run(line.measurements))
 
 

@@ -136,7 +136,7 @@ def test_array_of_any_dimension_is_drawn(array: SensorArray, tmp_path: Path) -> 
 
 def test_invalid_arguments_are_refused() -> None:
     run = found([[(1, 0, 1)]] * 3)
-    with pytest.raises(ValueError, match="wants a measurement"):
+    with pytest.raises(ValueError, match="measurement must be set with snapshots; got None"):
         plot_bearing_time(run, snapshots=np.ones((3, 8)))
     with pytest.raises(ValueError, match=r"snapshots must have shape \(3, 8\); got \(2, 8\)"):
         plot_bearing_time(run, snapshots=np.ones((2, 8)), measurement=LINE)

@@ -49,8 +49,8 @@ def systematic_resample(weights: ArrayLike, rng: np.random.Generator) -> Int:
     array([0, 0, 2, 3])
     """
     edges = np.cumsum(weights, dtype=np.float64)
-    places = (rng.random() + np.arange(len(edges))) / len(edges)
-    return np.searchsorted(edges[:-1] / edges[-1], places, side="right")
+    points = (rng.random() + np.arange(len(edges))) / len(edges)
+    return np.searchsorted(edges[:-1] / edges[-1], points, side="right")
 
 
 @register("particle")

@@ -60,7 +60,7 @@ NAMES = {
 
 def table1(runs: int, seed: int) -> Report:
     """Table 1 for every method, Fig. 4 (a) to (h), and the claims."""
-    found: dict[tuple[str, str], TrialEstimates] = {}
+    solutions: dict[tuple[str, str], TrialEstimates] = {}
     results: dict[tuple[str, str], Scores] = {}
     rows: list[tuple[Any, ...]] = []
     trials = {case: draws(scenario, runs, seed) for case, scenario in CASES.items()}
@@ -68,7 +68,7 @@ def table1(runs: int, seed: int) -> Report:
         for method in METHODS:
             if method == "started" and "prior" not in case:
                 continue  # the start of the trial is not used: the same as from the prior
-            got = found[case, method] = estimates(drawn, method)
+            got = solutions[case, method] = estimates(drawn, method)
             ours = results[case, method] = scores(got.theta, drawn.theta, got.u, drawn.u)
             strict = scores(got.theta, drawn.theta, got.u, drawn.u, "one-to-one")
             paper = PAPER.get((case, method), (np.nan,) * 4)
@@ -89,7 +89,7 @@ def table1(runs: int, seed: int) -> Report:
         "estimate twice; the last column takes each once.",
         *claims(results, trials),
     )
-    figures = {"fig4": _figure4(trials, found)}
+    figures = {"fig4": _figure4(trials, solutions)}
     return Report(f"Table 1 and Fig. 4: {runs} trials", columns, rows, remarks, figures)
 
 
@@ -119,7 +119,7 @@ def claims(results: dict[tuple[str, str], Scores], trials: dict[str, Draws]) -> 
 
 
 def _of_accuracy(results: dict[tuple[str, str], Scores]) -> list[str]:
-    rms = {key: found.location_rms for key, found in results.items()}
+    rms = {key: scores.location_rms for key, scores in results.items()}
     anywhere, near, prior = (
         rms[case, "lm"] / rms[case, "vb"] for case in ("K=3 random", "K=3 near", "K=3 prior")
     )
@@ -212,20 +212,20 @@ def _jumped(trials: Draws, method: str) -> float:
 # -- Fig. 4 --------------------------------------------------------------------------------------
 
 
-def _figure4(trials: dict[str, Draws], found: dict[tuple[str, str], TrialEstimates]) -> Figure:
+def _figure4(trials: dict[str, Draws], solutions: dict[tuple[str, str], TrialEstimates]) -> Figure:
     """Draw starts, estimates of VB and ML, and power histograms, for 3 and for 7 sources."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(13.0, 6.6), layout="constrained")
     axes = figure.subplots(2, 4)
     for row, case in zip(axes, ("K=3 random", "K=7 prior"), strict=True):
-        drawn, vb, ml = trials[case], found[case, "vb"], found[case, "lm"]
+        drawn, vb, ml = trials[case], solutions[case, "vb"], solutions[case, "lm"]
         start = drawn.problem.prior.theta
         disc = CASES[case].disc
-        for ax, places, title in zip(
+        for ax, positions, title in zip(
             row, (start, vb.theta, ml.theta), ("start", "VB", "ML"), strict=False
         ):
-            _draw_places(ax, places, drawn.theta[0], disc, f"{case}: {title}")
+            _draw_positions(ax, positions, drawn.theta[0], disc, f"{case}: {title}")
         _draw_powers(row[3], drawn, vb, ml)
         row[0].set_ylabel("y, m")
     figure.legend(axes[0, 0].get_lines(), ["edge of the sensors", "start or estimate", "truth"],
@@ -235,8 +235,8 @@ def _figure4(trials: dict[str, Draws], found: dict[tuple[str, str], TrialEstimat
     return figure
 
 
-def _draw_places(ax: Axes, places: Float, truth: Float, disc: float, title: str) -> None:
-    flat = places.reshape(-1, 2)
+def _draw_positions(ax: Axes, positions: Float, truth: Float, disc: float, title: str) -> None:
+    flat = positions.reshape(-1, 2)
     shown = flat[np.isfinite(flat).all(axis=1)]
     phi = np.linspace(0, 2 * np.pi, 200)
     ax.plot(disc * np.cos(phi), disc * np.sin(phi), color="0.5", linestyle="--", linewidth=0.8)
@@ -261,7 +261,7 @@ def _draw_powers(ax: Axes, drawn: Draws, vb: TrialEstimates, ml: TrialEstimates)
     ax.legend(fontsize=8)
 
 
-def _of_truths(found: TrialEstimates, drawn: Draws) -> Float:
+def _of_truths(solution: TrialEstimates, drawn: Draws) -> Float:
     """Return the estimated log amplitude of each true source."""
-    which = np.array([assign(t, s) for t, s in zip(found.theta, drawn.theta, strict=True)])
-    return np.take_along_axis(found.u, which, axis=1)
+    which = np.array([assign(t, s) for t, s in zip(solution.theta, drawn.theta, strict=True)])
+    return np.take_along_axis(solution.u, which, axis=1)

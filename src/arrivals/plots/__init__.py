@@ -1,1 +1,1 @@
-"""Plots."""
+"""Plots of tracks, arrays, maps and studies."""

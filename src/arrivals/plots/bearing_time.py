@@ -1,4 +1,4 @@
-"""Pictures of results: they take an `ax` and give it back; matplotlib comes when it is wanted."""
+"""Plots of directions over time and of arrays; matplotlib is imported when a plot is drawn."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ PALETTE = (
     "#e377c2", "#17becf", "#8c564b", "#b8a900", "#00429d",
 )  # fmt: skip
 NEUTRAL = "#202020"
-N_DIRECTIONS, N_COLUMNS = 361, 1500  # of the beam's image, at most
+N_DIRECTIONS, N_COLUMNS = 361, 1500  # maximum size of the beam's image
 PICTURES = (".png", ".pdf", ".svg", ".jpg")
-N_NUMBERED = 32  # sensors that still have room for a number
+N_NUMBERED = 32  # maximum number of sensors that are numbered
 
 
 def plot_bearing_time(
@@ -40,25 +40,25 @@ def plot_bearing_time(
     dynamic_range_db: float = 30.0,
     ax: Axes | None = None,
 ) -> Axes:
-    """Draw directions over time, the conventional beam's power behind them.
+    """Draw directions over time, over the power of the conventional beamformer.
 
     Each label has a colour (they repeat), directions without a label are dark, and the opacity
-    is the existence; where a tracker gives none, all are opaque.
+    is the existence; without existence, all are opaque.
 
     Parameters
     ----------
     run : Run
-        Of a tracker of directions, n_steps long.
+        Run of a tracker of directions, n_steps long.
     snapshots : array_like, shape (n_steps, *measurement.shape), optional
-        What the tracker was given; the beam is not drawn without it.
+        Measurements of the run; without them, the beam is not drawn.
     measurement : ArraySnapshot, optional
-        Array and wavelength, wanted with `snapshots`.
+        Array and wavelength, required with `snapshots`.
     time : array_like, shape (n_steps,), optional
-        Seconds, growing; the number of the step if None.
+        Increasing times, s; the number of the step if None.
     dynamic_range_db : float
         Power shown, down from the highest of all steps, dB.
     ax : matplotlib Axes, optional
-        A new figure's if None; it belongs to no window; `save` writes it.
+        Axes of a new figure without a window if None; `save` writes it.
 
     Returns
     -------
@@ -70,7 +70,7 @@ def plot_bearing_time(
     ValueError
         If shapes do not fit the run, or `snapshots` come without a `measurement`.
     TypeError
-        If the run holds no directions.
+        If the run does not have directions.
 
     Examples
     --------
@@ -82,12 +82,12 @@ def plot_bearing_time(
     ('step', 'direction of arrival, degrees')
     """
     if "doa" not in run.fields:
-        raise TypeError(f"the run must hold directions; it holds {run.kind.__name__}")
+        raise TypeError(f"run must contain directions; got {run.kind.__name__}")
     ax = new_axes((9.0, 4.5)) if ax is None else ax
     at = np.arange(len(run), dtype=np.float64) if time is None else shaped("time", time, len(run))
     if snapshots is not None:
         if measurement is None:
-            raise ValueError("the beam wants a measurement, its array and wavelength")
+            raise ValueError("measurement must be set with snapshots; got None")
         range_db = positive("dynamic_range_db", dynamic_range_db)
         _draw_beam(ax, at, np.asarray(snapshots), measurement, range_db)
     _draw_tracks(ax, at, run)
@@ -116,7 +116,7 @@ def _draw_beam(
     if snapshots.shape != shape:
         raise ValueError(f"snapshots must have shape {shape}; got {snapshots.shape}")
     if not (np.isfinite(snapshots) & (snapshots != 0)).any():
-        return  # silence
+        return  # no power
     doa = scan_directions(measurement.array, N_DIRECTIONS)
     starts = np.arange(0, len(at), max(1, -(-len(at) // N_COLUMNS)))
     blocks = np.split(snapshots, starts[1:])
@@ -160,27 +160,27 @@ def _edges(centres: Float) -> Float:
 
 
 def _draw_tracks(ax: Axes, at: Float, run: Run) -> None:
-    """Draw each label as a line through successive steps, and what stands alone as dots."""
+    """Draw each label as a line through successive steps, and isolated directions as dots."""
     from matplotlib.collections import LineCollection
 
     step, slot = np.nonzero(~np.isnan(run.doa))
     order = np.lexsort([step, run.label[step, slot]])
     step, slot = step[order], slot[order]
-    label, place = run.label[step, slot], np.stack([at[step], np.rad2deg(run.doa[step, slot])], 1)
+    label, point = run.label[step, slot], np.stack([at[step], np.rad2deg(run.doa[step, slot])], 1)
     colour = _colours(label, run.existence[step, slot])
-    joined = _joined(step, label, place[:, 1])
-    lines = list(np.stack([place[:-1][joined], place[1:][joined]], axis=1))
+    joined = _joined(step, label, point[:, 1])
+    lines = list(np.stack([point[:-1][joined], point[1:][joined]], axis=1))
     for width, paint in ((3.4, "white"), (1.7, colour[1:][joined])):
         ax.add_collection(LineCollection(lines, colors=paint, linewidths=width, zorder=3))
     alone = np.ones(len(step), dtype=np.bool_)
     alone[:-1][joined] = False
     alone[1:][joined] = False
-    x, y = place[alone].T
+    x, y = point[alone].T
     ax.scatter(x, y, s=9, c=colour[alone], edgecolors="white", linewidths=0.4, zorder=2)
 
 
 def _joined(step: Int, label: Int, degrees: Float) -> Bool:
-    """Tell which neighbours in a list sorted by label and step belong to one line."""
+    """Return True for neighbours, sorted by label and step, that belong to one line."""
     same = (np.diff(label) == 0) & (label[1:] >= 0) & (np.diff(step) == 1)
     furthest = 180 if (np.abs(degrees) > 90).any() else 90  # not across ±180°, on lines ±90°
     return np.asarray(same & (np.abs(np.diff(degrees)) < furthest))
@@ -197,14 +197,14 @@ def _colours(label: Int, existence: Float) -> Float:
 
 
 def plot_array(array: SensorArray, *, ax: Axes | None = None) -> Axes:
-    """Draw where the sensors are, numbered from 0 if they are few.
+    """Draw the sensors of an array, numbered from 0 if they are few.
 
     Parameters
     ----------
     array : SensorArray
         Array whose sensors are drawn.
     ax : matplotlib Axes, optional
-        A new figure's if None. Sensors in space want one of projection "3d".
+        Axes of a new figure if None; sensors in space require the projection "3d".
 
     Returns
     -------
@@ -217,20 +217,20 @@ def plot_array(array: SensorArray, *, ax: Axes | None = None) -> Axes:
     'position, m'
     """
     ax = new_axes((7.0, 1.6) if array.dim == 1 else (4.5, 4.5), array.dim) if ax is None else ax
-    places = array.positions
+    positions = array.positions
     if array.dim == 1:
-        places = np.column_stack([places, np.zeros(len(places))])
-    cast(Any, ax).scatter(*places.T, s=28, color=PALETTE[1], zorder=3)
+        positions = np.column_stack([positions, np.zeros(len(positions))])
+    cast(Any, ax).scatter(*positions.T, s=28, color=PALETTE[1], zorder=3)
     if array.n_sensors <= N_NUMBERED and array.dim < 3:
-        for number, place in enumerate(places):
-            ax.annotate(str(number), place, (0, 6), textcoords="offset points",
+        for number, position in enumerate(positions):
+            ax.annotate(str(number), position, (0, 6), textcoords="offset points",
                         ha="center", fontsize=8)  # fmt: skip
     _finish_array(ax, array.dim)
     return ax
 
 
 def _finish_array(ax: Axes, dim: int) -> None:
-    """Name the axes; a line needs no second one."""
+    """Label the axes; a line has only one."""
     if dim == 1:
         ax.axhline(0, color="0.8", linewidth=1, zorder=1)
         ax.set(xlabel="position, m", yticks=[], ylim=(-1, 1))
@@ -247,7 +247,7 @@ def _finish_array(ax: Axes, dim: int) -> None:
 
 
 def new_axes(size: tuple[float, float], dim: int = 2) -> Axes:
-    """Return the axes of a new figure that no window shows."""
+    """Return the axes of a new figure without a window."""
     from matplotlib.figure import Figure
 
     projection = {"projection": "3d"} if dim == 3 else {}
@@ -256,14 +256,14 @@ def new_axes(size: tuple[float, float], dim: int = 2) -> Axes:
 
 
 def save(ax: Axes, path: str | PathLike[str], *, dpi: float = 150.0) -> None:
-    """Write the figure that has `ax` to a file, which appears only when it is complete.
+    """Write the figure of `ax` to a file, which appears only when it is complete.
 
     Raises
     ------
     ValueError
-        If the suffix is none of png, pdf, svg and jpg.
+        If the suffix is not one of png, pdf, svg and jpg.
     OSError
-        If the folder does not exist, or may not be written to.
+        If the folder does not exist or is not writable.
 
     Examples
     --------
@@ -277,7 +277,7 @@ def save(ax: Axes, path: str | PathLike[str], *, dpi: float = 150.0) -> None:
 
 
 def picture_format(path: str | PathLike[str]) -> str:
-    """Return the format that a picture's suffix stands for.
+    """Return the format of a picture by its suffix.
 
     Examples
     --------

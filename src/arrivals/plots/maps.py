@@ -1,4 +1,4 @@
-"""Maps of positions found: sensors, tracks and error ellipses."""
+"""Maps of estimated positions: sensors, tracks and error ellipses."""
 
 from __future__ import annotations
 
@@ -26,30 +26,30 @@ def plot_map(
     n_ellipses: int = 12,
     ax: Axes | None = None,
 ) -> Axes:
-    """Draw positions over time, with 95 % ellipses along the way, and the sensors.
+    """Draw positions over time with 95 % ellipses, and the sensors.
 
     Parameters
     ----------
     run : Run
-        Of a tracker of positions.
+        Run of a tracker of positions.
     sensors : array_like, shape (n_sensors, 2), optional
-        m; rows that are NaN are left out.
+        Sensor positions, m; rows with NaN are left out.
     truth : array_like, shape (n_steps, n_sources, 2), optional
         True positions, m.
     n_ellipses : int
-        For each label at most; the last position always has one.
+        Maximum number for each label; the last position always has one.
     ax : matplotlib Axes, optional
-        A new figure's if None; `save` of `arrivals.plots.bearing_time` writes it.
+        Axes of a new figure if None; `save` of `arrivals.plots.bearing_time` writes it.
 
     Returns
     -------
     matplotlib Axes
-        Metres, the same scale either way.
+        Axes in metres, of equal scale.
 
     Raises
     ------
     TypeError
-        If the run holds no positions.
+        If the run does not have positions.
 
     Examples
     --------
@@ -60,15 +60,15 @@ def plot_map(
     'x, m'
     """
     if "position" not in run.fields:
-        raise TypeError(f"the run must hold positions; it holds {run.kind.__name__}")
+        raise TypeError(f"run must contain positions; got {run.kind.__name__}")
     count("n_ellipses", n_ellipses)
     ax = new_axes((7.0, 6.4)) if ax is None else ax
     if sensors is not None:
         x, y = real("sensors", sensors).T
         ax.scatter(x, y, s=16, color="0.6", marker="^", label="sensors")
     if truth is not None:
-        for j, way in enumerate(np.moveaxis(real("truth", truth), 1, 0)):
-            ax.plot(*way.T, color="black", linewidth=0.8, linestyle=":",
+        for j, path in enumerate(np.moveaxis(real("truth", truth), 1, 0)):
+            ax.plot(*path.T, color="black", linewidth=0.8, linestyle=":",
                     label=None if j else "truth")  # fmt: skip
     for label in np.unique(run.label[run.label >= 0]).tolist():
         _draw_track(ax, run, label, n_ellipses)
@@ -83,37 +83,37 @@ def plot_map(
 
 def _draw_track(ax: Axes, run: Run, label: int, n_ellipses: int) -> None:
     step, slot = np.nonzero(run.label == label)
-    place, spread = run.position[step, slot], run.covariance[step, slot]
+    position, spread = run.position[step, slot], run.covariance[step, slot]
     colour = PALETTE[label % len(PALETTE)]
     breaks = np.flatnonzero(np.diff(step) > 1) + 1
-    for n, part in enumerate(np.split(place, breaks)):
+    for n, part in enumerate(np.split(position, breaks)):
         ax.plot(*part.T, color=colour, linewidth=1.6, label=None if n else f"source {label}")
     ax.scatter(
-        place[-1:, 0],
-        place[-1:, 1],
+        position[-1:, 0],
+        position[-1:, 1],
         s=22,
         color=colour,
         edgecolors=NEUTRAL,
         linewidths=0.5,
         zorder=4,
     )
-    shown = np.unique(np.linspace(len(place) - 1, 0, n_ellipses).round().astype(int))
+    shown = np.unique(np.linspace(len(position) - 1, 0, n_ellipses).round().astype(int))
     for k in shown.tolist():
-        x, y = ellipse(place[k], spread[k])
+        x, y = ellipse(position[k], spread[k])
         ax.plot(x, y, color=colour, linewidth=0.7, alpha=0.7)
 
 
 def ellipse(mean: Float, covariance: Float, confidence: float = CONFIDENCE) -> tuple[Float, Float]:
-    """Return x and y of the ellipse that holds a Gaussian position with some probability.
+    """Return x and y of the confidence ellipse of a Gaussian position.
 
     Parameters
     ----------
     mean : ndarray, shape (2,)
-        m.
+        Mean, m.
     covariance : ndarray, shape (2, 2)
-        m².
+        Covariance, m².
     confidence : float
-        The probability.
+        Probability that the position lies in the ellipse.
 
     Examples
     --------
@@ -121,9 +121,9 @@ def ellipse(mean: Float, covariance: Float, confidence: float = CONFIDENCE) -> t
     >>> round(float(x.max()), 2), round(float(y.max()), 2)
     (4.9, 2.45)
     """
-    reach = np.sqrt(-2 * np.log(1 - confidence))  # χ² of two degrees of freedom
+    radius = np.sqrt(-2 * np.log(1 - confidence))  # χ² of two degrees of freedom
     variance, axes = np.linalg.eigh(covariance)
     phi = np.linspace(0, 2 * np.pi, 101)
     circle = np.stack([np.cos(phi), np.sin(phi)])
-    x, y = mean[:, None] + reach * (axes * np.sqrt(np.maximum(variance, 0))) @ circle
+    x, y = mean[:, None] + radius * (axes * np.sqrt(np.maximum(variance, 0))) @ circle
     return x, y

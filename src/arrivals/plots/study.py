@@ -1,4 +1,4 @@
-"""Pictures of studies: a metric against a parameter of the scenario, with intervals and bounds."""
+"""Plots of studies: a metric over a parameter of the scenario, with intervals and bounds."""
 
 from __future__ import annotations
 
@@ -29,31 +29,34 @@ def plot_metric(
     bound: Mapping[str, float] | None = None,
     ax: Axes | None = None,
 ) -> Axes:
-    """Draw means over runs with their bootstrap intervals, a colour a method.
+    """Draw means over runs with bootstrap intervals, one colour per method.
 
     Parameters
     ----------
     study : Study
+        Results of a study.
     metric : str
+        Name of the metric.
     x : str, optional
-        Parameter of the scenarios that differs from case to case, such as "snr_db"; the cases
-        stand side by side, by name, if None.
+        Parameter of the scenarios that differs from case to case, such as "snr_db"; the axis
+        shows the names of the cases if None.
     methods : sequence of str, optional
-        Labels, in order; all of them if None. A method without the metric is an error then, and
-        left out otherwise.
+        Labels, in order; all of them if None. A listed method without the metric is an error,
+        others are left out.
     bound : mapping of str to float, optional
         A lower bound by case, drawn in black.
     ax : matplotlib Axes, optional
-        A new figure's if None.
+        Axes of a new figure if None.
 
     Returns
     -------
     matplotlib Axes
+        Axes with one curve per method.
 
     Raises
     ------
     ValueError
-        If no case has the parameter, or there is no such metric or method.
+        If a case lacks the parameter, or the metric or a method is unknown.
 
     Examples
     --------
@@ -66,22 +69,22 @@ def plot_metric(
     from arrivals.plots.bearing_time import new_axes
 
     ax = new_axes((6.4, 4.4)) if ax is None else ax
-    places = _places(study, x)
+    positions = _positions(study, x)
     shown = study.methods if methods is None else list(methods)
     for n, label in enumerate(shown):
         try:
-            _draw(ax, study, metric, label, places, n)
+            _draw(ax, study, metric, label, positions, n)
         except ValueError:
             if methods is not None or len(shown) == 1:
                 raise
     if bound:
         cases = [case for case in study.cases if case in bound]
-        at = [places[case] for case in cases]
+        at = [positions[case] for case in cases]
         ax.plot(at, [bound[case] for case in cases], color="black", linewidth=1.2,
                 linestyle="-" if len(at) > 1 else "", marker="" if len(at) > 1 else "_",
                 markersize=18, label="bound")  # fmt: skip
     if x is None:
-        ax.set_xticks(list(places.values()), list(places))
+        ax.set_xticks(list(positions.values()), list(positions))
     ax.set(xlabel=x or "", ylabel=metric)
     ax.grid(color="0.92")
     ax.set_axisbelow(True)
@@ -89,21 +92,23 @@ def plot_metric(
     return ax
 
 
-def _places(study: Study, x: str | None) -> dict[str, float]:
+def _positions(study: Study, x: str | None) -> dict[str, float]:
     if x is None:
         return {case: float(n) for n, case in enumerate(study.cases)}
     scenarios = study.config["scenarios"]
     without = [case for case in study.cases if x not in scenarios[case]]
     if without:
-        raise ValueError(f"x must be a parameter of every scenario; {without[0]} has no {x!r}")
+        raise ValueError(
+            f"x must be a parameter of every scenario; got {x!r}, missing in {without[0]}"
+        )
     return {case: float(scenarios[case][x]) for case in study.cases}
 
 
 def _draw(
-    ax: Axes, study: Study, metric: str, label: str, places: Mapping[str, float], n: int
+    ax: Axes, study: Study, metric: str, label: str, positions: Mapping[str, float], n: int
 ) -> None:
-    means = np.array([study.mean(metric, label, case) for case in places])
-    ends = np.array([study.interval(metric, label, case) for case in places])
+    means = np.array([study.mean(metric, label, case) for case in positions])
+    ends = np.array([study.interval(metric, label, case) for case in positions])
     ends = np.where(np.isnan(ends), means[:, None], ends)
     any_colour = (*PALETTE, NEUTRAL)[n % (len(PALETTE) + 1)]
     name, _, variant = label.partition(" ")
@@ -113,7 +118,7 @@ def _draw(
         "markersize": 4,
         "linewidth": 1.2,
         "capsize": 2,
-        "linestyle": "" if len(places) == 1 else "--" if variant else "-",
+        "linestyle": "" if len(positions) == 1 else "--" if variant else "-",
     }
-    reach = np.abs(ends.T - means)
-    ax.errorbar(np.array(list(places.values())), means, yerr=reach, label=label, **style)
+    half_width = np.abs(ends.T - means)
+    ax.errorbar(np.array(list(positions.values())), means, yerr=half_width, label=label, **style)

@@ -108,8 +108,8 @@ def calibrate(
     >>> from arrivals.measurement_models import neper_to_db
     >>> rng = np.random.default_rng(0)
     >>> sensors, truth = rng.uniform(-500, 500, (8, 2)), rng.uniform(-500, 500, (200, 1, 2))
-    >>> far = np.hypot(*np.moveaxis(truth - sensors, -1, 0))
-    >>> rss_db = -20 - 30 * np.log10(far) + 5 * rng.standard_normal(far.shape)
+    >>> distance = np.hypot(*np.moveaxis(truth - sensors, -1, 0))
+    >>> rss_db = -20 - 30 * np.log10(distance) + 5 * rng.standard_normal(distance.shape)
     >>> network = Network(tuple("abcdefgh"), np.arange(200.0), rss_db,
     ...                 np.broadcast_to(sensors, (200, 8, 2)), truth)
     >>> fitted = calibrate(network)
@@ -119,8 +119,8 @@ def calibrate(
     if network.truth is None or network.truth.shape[1] != 1:
         raise ValueError("network must have the true positions of one transmitter")
     ridge = float(db_to_neper(positive("offset_std_db", offset_std_db)))
-    far = np.linalg.norm(network.truth - network.sensors, axis=-1)
-    log_range = np.log(np.maximum(far, positive("r_min", r_min)))
+    distance = np.linalg.norm(network.truth - network.sensors, axis=-1)
+    log_range = np.log(np.maximum(distance, positive("r_min", r_min)))
     valid = np.isfinite(network.rss_db) & np.isfinite(log_range)
     if floor_db is not None:
         valid &= network.rss_db > floor_db + 3.0

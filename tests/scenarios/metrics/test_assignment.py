@@ -23,10 +23,10 @@ ROWS = st.lists(st.one_of(st.floats(-180, 180), st.just(np.nan)), min_size=1, ma
 
 @given(ROWS, ROWS, st.sampled_from([None, 360.0]))
 def test_matches_of_directions_equal_those_of_gospa(
-    truth: list[float], found: list[float], period: float
+    truth: list[float], estimate: list[float], period: float
 ) -> None:
-    pairs = matches([truth], [found], c=10.0, period=period)
-    whole = gospa(truth, found, c=10.0, period=period)
+    pairs = matches([truth], [estimate], c=10.0, period=period)
+    whole = gospa(truth, estimate, c=10.0, period=period)
     assert np.abs(pairs.error).sum() == pytest.approx(whole.distance)
     n_true = int((~np.isnan(truth)).sum())
     assert 5.0 * (n_true - len(pairs.step)) == pytest.approx(whole.missed)
@@ -39,9 +39,9 @@ def test_matches_errors_wrap_with_a_period() -> None:
 
 def test_label_switches_and_track_lengths_match_hand_count() -> None:
     truth = np.array([[0.0, 50.0]] * 6)
-    found = [[0.0, 50.0], [0, 50], [50, np.nan], [50, 0], [50, 0], [50, 0]]
+    estimate = [[0.0, 50.0], [0, 50], [50, np.nan], [50, 0], [50, 0], [50, 0]]
     label = [[1, 2], [1, 2], [2, -1], [3, 1], [3, 1], [3, 1]]
-    pairs = matches(truth, np.array(found, dtype=float), c=10)
+    pairs = matches(truth, np.array(estimate, dtype=float), c=10)
     assert label_switches(pairs, label) == 1  # source 50 changes from label 2 to 3; 0 returns as 1
     assert sorted(track_lengths(pairs, label)) == [2, 3, 3, 3]
 
@@ -60,9 +60,9 @@ def test_correct_deviations_have_nees_one_and_nominal_coverage(std: float) -> No
 @given(st.integers(0, 5), st.integers(0, 5), st.integers(0, 10_000))
 def test_matches_of_positions_equal_those_of_gospa(n_true: int, n_found: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
-    truth, found = rng.uniform(0, 20, (1, n_true, 2)), rng.uniform(0, 20, (1, n_found, 2))
-    pairs = matches(truth, found, c=10.0)
-    whole = gospa(truth[0], found[0], c=10.0)
+    truth, estimate = rng.uniform(0, 20, (1, n_true, 2)), rng.uniform(0, 20, (1, n_found, 2))
+    pairs = matches(truth, estimate, c=10.0)
+    whole = gospa(truth[0], estimate[0], c=10.0)
     assert np.linalg.norm(pairs.error, axis=-1).sum() == pytest.approx(whole.distance)
     assert 5.0 * (n_true - len(pairs.step)) == pytest.approx(whole.missed)
 

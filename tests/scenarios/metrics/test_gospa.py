@@ -34,11 +34,11 @@ def assignments(n: int, m: int) -> Iterator[list[tuple[int, int]]]:
                 yield list(zip(rows, columns, strict=True))
 
 
-def brute_gospa(truth: list[float], found: list[float], c: float, p: float) -> float:
+def brute_gospa(truth: list[float], estimate: list[float], c: float, p: float) -> float:
     best = min(
-        sum(abs(truth[i] - found[j]) ** p for i, j in pairs)
-        + c**p / 2 * (len(truth) + len(found) - 2 * len(pairs))
-        for pairs in assignments(len(truth), len(found))
+        sum(abs(truth[i] - estimate[j]) ** p for i, j in pairs)
+        + c**p / 2 * (len(truth) + len(estimate) - 2 * len(pairs))
+        for pairs in assignments(len(truth), len(estimate))
     )
     return float(best ** (1 / p))
 
@@ -55,34 +55,34 @@ def brute_cut(small: list[float], large: list[float], c: float, p: float) -> flo
 @LAW
 @given(ANGLES, ANGLES, CUTS, EXPONENTS)
 def test_gospa_is_the_best_of_all_assignments(
-    truth: list[float], found: list[float], c: float, p: float
+    truth: list[float], estimate: list[float], c: float, p: float
 ) -> None:
-    assert gospa(truth, found, c, p).total == pytest.approx(brute_gospa(truth, found, c, p))
+    assert gospa(truth, estimate, c, p).total == pytest.approx(brute_gospa(truth, estimate, c, p))
 
 
 @LAW
 @given(ANGLES, ANGLES, CUTS, EXPONENTS, ALPHAS)
 def test_gospa_and_ospa_follow_their_definitions(
-    truth: list[float], found: list[float], c: float, p: float, alpha: float
+    truth: list[float], estimate: list[float], c: float, p: float, alpha: float
 ) -> None:
-    small, large = sorted([truth, found], key=len)
+    small, large = sorted([truth, estimate], key=len)
     cut, surplus = brute_cut(small, large, c, p), len(large) - len(small)
-    total = gospa(truth, found, c, p, alpha).total
+    total = gospa(truth, estimate, c, p, alpha).total
     assert total == pytest.approx((cut + c**p * surplus / alpha) ** (1 / p))
     mean = (cut + c**p * surplus) / max(1, len(large))
-    assert ospa(truth, found, c, p) == pytest.approx(mean ** (1 / p))
+    assert ospa(truth, estimate, c, p) == pytest.approx(mean ** (1 / p))
 
 
 @LAW
 @given(ANGLES, ANGLES, CUTS)
 def test_rmse_is_the_best_of_all_assignments(
-    truth: list[float], found: list[float], c: float
+    truth: list[float], estimate: list[float], c: float
 ) -> None:
     best = min(
-        sum((truth[i] - found[j]) ** 2 for i, j in pairs) + c**2 * (len(truth) - len(pairs))
-        for pairs in assignments(len(truth), len(found))
+        sum((truth[i] - estimate[j]) ** 2 for i, j in pairs) + c**2 * (len(truth) - len(pairs))
+        for pairs in assignments(len(truth), len(estimate))
     )
-    assert rmse(truth, found, c) == pytest.approx(np.sqrt(best / max(1, len(truth))))
+    assert rmse(truth, estimate, c) == pytest.approx(np.sqrt(best / max(1, len(truth))))
 
 
 @LAW
@@ -132,32 +132,34 @@ def test_metrics_are_invariant_to_the_order_of_points(
 @LAW
 @given(ANGLES, ANGLES, st.lists(st.integers(-3, 3), min_size=4, max_size=4))
 def test_gospa_with_period_is_invariant_to_full_turns(
-    truth: list[float], found: list[float], turns: list[int]
+    truth: list[float], estimate: list[float], turns: list[int]
 ) -> None:
-    turned = [f + 360 * n for f, n in zip(found, turns, strict=False)]
-    expected = gospa(truth, found, c=10, period=360)
+    turned = [f + 360 * n for f, n in zip(estimate, turns, strict=False)]
+    expected = gospa(truth, estimate, c=10, period=360)
     assert gospa(truth, turned, c=10, period=360).total == pytest.approx(expected.total, abs=1e-9)
-    assert expected.total == pytest.approx(gospa(truth, found, c=10).total)  # within half a turn
+    assert expected.total == pytest.approx(gospa(truth, estimate, c=10).total)  # within half a turn
 
 
 @LAW
 @given(ANGLES, ANGLES, st.integers(0, 3))
-def test_rows_with_nan_are_ignored(truth: list[float], found: list[float], n: int) -> None:
-    padded = np.r_[np.full(n, np.nan), found]
-    assert gospa(truth, padded, c=10) == gospa(truth, found, c=10)
-    assert rmse(padded, truth, c=10) == rmse(found, truth, c=10)
+def test_rows_with_nan_are_ignored(truth: list[float], estimate: list[float], n: int) -> None:
+    padded = np.r_[np.full(n, np.nan), estimate]
+    assert gospa(truth, padded, c=10) == gospa(truth, estimate, c=10)
+    assert rmse(padded, truth, c=10) == rmse(estimate, truth, c=10)
 
 
 @pytest.mark.parametrize("unit", [1.0, np.pi / 180])
 def test_metrics_match_worked_examples_of_the_specification(unit: float) -> None:
-    truth, found, c = unit * np.array([10, 20, 40]), unit * np.array([11, 26, 70]), 10 * unit
-    parts = gospa(truth, found, c)
+    truth, estimate, c = unit * np.array([10, 20, 40]), unit * np.array([11, 26, 70]), 10 * unit
+    parts = gospa(truth, estimate, c)
     assert (parts.total / unit, parts.distance / unit) == pytest.approx((17, 7))
     assert (parts.missed / unit, parts.false / unit) == pytest.approx((5, 5))
-    assert rmse(truth, found, c) / unit == pytest.approx(np.sqrt(137 / 3))
+    assert rmse(truth, estimate, c) / unit == pytest.approx(np.sqrt(137 / 3))
     assert gospa(truth, [], c).total / unit == pytest.approx(15)
     assert rmse(truth, [], c) / unit == pytest.approx(10)
-    assert (gospa([], found[:2], c).total / unit, rmse([], found, c)) == pytest.approx((10, 0))
+    assert (gospa([], estimate[:2], c).total / unit, rmse([], estimate, c)) == pytest.approx(
+        (10, 0)
+    )
 
 
 def test_gospa_pair_at_the_cut_off_is_not_matched() -> None:
@@ -179,9 +181,9 @@ def test_metrics_wrap_angles_with_a_period() -> None:
 
 def test_mean_metrics_average_over_steps() -> None:
     truth = np.array([[0.0, 50.0], [1.0, np.nan]])
-    found = [[2.0], []]
-    assert mean_gospa(truth, found, c=10) == Gospa(6, 1, 5, 0)
-    assert mean_rmse(truth, found, c=10) == pytest.approx((np.sqrt(52) + 10) / 2)
+    estimate = [[2.0], []]
+    assert mean_gospa(truth, estimate, c=10) == Gospa(6, 1, 5, 0)
+    assert mean_rmse(truth, estimate, c=10) == pytest.approx((np.sqrt(52) + 10) / 2)
     positions = np.zeros((3, 2, 2))
     assert mean_gospa(positions, positions + np.array([3, 4]), c=10, p=2).distance == 50
 
@@ -194,13 +196,13 @@ def test_mean_metrics_average_over_steps() -> None:
         ({"p": 0.5}, "p must be finite and at least 1; got 0.5"),
         ({"alpha": 2.5}, r"alpha must lie in \(0, 2\]; got 2.5"),
         ({"period": -1}, "period must be finite and positive; got -1"),
-        ({"found": [[1.0, 2.0]]}, "must have the same dimension; got 1 and 2"),
-        ({"found": [np.inf]}, "found must be finite, or NaN for absent points"),
+        ({"estimate": [[1.0, 2.0]]}, "must have the same dimension; got 1 and 2"),
+        ({"estimate": [np.inf]}, "estimate must be finite, or NaN for absent points"),
         ({"truth": 1.0}, r"truth must have shape \(n,\) or \(n, dim\); got \(\)"),
     ],
 )
 def test_gospa_invalid_argument_is_rejected(arguments: dict[str, float], message: str) -> None:
-    good = {"truth": [1.0], "found": [2.0], "c": 10}
+    good = {"truth": [1.0], "estimate": [2.0], "c": 10}
     with pytest.raises(ValueError, match=message):
         gospa(**(good | arguments))  # type: ignore[arg-type]
 
@@ -222,7 +224,7 @@ def test_best_assignment_is_the_best_of_all_permutations(
     seed: int, n_sources: int, period: float | None
 ) -> None:
     rng = np.random.default_rng(seed)
-    truth, found = rng.uniform(-400, 400, (2, 3, 2, n_sources))
+    truth, estimate = rng.uniform(-400, 400, (2, 3, 2, n_sources))
 
     def squares(t: np.ndarray, f: np.ndarray) -> float:
         difference = np.abs(t - f) % (period or np.inf)
@@ -231,9 +233,9 @@ def test_best_assignment_is_the_best_of_all_permutations(
     for run in range(3):
         total = sum(
             min(squares(t, f[list(order)]) for order in permutations(range(n_sources)))
-            for t, f in zip(truth[run], found[run], strict=True)
+            for t, f in zip(truth[run], estimate[run], strict=True)
         )
-        ours = best_assignment_rmse(truth, found, period)
+        ours = best_assignment_rmse(truth, estimate, period)
         assert ours[run] == pytest.approx(np.sqrt(total / 2 / n_sources), abs=1e-9)
 
 

@@ -40,36 +40,36 @@ def test_noise_of_known_power_has_its_nmse_and_sdr() -> None:
 @given(st.complex_numbers(min_magnitude=1e-3, max_magnitude=1e3, allow_nan=False))
 def test_sdr_is_invariant_to_scale_and_phase(factor: complex) -> None:
     s = signals()
-    found = s + 0.1 * signals(1)
-    np.testing.assert_allclose(sdr(s, factor * found), sdr(s, found), rtol=1e-9)
+    estimate = s + 0.1 * signals(1)
+    np.testing.assert_allclose(sdr(s, factor * estimate), sdr(s, estimate), rtol=1e-9)
 
 
 def test_sdr_is_the_maximum_over_complex_factors() -> None:
-    s, found = signals()[0, :, :1], (signals() + 0.3 * signals(1))[0, :, :1] * 2j
+    s, estimate = signals()[0, :, :1], (signals() + 0.3 * signals(1))[0, :, :1] * 2j
     turns = np.exp(1j * np.linspace(0, 2 * np.pi, 721))
     alphas = (np.linspace(0.5, 4, 141)[:, None] * turns).ravel()
-    errors = [float(np.sum(np.abs(found - alpha * s) ** 2)) for alpha in alphas]
+    errors = [float(np.sum(np.abs(estimate - alpha * s) ** 2)) for alpha in alphas]
     best = alphas[int(np.argmin(errors))]
     direct = 10 * np.log10(np.sum(np.abs(best * s) ** 2) / min(errors))
-    assert sdr(s, found)[0] == pytest.approx(direct, abs=0.05)
+    assert sdr(s, estimate)[0] == pytest.approx(direct, abs=0.05)
 
 
 @pytest.mark.parametrize(
-    ("truth", "found", "error", "message"),
+    ("truth", "estimate", "error", "message"),
     [
         (np.ones((3, 2)), np.ones((3, 1)), ValueError, "the same shape"),
         (np.ones(3), np.ones(3), ValueError, "n_steps, n_sources"),
-        (np.ones((2, 1)), [[np.nan], [1.0]], ValueError, "found must be finite"),
+        (np.ones((2, 1)), [[np.nan], [1.0]], ValueError, "estimate must be finite"),
         (np.zeros((2, 1)), np.ones((2, 1)), ValueError, "nonzero for every source"),
         ([["a"]], [["a"]], TypeError, "must hold numbers"),
     ],
 )
 def test_nmse_and_sdr_invalid_signals_are_rejected(
-    truth: Any, found: Any, error: type[Exception], message: str
+    truth: Any, estimate: Any, error: type[Exception], message: str
 ) -> None:
     for measure in (nmse, sdr):
         with pytest.raises(error, match=message):
-            measure(truth, found)
+            measure(truth, estimate)
 
 
 # -- autoregressive signals ----------------------------------------------------------------------
