@@ -10,7 +10,6 @@ from arrivals.typing import Float
 from arrivals.validation import count, number, real
 
 
-
 def per_sensor(name: str, value: ArrayLike, n: int) -> float | Float:
     """Return a finite number, or one for each sensor that cannot be written to.
 

@@ -20,7 +20,12 @@ from arrivals.measurement_models.signal_strength.envelope import (
     sample_log_envelope,
 )
 from arrivals.measurement_models.signal_strength.gains import LogGains
-from arrivals.measurement_models.signal_strength.path_loss import Levels, PropagationModel, check_unit, slopes
+from arrivals.measurement_models.signal_strength.path_loss import (
+    Levels,
+    PropagationModel,
+    check_unit,
+    slopes,
+)
 from arrivals.typing import Float
 from arrivals.validation import constant, count, instance, number, positive, real
 
