@@ -122,7 +122,7 @@ def complex_snapshot(z: ArrayLike, shape: tuple[int, ...]) -> Complex:
     array[~(size < LARGEST)] = complex(np.nan, np.nan)
     array[size < SMALLEST] = 0
     if np.isnan(array).all():
-        raise ValueError("no sensor of the snapshot gave a finite number")
+        raise ValueError("a snapshot must have a finite number; got none")
     return array
 
 

@@ -35,12 +35,12 @@ def autocovariance(signal: ArrayLike, n_lags: int) -> Float:
     x = _signal(signal)
     n = x.shape[-1]
     if n <= count("n_lags", n_lags, minimum=0):
-        raise ValueError(f"{n_lags} lags need more than {n_lags} samples; got {n}")
+        raise ValueError(f"signal must have more than {n_lags} samples for {n_lags} lags; got {n}")
     x = x - x.mean(axis=-1, keepdims=True)
     products = [(x[..., k:] * x[..., : n - k].conj()).real.sum(axis=-1) for k in range(n_lags + 1)]
     c = np.stack(products, axis=-1) / n
     if not (c[..., 0] > 0).all():
-        raise ValueError("the signal must vary; it is constant")
+        raise ValueError("signal must vary; got a constant")
     return np.asarray(c)
 
 

@@ -125,7 +125,7 @@ class FunctionMotion(MotionModel):
         if callable(self._Q):
             return shaped("Q(dt)", self._Q(dt), self.dim_x, self.dim_x)
         if dt != 1:
-            raise ValueError(f"a matrix Q holds for dt=1 only; got dt={dt}: pass a function Q(dt)")
+            raise ValueError(f"dt must be 1 for a matrix Q; got {dt}: pass a function Q(dt)")
         return np.array(self._Q)
 
     def _difference(self, x1: Float, x2: Float) -> Float:

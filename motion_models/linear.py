@@ -239,4 +239,4 @@ def _on_diagonal(block: ArrayLike, n: int) -> Float:
 
 def _one_step(dt: float) -> None:
     if dt != 1:
-        raise ValueError(f"the matrices of LinearMotion hold for dt=1 only; got dt={dt}")
+        raise ValueError(f"dt must be 1 for the matrices of LinearMotion; got {dt}")

@@ -51,7 +51,9 @@ class ElementResponse(FrozenModel):
                 f"got {gains.shape}"
             )
         if not np.isfinite(gains).all():
-            raise ValueError("gains must be finite; a sensor that gave none is best left out")
+            raise ValueError(
+                "gains must be finite; got NaN or inf: remove the sensors without data"
+            )
         gains.setflags(write=False)
         object.__setattr__(self, "gains", gains)
 

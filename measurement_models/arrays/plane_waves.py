@@ -55,7 +55,7 @@ class PlaneWaves(FrozenModel):
             positive("slowness", factor)
         if self.elevation is not None:
             if self.slowness is not None:
-                raise ValueError("either slowness or elevation may be unknown, not both")
+                raise ValueError("slowness must be None if elevation is set; got both")
             if self.array.dim == 1:
                 raise ValueError("elevation must be None for a line: its directions are cones")
             if not all(abs(angle) <= np.pi / 2 for angle in self.elevation):
@@ -159,11 +159,11 @@ def grid_of(name: str, values: Sequence[float] | None) -> tuple[float, ...] | No
 def _check_response(response: ElementResponse, array: SensorArray, n_bins: int) -> None:
     if array.dim == 1:
         raise ValueError(
-            "element responses are functions of the azimuth: give the positions in a plane"
+            "positions must be in a plane for responses as functions of the azimuth; got a line"
         )
-    wanted = f"({array.n_sensors} sensors" + (f", {n_bins} bins)" if n_bins > 1 else ")")
+    shape = f"({array.n_sensors} sensors" + (f", {n_bins} bins)" if n_bins > 1 else ")")
     if response.n_sensors != array.n_sensors or response.n_bins not in (None, n_bins):
         raise ValueError(
             "the element response must have shape (n_angles, n_sensors) or (n_bins, n_angles, "
-            f"n_sensors) {wanted}; got {response.gains.shape}"
+            f"n_sensors) {shape}; got {response.gains.shape}"
         )

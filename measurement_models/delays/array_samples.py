@@ -81,12 +81,11 @@ class ArraySamples(FrozenModel):
         spacing = self.array.spacing
         if spacing is None:
             raise ValueError(
-                "delays between neighbours need a line of two sensors or more on a uniform grid "
-                f"(gaps are allowed); this array has {self.array.n_sensors} sensors in "
-                f"{self.array.dim} dimension(s) on no such grid"
+                "array must be a line of two or more sensors on a uniform grid (gaps are allowed); "
+                f"got {self.array.n_sensors} sensors in {self.array.dim} dimension(s)"
             )
         if self.array.speed is None:
-            raise ValueError("the array has no wave speed: give speed, m/s")
+            raise ValueError("array must have a wave speed, m/s; got None")
         p = self.array.positions[:, 0]
         grid_index = np.rint((p.max() - p) / spacing).astype(np.int64)
         grid_index.setflags(write=False)
@@ -95,8 +94,8 @@ class ArraySamples(FrozenModel):
         if 2 * self.correlation.highest * self.kappa > 1 + 1e-6:
             limit = self.rate / (2 * self.kappa)
             raise ValueError(
-                f"the source reaches up to {self.correlation.highest * self.rate:.6g} Hz, above "
-                f"the array's alias limit, {limit:.6g} Hz: directions are ambiguous"
+                "frequencies of the source must not exceed the array's alias limit, "
+                f"{limit:.6g} Hz; got {self.correlation.highest * self.rate:.6g} Hz"
             )
 
     @property

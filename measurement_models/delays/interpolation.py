@@ -82,8 +82,8 @@ class DelayInterpolator(FrozenModel):
         r = r0 + self.loading * np.eye(len(offsets))
         if np.linalg.cond(r) > 1e12:
             raise ValueError(
-                f"{len(offsets)} taps on this source are singular without loading; give a loading "
-                f"of 1e-9 at least, got {self.loading}"
+                f"loading must be at least 1e-9 for {len(offsets)} taps on this source; got "
+                f"{self.loading}: the correlation matrix is singular"
             )
         for name, matrix in (("r0", r0), ("G", np.linalg.inv(r))):
             matrix.setflags(write=False)
@@ -211,12 +211,14 @@ class InterpolationDelay(MeasurementModel):
         ----------
         frames : array_like, shape (..., n_snapshots, n_sensors)
         k : int, optional
-            The last one for which all taps are there if None.
+            Number of a snapshot; the last one with all taps if None.
         """
         frames = np.asarray(frames, dtype=np.float64)
         k = frames.shape[-2] - 1 - self.latency if k is None else k
         if not self.memory <= k < frames.shape[-2] - self.latency:
-            raise ValueError(f"snapshot {k} of {frames.shape[-2]} lacks taps on one side")
+            raise ValueError(
+                f"k must have all taps within the {frames.shape[-2]} snapshots; got {k}"
+            )
         n, m = self.dim_z, self.baseline
         first, source = (m, 0) if m > 0 else (0, -m)
         at = k - np.array(self.interpolator.offsets)
@@ -260,14 +262,13 @@ class InterpolationDelay(MeasurementModel):
         return float(self.variance(np.zeros(1))) * np.eye(self.dim_z)
 
     def _inputs(self, regressors: ArrayLike | None) -> Float:
-        given = self.regressors if regressors is None else np.asarray(regressors, dtype=np.float64)
-        if given is None:
-            raise ValueError("h and H need the neighbours' samples: pass or bind regressors")
-        wanted = (self.dim_z, self.interpolator.n_taps)
-        if given.shape[-2:] != wanted:
-            raise ValueError(f"regressors must have shape (..., {wanted[0]}, {wanted[1]}); "
-                             f"got {given.shape}")  # fmt: skip
-        return given
+        X = self.regressors if regressors is None else np.asarray(regressors, dtype=np.float64)
+        if X is None:
+            raise ValueError("regressors must be set, samples of the neighbours; got None")
+        m, n = self.dim_z, self.interpolator.n_taps
+        if X.shape[-2:] != (m, n):
+            raise ValueError(f"regressors must have shape (..., {m}, {n}); got {X.shape}")
+        return X
 
 
 def _delay(x: ArrayLike) -> Float:

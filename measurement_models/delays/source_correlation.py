@@ -76,8 +76,8 @@ class FlatBand(SourceCorrelation):
         low, high = number("low", self.low), number("high", self.high)
         if not 0 <= low < high <= 0.5:
             raise ValueError(
-                "a band lies between 0 and half the sampling rate, 0 <= low < high <= 0.5 cycles "
-                f"per sample; got {self.low} and {self.high}"
+                "low and high must satisfy 0 <= low < high <= 0.5 cycles per sample, half the "
+                f"sampling rate; got {self.low} and {self.high}"
             )
 
     @property

@@ -71,8 +71,7 @@ class ArrayManifold(SingleSourceSnapshot):
         if inner > 0.5 * (1 + 1e-6):
             raise ValueError(
                 f"the inner pair must lie at most half a wavelength, {self.wavelength / 2:.6g} m, "
-                f"from the centre; it lies {inner * self.wavelength:.6g} m from it: directions "
-                "are ambiguous"
+                f"from the centre; got {inner * self.wavelength:.6g} m: directions are ambiguous"
             )
 
     @property
@@ -177,13 +176,13 @@ def _pairs(array: SensorArray) -> tuple[Int, int, Int]:
         If the array is not a line, has no centre sensor, or is not symmetric about it.
     """
     if array.dim != 1:
-        raise ValueError(f"the array must be a line; its sensors lie in {array.dim} dimensions")
+        raise ValueError(f"array must be a line; got sensors in {array.dim} dimensions")
     positions = array.positions[:, 0]
     order = np.argsort(positions)
     n = len(order)
     if n < 3 or n % 2 == 0:
         raise ValueError(
-            f"the array must have a centre sensor and pairs about it, 3, 5, ... sensors; it has {n}"
+            f"array must have a centre sensor and pairs about it, 3, 5, ... sensors; got {n}"
         )
     middle = int(order[n // 2])
     left, right = order[: n // 2][::-1], order[n // 2 + 1 :]
@@ -191,9 +190,8 @@ def _pairs(array: SensorArray) -> tuple[Int, int, Int]:
     worst = int(np.argmax(off))
     if off[worst] > 1e-6 * np.ptp(positions):
         raise ValueError(
-            "the array must be symmetric about its centre sensor; those at "
-            f"{positions[left[worst]]:g} and {positions[right[worst]]:g} m are not, about "
-            f"{positions[middle]:g} m"
+            f"array must be symmetric about its centre sensor at {positions[middle]:g} m; got "
+            f"sensors at {positions[left[worst]]:g} and {positions[right[worst]]:g} m"
         )
     return left, middle, right
 

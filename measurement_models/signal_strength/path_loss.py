@@ -70,7 +70,7 @@ def offsets(theta: Float, sensors: Float, r_min: float) -> Offsets:
 
 
 class Levels(NamedTuple):
-    """Levels at sensors and who makes them.
+    """Levels at sensors, and the responsibilities of the sources.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def levels(
 
 
 class PropagationModel(NamedTuple):
-    """Sensors and what is known of the way to them, for `levels`.
+    """Sensors and propagation parameters, for `levels`.
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ class PropagationModel(NamedTuple):
         )
 
 
-def slopes(found: Levels, alpha: float) -> Float:
+def slopes(predicted: Levels, alpha: float) -> Float:
     """Return the gradients of log σ_y: λ with respect to u, -½αλ d/R² to positions.
 
     Returns
@@ -199,7 +199,7 @@ def slopes(found: Levels, alpha: float) -> Float:
     >>> slopes(one, alpha=3.0)
     array([[ 1.  , -0.75, -0.  ]])
     """
-    lam, geometry = found.responsibilities, found.offsets
+    lam, geometry = predicted.responsibilities, predicted.offsets
     *lead, K, M = lam.shape
     slope = -0.5 * alpha * lam * geometry.inverse
     G = np.empty((*lead, 3 * K, M))
@@ -245,10 +245,10 @@ def doppler_log_gain(
     >>> (gain / np.log(10) * 20).round(2)
     array([[ 0.26, -0.25]])
     """
-    v, places = np.asarray(velocity, dtype=np.float64), np.asarray(sensors, dtype=np.float64)
-    way = places - np.asarray(theta, dtype=np.float64)[..., None, :]
-    far = np.maximum(np.linalg.norm(way, axis=-1), np.finfo(np.float64).tiny)
-    towards = (way * v[..., None, :]).sum(axis=-1) / far
+    v, positions = np.asarray(velocity, dtype=np.float64), np.asarray(sensors, dtype=np.float64)
+    path = positions - np.asarray(theta, dtype=np.float64)[..., None, :]
+    distance = np.maximum(np.linalg.norm(path, axis=-1), np.finfo(np.float64).tiny)
+    towards = (path * v[..., None, :]).sum(axis=-1) / distance
     if not np.linalg.norm(v, axis=-1).max(initial=0.0) < speed:
         raise ValueError(f"sources must be slower than the waves, {speed} m/s; got {v.tolist()}")
     return np.asarray(-2 * np.log1p(-towards / speed))

@@ -96,5 +96,6 @@ def rss_bound(
         return Bound(*marginals(J))
     except np.linalg.LinAlgError:
         raise ValueError(
-            f"{measurement.dim_z} readings do not determine the {3 * K} unknowns of {K} sources"
+            f"sensors must determine the {3 * K} unknowns of {K} sources; got "
+            f"{measurement.dim_z} readings"
         ) from None

@@ -87,7 +87,7 @@ def stationary_covariance(a: ArrayLike, q: float) -> Float:
     array([[1.]])
     >>> stationary_covariance([1.0], 1.0)
     Traceback (most recent call last):
-    ValueError: roots of coefficients must be inside the unit circle; [1.0] has one of modulus 1
+    ValueError: roots of coefficients must be inside the unit circle; got modulus 1 of [1.0]
     """
     a = np.atleast_1d(real("coefficients", a))
     p = len(a)
@@ -96,8 +96,8 @@ def stationary_covariance(a: ArrayLike, q: float) -> Float:
     largest = float(pole_radius(a))
     if largest >= 1:
         raise ValueError(
-            f"roots of coefficients must be inside the unit circle; {a.tolist()} has one of "
-            f"modulus {largest:.6g}"
+            "roots of coefficients must be inside the unit circle; got modulus "
+            f"{largest:.6g} of {a.tolist()}"
         )
     F, Q = np.eye(p, k=-1), np.zeros((p, p))
     F[0], Q[0, 0] = a, q

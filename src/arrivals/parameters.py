@@ -181,7 +181,7 @@ class Configurable:
             If "type" is not the name of such a class, or the class does not have a parameter.
         """
         if not isinstance(config, Mapping) or "type" not in config:
-            raise ValueError(f"a configuration is a dictionary with the key 'type'; got {config!r}")
+            raise ValueError(f"config must be a dictionary with the key 'type'; got {config!r}")
         kind = _find_type(str(config["type"]))
         if not (inspect.isclass(kind) and issubclass(kind, cls)):
             raise TypeError(f"{config['type']} is not a {cls.__name__}")

@@ -139,7 +139,7 @@ def test_number_and_spectra_of_the_sources_are_set_by_the_model(
         (("--set", "motion__coefficients=[[1.5]]"), ("unstable",)),
         (("--set", "motion=3"), ("motion must be an AutoregressiveSources; got 3",)),
         (("--set", "doa=[0.1]"), ("doa must have shape (2,)",)),
-        (("--set", "interval=1"), ("not be longer than the interval",)),
+        (("--set", "interval=1"), ("AR orders must be at most the interval",)),
         (("--frequency", "3000"), ("alias limit",)),
         (("--dtype", "int16"), ("requires samples from standard input",)),
     ],

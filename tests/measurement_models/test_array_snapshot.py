@@ -145,7 +145,7 @@ def test_snapshot_copies_its_argument_and_sets_invalid_numbers_to_nan() -> None:
         (1.0, ValueError, r"got \(\)"),
         (["a"] * 5, TypeError, "must hold complex numbers, NaN for a missing one; got <U1"),
         ([None] * 5, TypeError, "NaN for a missing one; got object"),
-        (np.full(5, np.inf), ValueError, "no sensor of the snapshot gave a finite number"),
+        (np.full(5, np.inf), ValueError, "a snapshot must have a finite number; got none"),
     ],
 )
 def test_invalid_snapshot_is_refused(z: ArrayLike, error: type[Exception], message: str) -> None:

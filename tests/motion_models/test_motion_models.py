@@ -227,7 +227,9 @@ def test_linear_motion_refuses_invalid_matrices(
 def test_linear_motion_refuses_other_durations() -> None:
     model = LinearMotion([[0.5]], [[1.0]])
     for method, x in (("f", [[1.0]]), ("F", [[1.0]]), ("Q", [])):
-        with pytest.raises(ValueError, match=r"hold for dt=1 only; got dt=0\.5"):
+        with pytest.raises(
+            ValueError, match=r"dt must be 1 for the matrices of LinearMotion; got 0\.5"
+        ):
             getattr(model, method)(*x, dt=0.5)
 
 

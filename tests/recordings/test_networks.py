@@ -67,7 +67,7 @@ def test_invalid_tables_raise_a_one_line_error(
 
 
 def test_a_table_of_readings_needs_its_sensors(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="needs a table of sensors"):
+    with pytest.raises(ValueError, match="requires a table of sensors"):
         read_network(tmp_path / "readings.csv")
 
 

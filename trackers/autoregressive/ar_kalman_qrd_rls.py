@@ -141,7 +141,7 @@ class ARKalmanQRDRLS(BlockProcessor):
         manifold_of(measurement)  # raises for an array that does not fit
         if max(self.motion.orders) > self.interval:
             raise ValueError(
-                f"an AR order must not be longer than the interval, {self.interval} snapshots; "
+                f"AR orders must be at most the interval, {self.interval} snapshots; "
                 f"got {max(self.motion.orders)}"
             )
         if doa is not None:

@@ -42,8 +42,8 @@ def finish_interval(
     current = source_power(filtered.X, belief.doa.shape[-1], belief.x.shape[-2])
     has_data = np.asarray(filtered.decay < 1)[..., None]
     # active_k: mean |s_k|² > γ times the long-term power   (sec. 5)
-    least = gate * np.maximum(belief.power, MIN_GATED_POWER * belief.r[..., None])
-    active = np.logical_and((current > least) | (gate == 0), has_data)
+    minimum = gate * np.maximum(belief.power, MIN_GATED_POWER * belief.r[..., None])
+    active = np.logical_and((current > minimum) | (gate == 0), has_data)
     any_active = np.asarray(active.any(axis=-1))[..., None, None]
     power = np.where(has_data, update_power(belief, current, memory), belief.power)
     scaled_q = belief.q * power / belief.power
@@ -70,8 +70,8 @@ def source_power(X: Float, n_sources: int, n_parts: int) -> Float:
 def update_noise(belief: SourceBelief, filtered: FilteredInterval) -> Float:
     """Return r <- 0.9 r + 0.1 E|y - A s|² (4.5); r without measurements."""
     new: Float = np.where(np.isnan(filtered.noise), belief.r, filtered.noise)
-    least = MIN_NOISE * belief.power.max(axis=-1)
-    return np.asarray(np.maximum(0.9 * belief.r + 0.1 * new, least))
+    minimum = MIN_NOISE * belief.power.max(axis=-1)
+    return np.asarray(np.maximum(0.9 * belief.r + 0.1 * new, minimum))
 
 
 def update_power(belief: SourceBelief, current: Float, memory: float) -> Float:

@@ -137,7 +137,7 @@ def assumed_noise(belief: SourceBelief, settings: NoiseSettings) -> Float:
     """Return r of one real part, (..., 1, 1), at least r_start exp(-n/τ) during acquisition."""
     r = belief.r
     if settings.r_start > 0:
-        least = settings.r_start * belief.power.mean(axis=-1)
-        r = np.maximum(r, least * np.exp(-belief.n / settings.tau))
+        minimum = settings.r_start * belief.power.mean(axis=-1)
+        r = np.maximum(r, minimum * np.exp(-belief.n / settings.tau))
     half = belief.x.shape[-2] / 2  # of real sources, half of the noise is in the other part
     return np.asarray(half * r[..., None, None])

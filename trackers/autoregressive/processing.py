@@ -220,8 +220,8 @@ class BlockProcessor(Tracker):
         With a gate, their mean power must exceed it.
         """
         rows = [one[np.isfinite(one).all(axis=-1)] for one in y]
-        least = self.gate * self.motion.power.sum() / self.motion.n_parts
-        if all(len(one) > 0 and np.mean(one**2) > least for one in rows):
+        minimum = self.gate * self.motion.power.sum() / self.motion.n_parts
+        if all(len(one) > 0 and np.mean(one**2) > minimum for one in rows):
             return rows
         return None
 

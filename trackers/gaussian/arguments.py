@@ -71,7 +71,7 @@ def belief_arrays(x: ArrayLike, P: ArrayLike, n: int) -> tuple[Float, Float]:
 
 
 def measurement_vector(z: ArrayLike, m: int) -> Float:
-    """Return a measurement as (m,), a copy; NaN alone stands for NaN everywhere.
+    """Return a measurement as (m,), a copy; one NaN means that all entries are missing.
 
     Examples
     --------
@@ -82,7 +82,9 @@ def measurement_vector(z: ArrayLike, m: int) -> Float:
     if array.shape == (m,) and array.dtype == np.float64:
         return array  # the usual case
     if array.dtype.kind == "c":
-        raise TypeError("z must hold real numbers: stack the parts of complex ones, composite(z)")
+        raise TypeError(
+            f"z must hold real numbers; got {array.dtype}: stack the parts by composite(z)"
+        )
     array = real("z", array)
     if array.ndim == 0 and np.isnan(array):
         return np.full(m, np.nan)

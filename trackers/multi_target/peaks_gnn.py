@@ -160,8 +160,8 @@ class PeaksGNN(DirectionTracker):
                     if p.default is p.empty]  # fmt: skip
         if required != ["measurement"]:
             raise ValueError(
-                f"detector must require no argument but measurement; {self.detector!r} requires "
-                f"{', '.join(required)}"
+                f"detector must require only the argument measurement; got {self.detector!r}, "
+                f"which requires {', '.join(required)}"
             )
         return kind(measurement=self.measurement)  # type: ignore[call-arg]  # checked above
 

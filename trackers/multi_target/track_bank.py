@@ -67,14 +67,14 @@ class TrackBank:
 
     def add(self, z: Float, covariance: Float) -> TrackBank:
         """Return the bank with a new track for each measurement, while slots are free."""
-        free = np.flatnonzero(~self.used)[: len(z)]
-        mean = np.zeros((len(free), self.mean.shape[1]))
-        mean[:, 0] = z[: len(free)]
-        label = self.n_labels + np.arange(len(free))
+        free_slots = np.flatnonzero(~self.used)[: len(z)]
+        mean = np.zeros((len(free_slots), self.mean.shape[1]))
+        mean[:, 0] = z[: len(free_slots)]
+        label = self.n_labels + np.arange(len(free_slots))
         bank = self._replace_slots(
-            free, mean=mean, covariance=covariance, label=label, hits=1, misses=0
+            free_slots, mean=mean, covariance=covariance, label=label, hits=1, misses=0
         )
-        return replace(bank, n_labels=self.n_labels + len(free))
+        return replace(bank, n_labels=self.n_labels + len(free_slots))
 
     def remove(self, slots: Bool) -> TrackBank:
         """Return the bank without some tracks."""

@@ -99,7 +99,8 @@ def without_position(P0: ArrayLike | None, n: int, position: Entries) -> Float:
     if P0 is None:
         if n > 2:
             raise ValueError(
-                f"P0 must be given, shape {(n, n)}: new sources need a covariance of the velocity"
+                f"P0 must have shape {(n, n)}; got None: new sources need a covariance of their "
+                "velocity"
             )
         return np.zeros((n, n))
     P = real("P0", P0)
@@ -110,7 +111,7 @@ def without_position(P0: ArrayLike | None, n: int, position: Entries) -> Float:
 
 def _covariances(P0: ArrayLike | None, K: int, n: int, position: Entries) -> Float:
     if P0 is None:
-        raise ValueError("P0 must be given with x0: the covariance of a source's state")
+        raise ValueError("P0 must be the covariance of a source's state if x0 is set; got None")
     P = real("P0", P0)
     P = np.broadcast_to(P, (K, n, n)) if P.shape == (n, n) else P
     if P.shape != (K, n, n):

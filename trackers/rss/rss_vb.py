@@ -229,8 +229,8 @@ def variational_posterior(
         if converged.all():
             break
         if converged.any():
-            left = ~converged
-            rows, problem, point = rows[left], problem.take(left), point.take(left)
+            active = ~converged
+            rows, problem, point = rows[active], problem.take(active), point.take(active)
     return q
 
 
@@ -260,11 +260,11 @@ def take_step(
     du, dtheta = factors.mu - point.u, factors.theta - point.theta
     while True:
         u, theta = point.u + s[:, None] * du, point.theta + s[:, None, None] * dtheta
-        moved = ExpansionPoint.at(problem, u, theta)
+        trial = ExpansionPoint.at(problem, u, theta)
         L = point.log_posterior
-        lower = (L - ROUNDING * np.abs(L) > moved.log_posterior) & (s > MIN_STEP_FRACTION)
+        lower = (L - ROUNDING * np.abs(L) > trial.log_posterior) & (s > MIN_STEP_FRACTION)
         if not line_search or not lower.any():
-            return moved
+            return trial
         s = np.where(lower, s / 2, s)
 
 

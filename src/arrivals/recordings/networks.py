@@ -56,11 +56,11 @@ class Network:
         if repeated:
             raise ValueError(f"name must have no duplicates; got {repeated[0]!r} twice")
         shape = (len(self.time), len(self.name))
-        for name, wanted in (("rss_db", shape), ("sensors", (*shape, 2))):
+        for name, expected in (("rss_db", shape), ("sensors", (*shape, 2))):
             got = getattr(self, name).shape
-            if got != wanted:
+            if got != expected:
                 raise ValueError(
-                    f"{name} must have shape {wanted}; got {getattr(self, name).shape}"
+                    f"{name} must have shape {expected}; got {getattr(self, name).shape}"
                 )
         valid = np.isfinite(self.rss_db)
         if not valid.any():
@@ -147,12 +147,12 @@ def read_network(
     --------
     >>> read_network("readings.csv")
     Traceback (most recent call last):
-    ValueError: readings.csv needs a table of sensors, with the columns name, x_m, y_m
+    ValueError: readings.csv requires a table of sensors, with the columns name, x_m, y_m
     """
     if Path(readings).suffix == ".npz":
         return _from_npz(readings)
     if sensors is None:
-        raise ValueError(f"{readings} needs a table of sensors, with the columns name, x_m, y_m")
+        raise ValueError(f"{readings} requires a table of sensors, with the columns name, x_m, y_m")
     name, positions = read_sensors(sensors)
     time, rss_db = _levels(readings, name)
     return Network.fixed(name, positions, rss_db, time)

@@ -232,7 +232,7 @@ def test_invalid_parameters_raise_with_message() -> None:
         FlatBand(0.3, 0.2)
     with pytest.raises(ValueError, match="stable"):
         Autoregressive([1.1])
-    with pytest.raises(ValueError, match=r"loading of 1e-9"):
+    with pytest.raises(ValueError, match=r"loading must be at least 1e-9"):
         DelayInterpolator(Tones(0.25), window(2.0))
     with pytest.raises(ValueError, match="different whole numbers"):
         DelayInterpolator(BAND, (0, 0))
@@ -244,11 +244,13 @@ def test_invalid_parameters_raise_with_message() -> None:
 
 def test_measurements_of_wrong_shape_are_refused() -> None:
     model = InterpolationDelay(DelayInterpolator(BAND), 4, 0.1)
-    with pytest.raises(ValueError, match="pass or bind regressors"):
+    with pytest.raises(
+        ValueError, match="regressors must be set, samples of the neighbours; got None"
+    ):
         model.h([0.3])
     with pytest.raises(ValueError, match=r"\(\.\.\., 3, 2\)"):
         model.h([0.3], np.zeros((2, 2)))
-    with pytest.raises(ValueError, match="lacks taps"):
+    with pytest.raises(ValueError, match="k must have all taps within the"):
         model.split(np.zeros((5, 4)), 0)
     with pytest.raises(ValueError, match="the delay, then the source"):
         Phasor(4, 0.1, 0.25).h([0.3, 1.0])
@@ -257,8 +259,11 @@ def test_measurements_of_wrong_shape_are_refused() -> None:
 @pytest.mark.parametrize(
     ("array", "message"),
     [
-        (SensorArray.uca(5, 1.0, speed=1.0), "on no such grid"),
-        (SensorArray.ula(5, 1.0), "no wave speed"),
+        (
+            SensorArray.uca(5, 1.0, speed=1.0),
+            "array must be a line of two or more sensors on a uniform grid",
+        ),
+        (SensorArray.ula(5, 1.0), "array must have a wave speed"),
         (SensorArray.ula(5, 2.0, speed=1.0), "alias limit, 0.25 Hz"),
     ],
 )

@@ -295,7 +295,7 @@ def test_directional_elements_resolve_front_and_back() -> None:
         ({"slowness": []}, "slowness must be a list of finite numbers"),
         ({"slowness": [-1.0]}, "slowness must be finite and positive"),
         ({"elevation": [2.0]}, "elevation must lie within ±π/2"),
-        ({"elevation": [0.1], "slowness": [1.0]}, "not both"),
+        ({"elevation": [0.1], "slowness": [1.0]}, "slowness must be None if elevation is set"),
         ({"array": SPARSE, "elevation": [0.1]}, "elevation must be None for a line"),
         ({"response": 3.0}, "response must be an ElementResponse"),
         ({"response": ElementResponse.first_order([0.0])}, r"\(8 sensors\); got \(4, 1\)"),

@@ -69,22 +69,22 @@ def test_gaussian_interface_equals_transformed_snapshots() -> None:
 
 
 WRONG: list[tuple[Callable[[], object], type[Exception], str]] = [
-    (lambda: ArrayManifold(SensorArray.ula(4, 0.5), 1.0), ValueError, "centre sensor.*it has 4"),
+    (lambda: ArrayManifold(SensorArray.ula(4, 0.5), 1.0), ValueError, "centre sensor.*got 4"),
     (
         lambda: ArrayManifold(SensorArray(np.zeros(1)), 1.0),
         ValueError,
-        "3, 5, ... sensors; it has 1",
+        "3, 5, ... sensors; got 1",
     ),
     (
         lambda: ArrayManifold(SensorArray(np.array([-0.5, 0.0, 0.4])), 1.0),
         ValueError,
-        "symmetric about its centre sensor; those at -0.5 and 0.4 m",
+        "symmetric about its centre sensor at 0 m; got sensors at -0.5 and 0.4 m",
     ),
     (lambda: ArrayManifold(SensorArray.uca(5, 0.5), 1.0), ValueError, "must be a line"),
     (
         lambda: ArrayManifold(SensorArray.symmetric([0.6, 1.0]), 1.0),
         ValueError,
-        "at most half a wavelength, 0.5 m, from the centre; it lies 0.6 m",
+        "at most half a wavelength, 0.5 m, from the centre; got 0.6 m",
     ),
     (lambda: ArrayManifold(SensorArray.symmetric([0.5]), -1.0), ValueError, "wavelength"),
     (lambda: ArrayManifold("array", 1.0), TypeError, "must be a SensorArray"),  # type: ignore[arg-type]

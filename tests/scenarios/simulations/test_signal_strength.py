@@ -110,7 +110,9 @@ def test_rss_bound_is_the_inverse_covariance_of_the_score() -> None:
 
 def test_priors_reduce_the_rss_bound_and_resolve_ambiguity() -> None:
     model = LogNormalRSS([[0.0, 0.0], [60.0, 0.0]])
-    with pytest.raises(ValueError, match="2 readings do not determine the 3 unknowns"):
+    with pytest.raises(
+        ValueError, match="must determine the 3 unknowns of 1 sources; got 2 readings"
+    ):
         rss_bound(model, [9.2], [[20.0, 0.0]])
     bound = rss_bound(model, [9.2], [[20.0, 30.0]], v0=0.1, P0=100.0 * np.eye(2))
     assert bound.position[0] < np.sqrt(200.0)

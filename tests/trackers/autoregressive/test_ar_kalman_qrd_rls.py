@@ -203,7 +203,7 @@ WRONG: list[tuple[Callable[[], object], type[Exception], str]] = [
         ValueError,
         "half a wavelength, 0.5 m",
     ),
-    (lambda: made(interval=1), ValueError, "not be longer than the interval, 1 snapshots; got 2"),
+    (lambda: made(interval=1), ValueError, "must be at most the interval, 1 snapshots; got 2"),
     (lambda: made(doa=[0.1, 0.1]), ValueError, "doa must be at least 1e-06 rad apart"),
     (lambda: made(doa=[0.1, 2.0]), ValueError, "within ±π/2 rad"),
     (lambda: made(doa=[0.1]), ValueError, r"doa must have shape \(2,\)"),

@@ -123,7 +123,7 @@ def test_reset_returns_to_the_state_after_construction(name: str) -> None:
 @pytest.mark.parametrize(
     ("params", "error", "message"),
     [
-        ({"detector": "ekf"}, ValueError, "'ekf' requires motion, measurement, x, P"),
+        ({"detector": "ekf"}, ValueError, "got 'ekf', which requires motion, measurement, x, P"),
         ({"detector": "cbff"}, ValueError, "did you mean cbf"),
         ({"motion": 3}, TypeError, "motion must be a MotionModel"),
         ({"std": 0.0}, ValueError, "std must be finite and positive"),

@@ -133,7 +133,9 @@ def test_unsupported_number_of_sources_raises_a_warning() -> None:
 
 def test_a_state_with_velocities_requires_their_covariance() -> None:
     model = network(6).replace(position=(0, 2))
-    with pytest.raises(ValueError, match=r"P0 must be given, shape \(4, 4\): new sources need"):
+    with pytest.raises(
+        ValueError, match=r"P0 must have shape \(4, 4\); got None: new sources need"
+    ):
         RSSVB(ConstantVelocity(q=0.1), model, n_sources=1)
     with pytest.raises(ValueError, match=r"amplitude\.mean must be one number where x0 is None"):
         RSSVB(ConstantVelocity(q=0.1), model, P0=np.eye(4), amplitude=AmplitudePrior([9.0, 9.0]))

@@ -226,7 +226,7 @@ def test_settings_change_by_nested_names() -> None:
     [
         ({"x0": [[1.0]]}, "x0 must be finite, of shape"),
         ({"x0": [[1.0, np.nan]]}, "x0 must be finite"),
-        ({"P0": None}, "P0 must be given with x0"),
+        ({"P0": None}, "P0 must be the covariance .* if x0 is set; got None"),
         ({"P0": np.zeros((2, 2))}, "P0 must have positive variances of the positions"),
         ({"P0": np.eye(3)}, "P0 must have shape"),
         ({"amplitude": AmplitudePrior(mean=[9.0])}, "mean must be a number or have shape"),

@@ -217,11 +217,11 @@ def backtrack(
     cost: PositionCost, theta: Float, step: Float, before: CostEvaluation
 ) -> tuple[Float, CostEvaluation]:
     """Return positions after a step that is halved until φ does not increase, and φ there."""
-    moved = theta + step
-    after = cost.evaluate(moved)
+    shifted = theta + step
+    after = cost.evaluate(shifted)
     rows = np.flatnonzero(_increases(after.phi, before.phi, step).any(axis=-1))
     if len(rows) == 0:
-        return moved, after
+        return shifted, after
     part, step = cost.take(rows), step[rows]
     for halving in range(MAX_HALVINGS):
         phi = part.evaluate(theta[rows] + step).phi
@@ -230,8 +230,8 @@ def backtrack(
             break
         shorter = 0.0 if halving == MAX_HALVINGS - 1 else 0.5
         step = np.where(increases[..., None], shorter * step, step)
-    moved[rows] = theta[rows] + step
-    return moved, cost.evaluate(moved)
+    shifted[rows] = theta[rows] + step
+    return shifted, cost.evaluate(shifted)
 
 
 def _increases(phi: Float, before: Float, step: Float) -> Bool:

@@ -46,8 +46,8 @@ class Prior(NamedTuple):
     def square(self, u: Float, theta: Float) -> Float:
         """Return Σ (u - μ)²/v + Σ (θ - θ₀)ᵀ Σ⁻¹ (θ - θ₀), (...,)."""
         step = theta - self.theta
-        far = (self.P * step[..., :, None] * step[..., None, :]).sum(axis=(-3, -2, -1))
-        return np.asarray((self.w * (u - self.mu) ** 2).sum(axis=-1) + far)
+        square_theta = (self.P * step[..., :, None] * step[..., None, :]).sum(axis=(-3, -2, -1))
+        return np.asarray((self.w * (u - self.mu) ** 2).sum(axis=-1) + square_theta)
 
 
 class JointPosterior(NamedTuple):
@@ -175,10 +175,10 @@ class JointPosterior(NamedTuple):
             P = self.prior.P
             variance = np.trace(P, axis1=-2, axis2=-1) / np.linalg.det(P)  # tr Σ₀
             distance_2 = np.square(theta - self.prior.theta).sum(axis=-1)
-            far = (distance_2 > MAX_PRIOR_DISTANCE**2 * variance).any(axis=-1)
+            distant = (distance_2 > MAX_PRIOR_DISTANCE**2 * variance).any(axis=-1)
             lower = L - initial < -1e-9 * np.abs(initial)
         finite = np.isfinite(theta).all(axis=(-2, -1)) & np.isfinite(L)
-        diverged = ~finite | far | lower | (fit < DIVERGED_FIT)
+        diverged = ~finite | distant | lower | (fit < DIVERGED_FIT)
         return Diagnostics(solution.converged, solution.iterations, fit, fit < POOR_FIT, diverged)
 
 

@@ -196,9 +196,9 @@ def local_search(candidate: Candidate, new: NewSourcePrior, same_number: bool) -
     Candidate
     """
     while True:
-        wanted = candidate.log_evidence_of_set + MIN_GAIN
+        threshold = candidate.log_evidence_of_set + MIN_GAIN
         changed = changes(candidate, new, same_number)
-        better = next((other for other in changed if other.log_evidence_of_set > wanted), None)
+        better = next((other for other in changed if other.log_evidence_of_set > threshold), None)
         if better is None:
             return candidate
         candidate = better

@@ -175,15 +175,15 @@ def log_posterior(c: Complex, n_points: int, prior: CirclePrior, log_weights: Fl
 def front_mean(q: Float) -> complex:
     """Return the mean of exp(jθ) over cos θ ≥ 0 of a density on a uniform grid."""
     half = len(q) // 4
-    front = np.concatenate([q[-half:], q[: half + 1]])
+    front_q = np.concatenate([q[-half:], q[: half + 1]])
     theta = 2 * np.pi * np.arange(-half, half + 1) / len(q)
-    return complex(front @ np.exp(1j * theta) / front.sum())
+    return complex(front_q @ np.exp(1j * theta) / front_q.sum())
 
 
 def window_circle_moments(
     c: Complex, prior: CirclePrior, log_weights: Float, n_moments: int, *, front_only: bool
 ) -> tuple[Complex, complex] | None:
-    """Return the same by quadrature about each mode near the top; None where that fails."""
+    """Return the same by quadrature about each mode near the top; None if that fails."""
 
     def log_prior(s: Int, theta: Float) -> Float:
         return np.asarray(prior.at(theta) + log_weights[s])
@@ -197,5 +197,5 @@ def window_circle_moments(
     np.add.at(moments, s, np.einsum("wp,wpi->wi", weight, powers))
     if not front_only:
         return moments, complex(moments[:, 1].sum())
-    front = weight * (powers[..., 1].real >= 0)
-    return moments, complex((front * powers[..., 1]).sum() / front.sum())
+    front_weight = weight * (powers[..., 1].real >= 0)
+    return moments, complex((front_weight * powers[..., 1]).sum() / front_weight.sum())

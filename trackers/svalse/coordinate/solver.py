@@ -113,9 +113,9 @@ class CoordinateSolver(SolverSettings):
         if not snapshots.any():
             return NO_COMPONENTS
         state = self.initial_state(snapshots, manifold, prior)
-        merge, most = self.merge_distance(prior is not None), self.max_iterations
+        merge, limit = self.merge_distance(prior is not None), self.max_iterations
         x, converged = state.initialize(), False  # (66)-(68)
-        while not converged and state.iterations < most and not state.is_cycling(most):
+        while not converged and state.iterations < limit and not state.is_cycling(limit):
             state.iterations += 1
             state.choose_support()  # ŝ, ŵ, Ĉ   (49)-(56)
             state.update_variances()  # ν, τ   (58), (59)

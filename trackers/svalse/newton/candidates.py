@@ -171,7 +171,7 @@ class RemovedComponents(BatchRecord):
 
     Attributes
     ----------
-    memory : Components, of length n_known
+    memory : Components, of length n_slots
         All components of the step, as they were when they were removed.
     can_reactivate : ndarray of bool, shape (B, n_tracked)
         Tracked components that were removed, not merged, and may return with their priors.
@@ -257,10 +257,10 @@ def reactivate(
     removed: RemovedComponents,
     kl_weight: float,
 ) -> None:
-    """Put a component that was removed before in place of the new one where it gains more."""
+    """Replace the new component by one that was removed before if that gains more."""
     n, rows = new.n, np.arange(len(new.n))
-    known = removed.can_reactivate.shape[1]
-    memory = removed.memory.first(known)
+    n_slots = removed.can_reactivate.shape[1]
+    memory = removed.memory.first(n_slots)
     kappa, mu = memory.prior_kappa, memory.prior_mu
     # KL divergence of a normal density from the von Mises prior
     phasors = (kappa * np.exp(-1j * mu))[:, :, None] * grid.phasors

@@ -26,7 +26,7 @@ from arrivals.trackers.svalse.noise_initialization import (
 )
 from arrivals.typing import Bool, Complex, Float, Int
 
-MAX_LOG_ODDS = 500.0  # stands for certainty
+MAX_LOG_ODDS = 500.0  # bound of the log odds of certain events
 MAX_AGE = 3  # steps that a component is tracked without being active
 SNR_WEIGHT = 0.3  # of the newest signal-to-noise ratio in the start of the next step
 DB = 10 / np.log(10)
@@ -205,7 +205,7 @@ def tracked_components(steps: Sequence[StepInput], extent: float) -> Components:
 
 
 def log_odds(rho: Float) -> Float:
-    """Return ln ρ/(1-ρ), within bounds that stand for certainty.
+    """Return ln ρ/(1-ρ), within ± `MAX_LOG_ODDS`.
 
     Examples
     --------

@@ -184,7 +184,7 @@ class SupportSearch:
         return added
 
     def finish(self, state: SolverState, idle: Bool, stop: Bool) -> None:
-        """Where no change gains: end the fill stage, take the final steps, or be done."""
+        """End the fill stage, take the final steps, or finish in rows without a gain."""
         state.done = idle & ((state.finished & ~state.filling) | stop)
         state.finished = state.finished & ~(stop & ~state.finished)
         idle = idle & ~state.done
