@@ -131,7 +131,7 @@ def against_lm(K: int, runs: int) -> str:
             problem, problem.prior.mu, start, VariationalSolver(max_iterations=60)
         )
         between_them = time.process_time()
-        one = problem.take(0)
+        one = problem.select(0)
         lm = maximize(one, one.prior.mu, start[0], MAPSolver(tolerance=1e-4))
         if run < 0:
             continue

@@ -161,16 +161,18 @@ def measured(folder: Path) -> None:
     first = np.arange(july, july + 700)
     others = np.setdiff1d(np.arange(len(single)), eighth)
     known = calibrate(single, floor_db=FLOOR_DB)
-    fresh = calibrate(single.take(others), floor_db=FLOOR_DB)
+    fresh = calibrate(single.select(others), floor_db=FLOOR_DB)
     heading("Section 10, one measured transmitter: median m, p90 m")
     level = float(db_to_neper(1.0))
     line("exponent, shadowing", f"{known.alpha:.2f}, {known.sigma / level:.1f} dB", "2.5, 6.6 dB")
-    _snapshots(single.take(eighth), fresh)
-    before = calibrate(single.take(np.setdiff1d(np.arange(len(single)), first)), floor_db=FLOOR_DB)
+    _snapshots(single.select(eighth), fresh)
+    before = calibrate(
+        single.select(np.setdiff1d(np.arange(len(single)), first)), floor_db=FLOOR_DB
+    )
     for name, calibration in (("", known), (", calibrated on the rest of the data", before)):
         for tau, wanted in ((4.0, "121, 224, 10.1"), (30.0, "124, 228, 2.99"),
                             (120.0, "110..140, 230, 0.7..2")):  # fmt: skip
-            found = track_transmitter(single.take(first), calibration, tau=tau)
+            found = track_transmitter(single.select(first), calibration, tau=tau)
             median, nees = float(np.median(found.error)), float(np.median(found.nees))
             inside = float(np.mean(found.nees < 5.991))
             passed = between(median, 110, 140) and between(nees, 0.7, 2) if tau == 120 else None

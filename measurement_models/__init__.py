@@ -1,4 +1,4 @@
-"""Measurement models: what sensors measure of a state; arrays and their geometry."""
+"""Measurement models: measurements of a state by sensors; arrays and their geometry."""
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.arrays.element_response import ElementResponse

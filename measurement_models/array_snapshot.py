@@ -122,13 +122,13 @@ class ArraySnapshot(SingleSourceSnapshot):
 
     @cached_property
     def shape(self) -> tuple[int, ...]:
-        """Shape of one measurement: bins and snapshots, where there are several; sensors."""
+        """Shape of one measurement: bins and snapshots, if several; sensors."""
         axes = [n for n in (self.n_bins, self.n_snapshots) if n > 1]
         return (*axes, self.array.n_sensors)
 
     @property
     def is_single(self) -> bool:
-        """Whether a step is one snapshot at one frequency, without a second unknown."""
+        """True if a step is one snapshot at one frequency, without a second unknown."""
         return len(self.shape) == 1 and self.slowness is None and self.elevation is None
 
     @property

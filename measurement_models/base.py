@@ -59,7 +59,7 @@ class MeasurementModel(FrozenModel, ABC):
 
     @property_or_field
     def is_linear(self) -> bool:
-        """Whether h(x) = H x, with the same H at every state."""
+        """True if h(x) = H x, with the same H at every state."""
         return False
 
     def for_state(self, names: Sequence[str]) -> MeasurementModel:
@@ -95,7 +95,7 @@ class MeasurementModel(FrozenModel, ABC):
         return self if entries == everything else SelectedEntries(self, entries, tuple(names))
 
     def for_likelihood(self, names: Sequence[str]) -> MeasurementModel:
-        """Return this model for filters that weigh states by `log_likelihood`, where it has one.
+        """Return this model for filters that weight states by `log_likelihood`, if it has one.
 
         The same as `for_state`, except for models whose likelihood needs fewer entries than `h`.
         """

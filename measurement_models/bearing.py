@@ -81,7 +81,7 @@ class Bearing(MeasurementModel):
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """X and y, unless `position` is given."""
+        """The names x and y, unless `position` is set."""
         return ("x", "y") if self.position is None else ()
 
     def for_state(self, names: Sequence[str]) -> Bearing:

@@ -94,7 +94,7 @@ class CombinedMeasurement(MeasurementModel):
 
     @property
     def is_linear(self) -> bool:
-        """Whether all parts are."""
+        """True if all parts are linear."""
         return self.first.is_linear and self.second.is_linear
 
     def for_state(self, names: Sequence[str]) -> MeasurementModel:

@@ -28,7 +28,7 @@ class DirectionMeasurement(Protocol):
 
     @property
     def is_single(self) -> bool:
-        """Whether a step is one snapshot at one frequency, without a second unknown."""
+        """True if a step is one snapshot at one frequency, without a second unknown."""
 
     def observe(
         self, z: ArrayLike | None, reference: Reference = "middle"

@@ -1,4 +1,4 @@
-"""Motion models: how a state moves from one measurement to the next."""
+"""Motion models: change of a state from one measurement to the next."""
 
 from arrivals.motion_models.ar_estimation import select_order, yule_walker
 from arrivals.motion_models.autoregressive import AutoregressiveSources

@@ -95,7 +95,7 @@ class AutoregressiveSources(LinearMotionModel):
 
     @property
     def orders(self) -> tuple[int, ...]:
-        """p_k of each source."""
+        """Orders p_k of the sources."""
         return tuple(len(row) for row in self.coefficients)
 
     @property

@@ -50,7 +50,7 @@ class MotionModel(FrozenModel, ABC):
 
     @property_or_field
     def is_linear(self) -> bool:
-        """Whether f(x) = F x, with the same F at every state."""
+        """True if f(x) = F x, with the same F at every state."""
         return False
 
     @property_or_field

@@ -1,4 +1,4 @@
-"""A direction that walks on the circle, with birth and death of its source."""
+"""Random walk of a direction on the circle, with birth and death of its source."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -76,16 +76,16 @@ class BernoulliVonMises(MotionModel):
 
     @property
     def state_names(self) -> tuple[str, ...]:
-        """Doa."""
+        """The name doa."""
         return ("doa",)
 
     @property
     def angles(self) -> tuple[int, ...]:
-        """Its only entry."""
+        """The only entry of the state."""
         return (0,)
 
     def f(self, x: ArrayLike, dt: float = 1.0) -> Float:
-        """Return the angles wrapped: without noise they stay where they are."""
+        """Return the angles, wrapped and unchanged."""
         return self.walk.f(x, dt)
 
     def F(self, x: ArrayLike, dt: float = 1.0) -> Float:
@@ -101,7 +101,7 @@ class BernoulliVonMises(MotionModel):
         return self.walk.blur(kappa, dt, slope)
 
     def sample(self, x: ArrayLike, rng: np.random.Generator, dt: float = 1.0) -> Float:
-        """Draw angles after a step, as if their sources stayed active."""
+        """Draw angles after a step of sources that remain active."""
         return self.walk.sample(x, rng, dt)
 
     def predict_existence(self, existence: ArrayLike, dt: float = 1.0) -> Float:
@@ -134,7 +134,7 @@ class BernoulliVonMises(MotionModel):
         return np.asarray((1 - p_deactivate) * existence + p_activate * (1 - existence))
 
     def sample_active(self, active: ArrayLike, rng: np.random.Generator, dt: float = 1.0) -> Bool:
-        """Draw which sources are active after `dt`, given which are now.
+        """Draw the activity of sources after `dt` from the present one.
 
         Parameters
         ----------

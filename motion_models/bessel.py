@@ -189,7 +189,7 @@ def concentrations(kappa: ArrayLike) -> Float:
 
 
 def _circular_variance(kappa: Float) -> Float:
-    """Return 1 - A(κ) for κ >= 500: what A' = 1 - A² - A/κ has for an expansion in 1/κ."""
+    """Return 1 - A(κ) for κ >= 500 by the expansion in 1/κ of A' = 1 - A² - A/κ."""
     x = 1 / np.maximum(kappa, _LARGE)
     return np.asarray(x * (1 / 2 + x * (1 / 8 + x * (1 / 8 + x * (25 / 128 + x * 13 / 32)))))
 
@@ -214,7 +214,7 @@ def _concentration(ratio: Float, variance: Float) -> Float:
 
 
 def _halley(kappa: Float, ratio: Float) -> Float:
-    """Return a cubically better root of A(κ) = R: Halley, A' = 1 - A² - A/κ."""
+    """Return a root improved to third order of A(κ) = R: Halley, A' = 1 - A² - A/κ."""
     A = bessel_ratio(kappa)
     slope = 1 - A * A - A / kappa
     newton = (A - ratio) / slope

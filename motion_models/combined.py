@@ -109,7 +109,7 @@ class CombinedMotion(MotionModel):
 
     @property
     def is_linear(self) -> bool:
-        """Whether all parts are."""
+        """True if all parts are linear."""
         return self.first.is_linear and self.second.is_linear
 
     def f(self, x: ArrayLike, dt: float = 1.0) -> Float:

@@ -29,7 +29,7 @@ class DelayWalk(RandomWalk):
 
     @property
     def state_names(self) -> tuple[str, ...]:
-        """Delay."""
+        """The name delay."""
         return ("delay",)
 
 

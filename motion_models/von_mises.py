@@ -15,7 +15,7 @@ from arrivals.validation import count, not_negative, positive, state
 
 
 def wrap(angle: ArrayLike) -> Float:
-    """Bring angles into [-π, π); those already there come back bit for bit.
+    """Wrap angles into [-π, π); those already inside are returned bit for bit.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def mfold_concentration(kappa: ArrayLike, m: ArrayLike) -> Float:
 
 
 def mfold_modes(eta: ArrayLike, m: int) -> Complex:
-    """Return the parameters of the m densities whose even mixture stands for f(mθ; η).
+    """Return the parameters of the m densities whose even mixture approximates f(mθ; η).
 
     η̃_r = κ̃ exp(j(μ + 2πr)/m), r = 0..m-1, with κ̃ from `mfold_concentration`.
 
@@ -246,11 +246,11 @@ class VonMisesWalk(MotionModel):
 
     @property
     def angles(self) -> tuple[int, ...]:
-        """Its only entry."""
+        """The only entry of the state."""
         return (0,)
 
     def f(self, x: ArrayLike, dt: float = 1.0) -> Float:
-        """Return the angles wrapped: without noise they stay where they are."""
+        """Return the angles, wrapped and unchanged."""
         return wrap(state(x, 1))
 
     def F(self, x: ArrayLike, dt: float = 1.0) -> Float:

@@ -71,10 +71,12 @@ class Trial:
         """
         kind = find(name) if isinstance(name, str) else name
         accepted = inspect.signature(kind).parameters
-        arguments = {key: value for key, value in self.known().items() if key in accepted}
+        arguments = {
+            key: value for key, value in self.tracker_arguments().items() if key in accepted
+        }
         return kind(**arguments | params)
 
-    def known(self) -> dict[str, Any]:
+    def tracker_arguments(self) -> dict[str, Any]:
         """Return the models of the trial by the names of a tracker's parameters.
 
         Returns

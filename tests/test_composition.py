@@ -86,7 +86,7 @@ def test_combined_motion_refuses_two_entries_of_one_name() -> None:
 
 @pytest.mark.parametrize("place", [0, 1, 4])
 def test_imm_averages_the_angle_of_a_combined_state_on_the_circle(place: int) -> None:
-    """At +-(pi - 0.05) the mean is +-pi, wherever the angle stands in the state; filterpy has 0."""
+    """At +-(pi - 0.05) the mean is +-pi, at any position in the state; filterpy has 0."""
     walk, others = VonMisesWalk(100.0), (RandomWalk(0.1, 1), ConstantVelocity(0.1))
     parts = {0: (walk, others[0]), 1: (others[0], walk), 4: (others[1], walk, DelayWalk(0.1))}
     motion = CombinedMotion(*parts[place])

@@ -1,4 +1,4 @@
-"""Sizes and boundaries of modules, so that a newcomer can read the house."""
+"""Sizes and boundaries of modules."""
 
 import ast
 import re

@@ -1,4 +1,4 @@
-"""What is installed is what stands in the folders, and imports run one way."""
+"""Packages, links and wheel agree with the folders, and imports run one way."""
 
 import ast
 import shutil
@@ -117,7 +117,7 @@ def test_import_is_light(module: str) -> None:
 
 
 def imports(source: str) -> Iterator[tuple[str, bool]]:
-    """Give what a source imports, by full name, and whether inside a function."""
+    """Return the full names that a source imports, and True for those inside a function."""
 
     def walk(node: ast.AST, inside: bool) -> Iterator[tuple[str, bool]]:
         if isinstance(node, ast.Import):

@@ -1,4 +1,4 @@
-"""The README's Python runs as printed, and its two commands stand where CI looks for them."""
+"""Python and commands of the README: they run as printed, and CI finds them."""
 
 import doctest
 from pathlib import Path

@@ -63,7 +63,7 @@ class PlaneWaves(FrozenModel):
 
     @property
     def is_line(self) -> bool:
-        """Whether directions are counted from broadside: two angles have one response."""
+        """True if directions are counted from broadside: two angles have one response."""
         return self.array.dim == 1
 
     @property

@@ -1,1 +1,1 @@
-"""Delays."""
+"""Delays between the sensors of a line, from real samples."""

@@ -16,7 +16,7 @@ from arrivals.validation import instance, number, positive
 
 @dataclass(frozen=True)
 class ArraySamples(FrozenModel):
-    """What a line array samples of one source: y_j(k) = s(k - jΔ) + v_j(k).
+    """Samples of one source by a line array: y_j(k) = s(k - jΔ) + v_j(k).
 
     This is the door between angles and delays. The method's papers count the sensors j in the
     order in which a wave from a positive angle passes them. Here a sensor at a larger coordinate

@@ -24,7 +24,7 @@ class SourceAtCentre(MeasurementModel):
     """Base of two models with the source's waveform at the array's centre in the state.
 
     The delay Δ is element 0 of the state, the source's elements are the last `dim_source`;
-    between them may stand what else the motion of the delay carries. A sensor lags the centre by
+    other elements of the motion of the delay lie between them. A sensor lags the centre by
     τ_j = (j - (N-1)/2) Δ. The data are scaled to a source of power 1.
     """
 
@@ -43,7 +43,7 @@ class SourceAtCentre(MeasurementModel):
     @property
     @abstractmethod
     def transition(self) -> Float:
-        """How these elements move in one snapshot, (dim_source, dim_source)."""
+        """Transition matrix of these elements over one snapshot, (dim_source, dim_source)."""
 
     @property
     @abstractmethod

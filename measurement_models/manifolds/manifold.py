@@ -44,7 +44,7 @@ class Manifold(Protocol):
 
     @property
     def coefficients(self) -> Complex | None:
-        """The matrices G; None stands for the identity, and no product is formed."""
+        """The matrices G; None for the identity, without a product."""
 
     @property
     def front_back_ambiguous(self) -> bool:

@@ -172,7 +172,7 @@ class PropagationModel(NamedTuple):
         """Return the offsets of positions (..., n_sources, 2) from the sensors."""
         return offsets(theta, self.sensors, self.r_min)
 
-    def take(self, rows: Any) -> PropagationModel:
+    def select(self, rows: Any) -> PropagationModel:
         """Return the model at some rows of a batch."""
         noise = np.asarray(self.log_noise)
         return self._replace(

@@ -46,12 +46,12 @@ class Method:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "kind", find(self.tracker))
-        known = inspect.signature(self.kind).parameters
+        parameters = inspect.signature(self.kind).parameters
         for name in self.params:
-            if name.partition("__")[0] not in known:
+            if name.partition("__")[0] not in parameters:
                 raise ValueError(
                     f"the tracker {self.tracker!r} has no parameter {name!r}; it has: "
-                    f"{', '.join(known)}"
+                    f"{', '.join(parameters)}"
                 )
         settings = ", ".join(f"{name}={value}" for name, value in self.params.items())
         default = f"{self.tracker}({settings})" if settings else self.tracker
@@ -72,10 +72,10 @@ class Method:
         Tracker
             A new tracker.
         """
-        known = inspect.signature(self.kind).parameters
-        settings = {name: value for name, value in self.params.items() if name in known}
-        nested = {name: value for name, value in self.params.items() if name not in known}
-        if "rng" in known and "rng" not in settings:
+        parameters = inspect.signature(self.kind).parameters
+        settings = {name: value for name, value in self.params.items() if name in parameters}
+        nested = {name: value for name, value in self.params.items() if name not in parameters}
+        if "rng" in parameters and "rng" not in settings:
             own = np.random.SeedSequence(
                 seed_sequence.entropy,
                 spawn_key=(*seed_sequence.spawn_key, zlib.crc32(self.label.encode())),

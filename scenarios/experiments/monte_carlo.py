@@ -25,7 +25,7 @@ Metrics = Sequence[str] | Mapping[str, Metric]
 
 @dataclass(frozen=True)
 class StudySettings:
-    """How a study is computed and kept; see `monte_carlo`.
+    """Settings of the computation and storage of a study; see `monte_carlo`.
 
     `batch` is the number of runs in one task of a process, and in one call of a method with its
     own `run_batch`.

@@ -90,8 +90,8 @@ class Results:
                 f"{self.path} must be the file of this study; got another {', '.join(differ)}: "
                 "name another file, or a folder, in which each study has its own file"
             )
-        known = other.get("scenarios", {})
-        strange = next((row.case for row in self.rows() if row.case not in known), None)
+        scenarios = other.get("scenarios", {})
+        strange = next((row.case for row in self.rows() if row.case not in scenarios), None)
         if strange is not None:
             raise ValueError(
                 f"cases of {self.path} must be those of its first line; got {strange!r}"

@@ -147,15 +147,15 @@ class Study:
             failed = [r for r in self.failures() if r.method == method and r.case == case]
             if failed:
                 raise ValueError(f"all runs of {method!r} failed; the first: {failed[0].note}")
-            known = ", ".join([*self.config["metrics"], "cpu_ms"])
-            raise ValueError(f"no run of {method!r} has the metric {metric!r}; known: {known}")
+            names = ", ".join([*self.config["metrics"], "cpu_ms"])
+            raise ValueError(f"no run of {method!r} has the metric {metric!r}; known: {names}")
         return {row.run: row.value for row in sorted(rows) if row.value == row.value}
 
-    def _one(self, noun: str, name: str | None, known: list[str]) -> str:
-        if name is None and len(known) == 1:
-            return known[0]
-        if name not in known:
-            raise ValueError(f"{noun} must be one of {', '.join(map(repr, known))}; got {name!r}")
+    def _one(self, noun: str, name: str | None, names: list[str]) -> str:
+        if name is None and len(names) == 1:
+            return names[0]
+        if name not in names:
+            raise ValueError(f"{noun} must be one of {', '.join(map(repr, names))}; got {name!r}")
         return name
 
     def array(self, metric: str, method: str, case: str | None = None) -> Float:

@@ -101,7 +101,7 @@ def gospa(
 def ospa(
     truth: ArrayLike, estimate: ArrayLike, c: float, p: float = 1.0, period: float | None = None
 ) -> float:
-    """Compute the OSPA metric: the error per point, where an unpaired point counts as `c`.
+    """Compute the OSPA metric: the error per point; an unpaired point counts as `c`.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ def ospa(
 
 
 def rmse(truth: ArrayLike, estimate: ArrayLike, c: float, period: float | None = None) -> float:
-    """Compute the RMSE per true point: a missed point counts as `c`, false points cost nothing.
+    """Compute the RMSE per true point: a missed point counts as `c`, false points as zero.
 
     Parameters
     ----------
@@ -282,10 +282,8 @@ def _distances(truth: ArrayLike, estimate: ArrayLike, period: float | None) -> F
     t, f = _points("truth", truth), _points("estimate", estimate)
     if t.shape[1] != f.shape[1]:
         if t.size and f.size:
-            raise ValueError(
-                "truth and estimate must have the same dimension; "
-                f"got {t.shape[1]} and {f.shape[1]}"
-            )
+            sizes = f"{t.shape[1]} and {f.shape[1]}"
+            raise ValueError(f"truth and estimate must have the same dimension; got {sizes}")
         return np.zeros((len(t), len(f)))
     difference = np.abs(t[:, None] - f)
     if period is not None:

@@ -54,11 +54,11 @@ class RSSTrial(Trial):
     mu0: float
     v0: float
 
-    def known(self) -> dict[str, Any]:
+    def tracker_arguments(self) -> dict[str, Any]:
         """Return models and priors by the names of a tracker's parameters."""
         amplitude = AmplitudePrior(mean=self.mu0, variance=self.v0)
         prior = {"x0": self.x0, "P0": self.P0, "amplitude": amplitude}
-        return super().known() | prior
+        return super().tracker_arguments() | prior
 
 
 @dataclass(frozen=True)

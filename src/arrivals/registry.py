@@ -71,11 +71,11 @@ class Registry(Generic[Base]):
             if not is_subclass:
                 noun, base = with_article(self.noun), self.base.__name__
                 raise TypeError(f"{kind!r} is not {noun}: derive it from {base}")
-            known = self._classes.get(name)
-            if known not in (None, kind):
+            existing = self._classes.get(name)
+            if existing not in (None, kind):
                 raise ValueError(
                     f"the {self.noun} name {name!r} is taken by "
-                    f"{known.__module__}.{known.__qualname__}"
+                    f"{existing.__module__}.{existing.__qualname__}"
                 )
             self._classes[name] = kind
             return kind
@@ -190,4 +190,4 @@ class Registry(Generic[Base]):
 
     def name_of(self, kind: type) -> str | None:
         """Return the registered name of a class, or None."""
-        return next((name for name, known in self._classes.items() if known is kind), None)
+        return next((name for name, existing in self._classes.items() if existing is kind), None)

@@ -95,11 +95,11 @@ def test_track_by_subspace_methods_with_given_number_of_sources(
 def test_track_of_zeros_detects_no_source_without_warnings(
     scene: Path, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    wavfile.write(here / "silence.wav", RATE, np.zeros((2000, 8), "<i2"))
+    wavfile.write(here / "zeros.wav", RATE, np.zeros((2000, 8), "<i2"))
     for tracker in ("cbf", "mvdr", "svalse", "valse", *SUBSPACE):
         arguments = ("--tracker", tracker, "--out", "t.csv", "--plot", "t.png")
         array = str(scene / "array.toml")
-        assert main(track(here, *arguments, file="silence.wav", array=array)) == 0
+        assert main(track(here, *arguments, file="zeros.wav", array=array)) == 0
         assert capsys.readouterr() == ("", "")
         assert (here / "t.csv").read_text() == HEADING + "\n"
 

@@ -1,4 +1,4 @@
-"""What the command line answers to bad input."""
+"""Command line: messages and exit status for invalid input."""
 
 import io
 import os

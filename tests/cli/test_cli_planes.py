@@ -155,7 +155,7 @@ def test_ambiguous_directions_print_one_warning(
 def test_infrasound_demo_detects_both_sources_and_none_before(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """What several estimators agree on: 320, 250 and 321 degrees from north, or wind alone."""
+    """Several estimators agree: 320, 250 and 321 degrees from north, or wind alone."""
     assert main(["demo", "brp2012", "--out", str(tmp_path), "--quiet"]) == 0
     names = ["brp2012-cbf.csv", "brp2012-svalse.csv", "brp2012-valse.csv", "brp2012.png"]
     assert sorted(os.listdir(tmp_path)) == names
@@ -163,9 +163,9 @@ def test_infrasound_demo_detects_both_sources_and_none_before(
     rows = table((tmp_path / "brp2012-svalse.csv").read_text())
     time = np.array([float(row["time_s"]) for row in rows])
     doa = np.array([float(row["doa_deg"]) % 360 for row in rows])
-    for start, end, wanted in ((420, 435, 320), (610, 800, 250), (815, 895, 321)):
+    for start, end, expected in ((420, 435, 320), (610, 800, 250), (815, 895, 321)):
         within = (time >= start) & (time <= end)
         assert np.unique(time[within]).size >= (end - start) // 5  # steps of 4.96 s
-        assert np.abs(doa[within] - wanted).max() < 6.0
+        assert np.abs(doa[within] - expected).max() < 6.0
     quiet = (time < 410) | (time > 950)
     assert np.unique(time[quiet]).size < 45  # of 130 steps

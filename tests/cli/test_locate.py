@@ -144,8 +144,8 @@ def test_map_shows_tracks_and_truth_and_rejects_directions() -> None:
 def test_shipped_walk_is_tracked() -> None:
     network = read_network(POWDER)
     assert network.rss_db.shape[0] == 300
-    known = calibrate(network.take(slice(150, 300)), floor_db=FLOOR_DB)
+    known = calibrate(network.select(slice(150, 300)), floor_db=FLOOR_DB)
     assert 2.0 < known.alpha < 3.2
-    found = track_transmitter(network.take(slice(0, 150)), known)
+    found = track_transmitter(network.select(slice(0, 150)), known)
     assert np.median(found.error) < 250  # ten minutes calibrate the receivers poorly
     assert np.median(found.nees) < 5.991

@@ -49,7 +49,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory, voices: Float) -> Path:
     noise = 0.005 * np.random.default_rng(1).standard_normal((8000, 5))
     samples = np.stack(received, axis=-1) + noise
     wavfile.write(folder / "talk.wav", RATE, samples.astype(np.float32))
-    wavfile.write(folder / "silence.wav", RATE, np.zeros((800, 5), np.float32))
+    wavfile.write(folder / "zeros.wav", RATE, np.zeros((800, 5), np.float32))
     model = ArraySnapshot(SensorArray.symmetric([0.06, 0.12]), 0.343, noise=1e-3)
     z = model.simulate(np.tile(DOA, (600, 1)), voices[:600], np.random.default_rng(2))
     np.savez(folder / "complex.npz", snapshots=z, rate=RATE)
@@ -74,9 +74,9 @@ def test_signals_of_a_recording_are_written_as_wav(
     assert main(track(scene, *how, "--signals", "out.wav", "--out", "t.csv")) == 0
     rate, signals = wavfile.read("out.wav")
     assert (rate, signals.shape, signals.dtype) == (RATE, (8000, 2), np.float32)
-    alike = np.corrcoef(signals[1500:].T, voices[1500:].T)[:2, 2:]
-    assert np.diag(alike).min() > 0.95  # 0.7 at a microphone
-    assert abs(alike[[0, 1], [1, 0]]).max() < 0.2
+    correlation = np.corrcoef(signals[1500:].T, voices[1500:].T)[:2, 2:]
+    assert np.diag(correlation).min() > 0.95  # 0.7 at a microphone
+    assert abs(correlation[[0, 1], [1, 0]]).max() < 0.2
     rows = table(tmp_path / "t.csv")
     assert len(rows) == 2 * (8000 // 30 - 1)  # after acquisition
     assert float(rows[-1]["time_s"]) == pytest.approx((8000 // 30 * 30 - 1) / RATE)
@@ -105,8 +105,8 @@ def test_windows_and_complex_snapshots_have_complex_signals(
     assert (np.load("w.npy").dtype, np.load("w.npy").shape) == (np.complex128, (497, 2))
     snapshots = ("--frequency", "1000", "--out", "z.csv", "--signals", "z.npy")
     assert main(track(scene, *snapshots, file="complex.npz")) == 0
-    alike = np.corrcoef(np.load("z.npy")[200:].T, voices[200:600].T)[:2, 2:]
-    assert abs(alike).max(axis=1).min() > 0.95
+    correlation = np.corrcoef(np.load("z.npy")[200:].T, voices[200:600].T)[:2, 2:]
+    assert abs(correlation).max(axis=1).min() > 0.95
     message = ("--set", "motion__real_valued=True", "--signals", "z.wav", "--out", "r.csv")
     assert main(track(scene, "--frequency", "1000", *message, file="complex.npz")) == 0
     assert wavfile.read("z.wav")[1].shape == (600, 2)
@@ -161,7 +161,7 @@ def test_signals_invalid_argument_prints_one_line_and_writes_nothing(
 def test_signals_of_zeros_streams_and_other_arrays_are_refused(
     scene: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(track(scene, "--frequency", "1000", file="silence.wav")) == 2
+    assert main(track(scene, "--frequency", "1000", file="zeros.wav")) == 2
     assert "the recording is zero" in capsys.readouterr().err
     stream = ["track", "-", *track(scene, "--frequency", "1000")[2:], "--signals", "o.wav"]
     assert main(stream) == 2

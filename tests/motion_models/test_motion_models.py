@@ -1,3 +1,5 @@
+"""Motion models: shapes, Jacobians, noise, copies, equality and invalid arguments."""
+
 import copy
 import pickle
 

@@ -1,3 +1,5 @@
+"""Von Mises kernels against scipy and exact fractions, and the von Mises walk."""
+
 import subprocess
 import sys
 from decimal import Decimal, localcontext
@@ -33,7 +35,7 @@ KAPPAS = [1e-9, 0.01, 0.7, 1.3, 8.0, 90.0, 249.0, 251.0, 499.9, 500.1, 3e3, 1e6,
 
 
 def exact_ratios(kappa: float, n: int) -> list[Decimal]:
-    """I_m/I_{m-1}, m = 1..n, to 40 digits: the fraction started so far up that no error is left."""
+    """Return I_m/I_{m-1}, m = 1..n, to 40 digits by the continued fraction."""
     with localcontext(prec=45):
         k, order = Decimal(kappa), n + int(11 * kappa**0.5) + 60
         ratio, found = Decimal(1), []
@@ -220,9 +222,9 @@ def test_mixture_of_modes_approximates_the_mfold_density() -> None:
     theta = np.linspace(-np.pi, np.pi, 2000, endpoint=False)
     eta = 60.0 * np.exp(0.8j)
     modes = mfold_modes(eta, 3)
-    wanted = np.exp(log_density(3 * theta, 0.8, 60.0))
+    expected = np.exp(log_density(3 * theta, 0.8, 60.0))
     mixture = np.exp(log_density(theta[:, None], np.angle(modes), np.abs(modes))).mean(axis=1)
-    assert abs(mixture - wanted).max() < 0.01 * wanted.max()
+    assert abs(mixture - expected).max() < 0.01 * expected.max()
     assert (mfold_modes(0.0, 3) == 0).all()
 
 

@@ -1,3 +1,5 @@
+"""Plots: lines, colours, beam power, axes and files."""
+
 import subprocess
 import sys
 from pathlib import Path
@@ -18,7 +20,7 @@ LINE = ArraySnapshot(SensorArray.ula(8, spacing=0.5), wavelength=1.0, noise=0.01
 CIRCLE = ArraySnapshot(SensorArray.uca(8, radius=0.4), wavelength=1.0, noise=0.01)
 
 
-def found(steps: list[list[tuple[float, int, float]]]) -> Run:
+def run_of(steps: list[list[tuple[float, int, float]]]) -> Run:
     """Make a run from (degrees, label, existence) of each step."""
     recorder = RunRecorder(DirectionEstimate)
     for step in steps:
@@ -49,7 +51,7 @@ def dots(ax: Any) -> Any:
 
 
 def test_each_label_is_one_line_of_its_own_colour() -> None:
-    ax = plot_bearing_time(found([[(10, 0, 1), (-40, 1, 1)], [(11, 0, 1), (-41, 1, 1)]]))
+    ax = plot_bearing_time(run_of([[(10, 0, 1), (-40, 1, 1)], [(11, 0, 1), (-41, 1, 1)]]))
     _, tracks = lines(ax)
     np.testing.assert_allclose(tracks.get_segments()[0], [[0, 10], [1, 11]])
     first, second = tracks.get_colors()
@@ -59,24 +61,24 @@ def test_each_label_is_one_line_of_its_own_colour() -> None:
 
 def test_track_of_a_line_is_not_joined_across_endfire() -> None:
     steps: list[list[tuple[float, int, float]]] = [[(d, 0, 1)] for d in (85, 88, -87, -85)]
-    _, tracks = lines(plot_bearing_time(found(steps)))
+    _, tracks = lines(plot_bearing_time(run_of(steps)))
     ends = [segment[:, 1] for segment in tracks.get_segments()]
     np.testing.assert_allclose(ends, [[85, 88], [-87, -85]])
 
 
 def test_existence_sets_the_opacity() -> None:
-    ax = plot_bearing_time(found([[(10, 0, 0.25), (20, -1, np.nan)]]))
+    ax = plot_bearing_time(run_of([[(10, 0, 0.25), (20, -1, np.nan)]]))
     assert dots(ax).get_facecolors()[:, 3].tolist() == [1.0, 0.25]
 
 
 def test_directions_without_label_and_across_gaps_are_not_joined() -> None:
-    ax = plot_bearing_time(found([[(10, -1, 1)], [(10, -1, 1), (3, 0, 1)], [], [(3, 0, 1)]]))
+    ax = plot_bearing_time(run_of([[(10, -1, 1)], [(10, -1, 1), (3, 0, 1)], [], [(3, 0, 1)]]))
     assert len(lines(ax)[1].get_segments()) == 0
     assert len(dots(ax).get_offsets()) == 4
 
 
 def test_track_through_180_degrees_is_split() -> None:
-    run = found([[(178, 0, 1)], [(-178, 0, 1)], [(-175, 0, 1)]])
+    run = run_of([[(178, 0, 1)], [(-178, 0, 1)], [(-175, 0, 1)]])
     ax = plot_bearing_time(run)
     assert len(lines(ax)[1].get_segments()) == 1
     assert ax.get_ylim() == (-180, 180)
@@ -99,20 +101,20 @@ def test_beam_power_is_highest_at_the_source(model: ArraySnapshot, limit: int) -
 
 def test_long_recording_has_a_bounded_number_of_columns() -> None:
     z = scene(LINE, 4000)
-    ax = plot_bearing_time(found([[]] * 4000), snapshots=z, measurement=LINE)
+    ax = plot_bearing_time(run_of([[]] * 4000), snapshots=z, measurement=LINE)
     (image,) = [c for c in ax.collections if isinstance(c, QuadMesh)]
     assert np.asarray(image.get_array()).shape[1] <= 1500
 
 
 def test_axis_shows_time_if_given() -> None:
-    ax = plot_bearing_time(found([[(1, 0, 1)]] * 3), time=[10.0, 12.0, 14.0])
+    ax = plot_bearing_time(run_of([[(1, 0, 1)]] * 3), time=[10.0, 12.0, 14.0])
     assert ax.get_xlabel() == "time, s"
     assert ax.get_xlim() == (9, 15)
 
 
 def test_plots_draw_into_the_given_axes() -> None:
     ax = Figure().add_subplot()
-    assert plot_bearing_time(found([[(1, 0, 1)]]), ax=ax) is ax
+    assert plot_bearing_time(run_of([[(1, 0, 1)]]), ax=ax) is ax
     assert plot_array(SensorArray.ula(3, 0.5), ax=ax) is ax
 
 
@@ -135,7 +137,7 @@ def test_array_of_any_dimension_is_drawn(array: SensorArray, tmp_path: Path) -> 
 
 
 def test_invalid_arguments_are_refused() -> None:
-    run = found([[(1, 0, 1)]] * 3)
+    run = run_of([[(1, 0, 1)]] * 3)
     with pytest.raises(ValueError, match="measurement must be set with snapshots; got None"):
         plot_bearing_time(run, snapshots=np.ones((3, 8)))
     with pytest.raises(ValueError, match=r"snapshots must have shape \(3, 8\); got \(2, 8\)"):

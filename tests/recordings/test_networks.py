@@ -172,14 +172,14 @@ def test_measured_transmitter_snapshots_and_track() -> None:
     known = calibrate(single, floor_db=FLOOR_DB)
     assert known.alpha == pytest.approx(2.5, abs=0.1)
     assert float(neper_to_db(known.sigma)) == pytest.approx(6.6, abs=0.3)
-    eighth = single.take(np.arange(0, len(single), 8))
+    eighth = single.select(np.arange(0, len(single), 8))
     starts = {"strongest": lambda readings: strongest(readings) + 20.0, "centre": centre}
     for start in starts.values():
         far = [distance(snapshot(one, known, start(one)[None])[0], eighth, one.step)
                for one in steps_of(eighth, known)]  # fmt: skip
         assert 145 <= np.median(far) <= 190
     july = int(np.argmax(np.diff(single.time))) + 1
-    found = track_transmitter(single.take(np.arange(july, july + 700)), known)
+    found = track_transmitter(single.select(np.arange(july, july + 700)), known)
     assert 110 <= np.median(found.error) <= 140
     assert 0.7 <= np.median(found.nees) <= 2
 

@@ -45,10 +45,10 @@ class History:
         lead = (len(self.z),)
         last = completes_interval(self.z[:, end - 1]) if end else np.zeros(lead, dtype=np.bool_)
         self.detected.append(belief is not None)
-        self.beliefs.append(self._unknown(lead) if belief is None else self._known(belief))
+        self.beliefs.append(self._unknown(lead) if belief is None else self._row_of(belief))
         self.first_steps.append(end - self.n_pending - last)
 
-    def _known(self, belief: SourceBelief) -> dict[str, NDArray[Any]]:
+    def _row_of(self, belief: SourceBelief) -> dict[str, NDArray[Any]]:
         x, active = to_state_vector(belief.x, self.motion), belief.active.astype(float)
         return {name: getattr(belief, name) for name in FIELDS} | {"x": x, "active": active}
 

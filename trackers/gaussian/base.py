@@ -191,7 +191,7 @@ class GaussianFilter(Tracker):
     def check_measurement(
         self, z: ArrayLike | None, R: ArrayLike | None, H: Float | None
     ) -> tuple[Float, Bool | None, Float] | None:
-        """Return a measurement (m,), where it is missing, and its noise; None if all is missing."""
+        """Return a measurement (m,), its missing mask and its noise; None if all is missing."""
         m = self.dim_z if H is None else len(H)
         values, missing = np.array(z), None
         usual = values.shape == (m,) and values.dtype == np.float64

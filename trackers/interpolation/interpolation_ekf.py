@@ -52,7 +52,7 @@ class InterpolationEKF(GaussianFilter):
         coefficients. "C": taps that cover ±κ, forwards and backwards along the array. "D":
         baselines 1, 2, 4 and 7. "E": all sensors at once, with the source waveform in the state;
         "phasor": the same in closed form, for one tone. "E2": "E" after acquisition by "C". A
-        name stands for its `Variant`, whose settings are reached by `variant__offsets` and so on.
+        name selects its `Variant`, whose settings are reached by `variant__offsets` and so on.
     doa : float
         Initial direction, rad.
     std : float, optional

@@ -236,10 +236,11 @@ class RSSTracker(Tracker):
             candidate = select_sources(predicted, new, self.n_sources, self.search.max_sources)
             tracks, n_known = TrackTable.certain(len(candidate.u)), 0
         detected = new_beliefs(candidate, self.P0, self.motion.dim_x, self.position)
-        sources = sources.joined(detected.take(slice(n_known, None)))
+        sources = sources.joined(detected.select(slice(n_known, None)))
         solution, active = candidate.solution, tracks.active
-        problem = candidate.problem.take(None)._replace(W=readings.precision)
-        self.store(sources.take(active), solution, problem.diagnose(solution), tracks.take(active))
+        problem = candidate.problem.select(None)._replace(W=readings.precision)
+        sources, tracks = sources.select(active), tracks.select(active)
+        self.store(sources, solution, problem.diagnose(solution), tracks)
 
     @property
     def estimate(self) -> PositionEstimate:

@@ -81,7 +81,7 @@ def run_chunk(
         elapsed = elapsed + dt
         rows = np.flatnonzero(~np.isnan(xi[:, t]).all(axis=1))
         if len(rows):
-            updated, diagnostics = update(sources.take(rows), xi[rows, t], elapsed[rows])
+            updated, diagnostics = update(sources.select(rows), xi[rows, t], elapsed[rows])
             for part, new in zip(sources, updated, strict=True):
                 part[rows] = new
             elapsed[rows] = 0.0
@@ -120,7 +120,7 @@ class BatchHistory:
         return [self._run(b, times, elapsed) for b in range(len(self.sources.u))]
 
     def _run(self, b: int, times: Float, elapsed: float) -> Run:
-        xy, tracks, sources = self.start.position, self.start.tracks, self.sources.take(b)
+        xy, tracks, sources = self.start.position, self.start.tracks, self.sources.select(b)
         n_steps, K, n = sources.x.shape
         fields = {
             "position": sources.x[..., xy],

@@ -73,7 +73,7 @@ class SourceBeliefs(NamedTuple):
         size = n_slots * (n + 1)
         return x.ravel(), P.reshape(size, size)
 
-    def take(self, rows: Any) -> SourceBeliefs:
+    def select(self, rows: Any) -> SourceBeliefs:
         """Return the beliefs at some rows of the first axis."""
         return SourceBeliefs(*(part[rows] for part in self))
 

@@ -95,7 +95,7 @@ def update_supported(
     """Return predicted sources after the update of those supported by the readings."""
     candidate, K = result.candidate, len(result.supported)
     moments = Marginals(*(part[0, :K] for part in candidate.solution.marginals))
-    updated = sources.take(result.supported).updated(
+    updated = sources.select(result.supported).updated(
         candidate.u[:K], candidate.theta[:K], moments, position, motion
     )
     return sources.replaced(result.supported, updated)

@@ -113,7 +113,7 @@ class RSSML(RSSTracker):
         if readings is None:
             self.record_missed()
             return
-        sources = self.source_beliefs().take(None)
+        sources = self.source_beliefs().select(None)
         if self.births or sources.u.size == 0:
             self.detect_sources(readings)
             return
@@ -122,7 +122,7 @@ class RSSML(RSSTracker):
         # argmax L(u, θ)   (section 4)
         solution = self.solve(problem, problem.prior.mu, problem.prior.theta)
         updated, diagnostics = self.update_sources(sources, readings, problem, solution)
-        self.store(updated.take(0), solution, diagnostics)
+        self.store(updated.select(0), solution, diagnostics)
 
     def solve(self, problem: JointPosterior, u: Float, theta: Float) -> Solution:
         """Maximize a batch of problems one by one; return the maxima and their marginals.
@@ -139,7 +139,7 @@ class RSSML(RSSTracker):
         Solution
         """
         initial = problem.log_posterior(u, theta)
-        maxima = [maximize(problem.take(b), u[b], theta[b], self.solver) for b in range(len(u))]
+        maxima = [maximize(problem.select(b), u[b], theta[b], self.solver) for b in range(len(u))]
         u, theta = np.array([one.u for one in maxima]), np.array([one.theta for one in maxima])
         J, log_likelihood = problem.laplace(u, theta)
         if not self.solver.prior:  # a small part of the prior keeps J regular

@@ -127,7 +127,7 @@ class RSSVB(RSSTracker):
         if readings is None:
             self.record_missed()
             return
-        sources = self.source_beliefs().take(None)
+        sources = self.source_beliefs().select(None)
         if self.births or sources.u.size == 0:
             self.detect_sources(readings)
             return
@@ -136,7 +136,7 @@ class RSSVB(RSSTracker):
         # q(u_j) = N(μ_j, v_j), q(θ_j) = N(θ_j, Σ_j)   (8)-(14)
         solution = self.solve(problem, problem.prior.mu, problem.prior.theta)
         updated, diagnostics = self.update_sources(sources, readings, problem, solution)
-        self.store(updated.take(0), solution, diagnostics)
+        self.store(updated.select(0), solution, diagnostics)
 
     def solve(self, problem: JointPosterior, u: Float, theta: Float) -> Solution:
         """Fit the factors of a batch of problems from starting points; return their moments.
@@ -230,7 +230,7 @@ def variational_posterior(
             break
         if converged.any():
             active = ~converged
-            rows, problem, point = rows[active], problem.take(active), point.take(active)
+            rows, problem, point = rows[active], problem.select(active), point.select(active)
     return q
 
 

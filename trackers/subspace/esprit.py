@@ -133,7 +133,7 @@ class ESPRIT(CovarianceSubspace[ShiftInvariance]):
 
     Notes
     -----
-    Labels are -1, `std` and `existence` NaN. Directions stand in rising order.
+    Labels are -1, `std` and `existence` NaN. Directions are in ascending order.
 
     References
     ----------

@@ -150,7 +150,7 @@ class MUSIC(CovarianceSubspace[SpectrumSearch]):
 
     Notes
     -----
-    Labels are -1, `std` and `existence` NaN. Directions stand in rising order; `amplitude` is the
+    Labels are -1, `std` and `existence` NaN. Directions are in ascending order; `amplitude` is the
     least-squares fit to the last snapshot. Sensors without valid data for a long time are left
     out; with smoothing, no source is detected then.
 

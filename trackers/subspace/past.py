@@ -119,7 +119,7 @@ class PAST(SubspaceTracker[DirectionFinder]):
 
     Notes
     -----
-    Labels are -1, `std` and `existence` NaN. Directions stand in rising order. A sensor that is
+    Labels are -1, `std` and `existence` NaN. Directions are in ascending order. A sensor that is
     missing is imputed from the subspace: W z, z fitted to the others. P starts at the inverse
     power of the first snapshot, so that the unit of the samples does not matter.
 

@@ -191,7 +191,7 @@ class RootMUSIC(CovarianceSubspace[PolynomialRooting]):
 
     Notes
     -----
-    Labels are -1, `std` and `existence` NaN. Directions stand in rising order.
+    Labels are -1, `std` and `existence` NaN. Directions are in ascending order.
 
     References
     ----------

@@ -77,7 +77,7 @@ def _active_sources(
     beliefs = []
     for j in active:
         if before[j] and tracked is not None:
-            beliefs.append(tracked.take(index[j]))
+            beliefs.append(tracked.select(index[j]))
             continue
         x = np.zeros(4)
         x[::2] = trial.truth[step, j]

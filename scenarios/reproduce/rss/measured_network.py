@@ -88,7 +88,7 @@ def snapshot(
     if method == "lm":
         return maximize(problem, prior.mu, theta).theta
     solver = VariationalSolver(max_iterations=60, tol_theta=1.0)
-    q = variational_posterior(problem.take(None), prior.mu[None], theta[None], solver)
+    q = variational_posterior(problem.select(None), prior.mu[None], theta[None], solver)
     return np.asarray(q.theta[0])
 
 

@@ -41,7 +41,7 @@ CASES: dict[str, FixedSources] = {
 }
 METHODS = ("vb", "vb_literal", "vb_jacobi", "lm", "bfgs", "started")
 # Table 1: amplitude bias and RMS, dB; location bias and RMS, m. The second column is headed K=1
-# in the text that we have; its prose speaks of seven targets.
+# in the text that we have; its prose has seven targets.
 PAPER: dict[tuple[str, str], tuple[float, float, float, float]] = {
     ("K=3 random", "vb_literal"): (0.17, 2.41, 0.43, 8.47),
     ("K=3 random", "lm"): (1.24, 3.1, 2.14, 14.1),
@@ -164,7 +164,7 @@ def _cycle_ms(K: int) -> float:
 
 def _search_ms(K: int) -> float:
     """Return the processor time of one iteration of Levenberg and Marquardt, ms."""
-    problem, solver = _problem(K).problem.take(0), MAPSolver(tolerance=1e-3)
+    problem, solver = _problem(K).problem.select(0), MAPSolver(tolerance=1e-3)
     mu, theta = problem.prior.mu, problem.prior.theta
     n = maximize(problem, mu, theta, solver).iterations
     return _least_ms(lambda: maximize(problem, mu, theta, solver)) / n

@@ -139,7 +139,7 @@ def _variational(name: str, problem: JointPosterior, max_iterations: int | None)
 def _maxima(name: Method, problem: JointPosterior, max_iterations: int | None) -> TrialEstimates:
     each = []
     for b in range(len(problem.xi)):
-        one = problem.take(b)
+        one = problem.select(b)
         each.append(maximize(one, one.prior.mu, one.prior.theta, MAPSolver(method=name)))
     return TrialEstimates(np.array([m.u for m in each]), np.array([m.theta for m in each]), 0.0)
 
@@ -147,7 +147,7 @@ def _maxima(name: Method, problem: JointPosterior, max_iterations: int | None) -
 def _detected(problem: JointPosterior, max_iterations: int | None) -> TrialEstimates:
     each = []
     for b in range(len(problem.xi)):
-        one = problem.take(b)
+        one = problem.select(b)
         mu, w, K = float(one.prior.mu[0]), float(one.prior.w[0]), len(one.prior.mu)
         new = NewSourcePrior.among(one.propagation.sensors, mu, 1 / w)
         candidates = forward_selection(no_source(one.propagation, one.xi, one.W), new, K)

@@ -123,7 +123,7 @@ def _row(study: Study, name: str, method: str) -> tuple[Any, ...]:
             return NAN
 
     rebuilt = REBUILT[name].get(tracker_name(method))
-    known = (rebuilt.gospa, rebuilt.std, rebuilt.rmse) if rebuilt else (NAN,) * 3
+    reference = (rebuilt.gospa, rebuilt.std, rebuilt.rmse) if rebuilt else (NAN,) * 3
     metrics = ("distance", "missed", "false", "rmse", "cardinality", "label_switches",
                "track_length", "nees", "coverage68", "coverage95", "cpu_ms")  # fmt: skip
     return (
@@ -133,7 +133,7 @@ def _row(study: Study, name: str, method: str) -> tuple[Any, ...]:
         *study.interval("gospa", method),
         *map(mean, metrics),
         PAPER[name].get(tracker_name(method), NAN),
-        *known,
+        *reference,
     )
 
 
@@ -214,7 +214,7 @@ def fig7(runs: int, seed: int, out: Path | None = None) -> Report:
     columns = ("p_deactivate", "p_activate", "GOSPA", "std of runs", "missed", "false", "RMSE",
                "converged", "paper's run", "paper's RMSE", "rebuilt", "its std",
                "rebuilt RMSE")  # fmt: skip
-    paper = [known.paper for known in ACTIVATION.values()]
+    paper = [reference.paper for reference in ACTIVATION.values()]
     figures = {"tracks": draw_runs(scenario, seed, trackers[:4], paper)}
     title = f"Fig. 7: probabilities of activation, svalse as printed, {runs} runs at 20 dB, degrees"
     return Report(title, columns, rows, [*_activation_claims(study), FORCED], figures)
@@ -234,10 +234,10 @@ def _activation_claims(study: Study) -> list[str]:
         here, usual = study.mean(metric, label), study.mean(metric, default)
         numbers = f"{metric} {here:.2f}, by default {usual:.2f}"
         lines.append(verdict(f"{claim} ({label})", here > usual + 1, numbers))
-    for label, known in zip(study.methods, ACTIVATION.values(), strict=True):
+    for label, reference in zip(study.methods, ACTIVATION.values(), strict=True):
         gospa = study.mean("gospa", label)
-        numbers = f"GOSPA {gospa:.2f}, rebuilt {known.gospa:.2f} ± {known.std:.2f}"
-        fact = abs(gospa - known.gospa) <= 2 * known.std
+        numbers = f"GOSPA {gospa:.2f}, rebuilt {reference.gospa:.2f} ± {reference.std:.2f}"
+        fact = abs(gospa - reference.gospa) <= 2 * reference.std
         lines.append(
             verdict(f"{label} is within two deviations of the rebuilt form", fact, numbers)
         )
@@ -252,7 +252,8 @@ FORCED = (
 
 
 def _activation_row(study: Study, label: str, death: float, birth: float) -> tuple[Any, ...]:
-    known = ACTIVATION[death, birth]
+    reference = ACTIVATION[death, birth]
     means = [study.mean(metric, label) for metric in ("missed", "false", "rmse", "converged")]
     return (death, birth, study.mean("gospa", label), study.spread("gospa", label), *means,
-            known.paper, known.paper_rmse, known.gospa, known.std, known.rmse)  # fmt: skip
+            reference.paper, reference.paper_rmse, reference.gospa, reference.std,
+            reference.rmse)  # fmt: skip

@@ -72,13 +72,13 @@ def _bounds(name: str, runs: int, seed: int) -> dict[str, LineBound]:
 def _row(study: Study, name: str, snr: float, method: str) -> tuple[Any, ...]:
     case = f"{snr:g}"
     means = [study.mean(m, method, case) for m in ("distance", "missed", "false", "rmse")]
-    known = (
+    reference = (
         SWEEP[name][snr][SWEPT.index(tracker_name(method))]
         if tracker_name(method) in SWEPT
         else (NAN, NAN)
     )
     gospa, spread = study.mean("gospa", method, case), study.spread("gospa", method, case)
-    return (snr, method, gospa, spread, *means, *known)
+    return (snr, method, gospa, spread, *means, *reference)
 
 
 def _claims(study: Study, name: str) -> list[str]:
@@ -114,7 +114,7 @@ def _claims(study: Study, name: str) -> list[str]:
 def _draw_rebuilt(ax: Axes, name: str, part: int) -> None:
     """Draw the rebuilt GOSPA (part 0) or RMSE (1) as crosses, in the methods' colours."""
     for n, method in enumerate(SWEPT):
-        values = [known[n][part] for known in SWEEP[name].values()]
+        values = [reference[n][part] for reference in SWEEP[name].values()]
         label = "rebuilt" if n == 0 else None
         ax.plot(SNR_DB, values, "x", color=METHOD_COLOURS[method], markersize=5, label=label)
 
@@ -144,10 +144,10 @@ def fig10(runs: int, seed: int, out: Path | None = None, quick: bool = False) ->
         _draw_rebuilt(ax, name, 1)
         plot_metric(study, "rmse", x="snr_db", ax=ax,
                     bound={case: one.rmse for case, one in bounds.items()})  # fmt: skip
-        least = min(study.mean("rmse", method, case) for method in study.methods
+        minimum = min(study.mean("rmse", method, case) for method in study.methods
                     for case in study.cases)  # fmt: skip
         ax.set(xlabel="SNR, dB", ylabel="RMSE, degrees", yscale="log", title=SCENES[name])
-        ax.set_ylim(bottom=max(least / 3, 1e-4))  # an interval may extend to zero
+        ax.set_ylim(bottom=max(minimum / 3, 1e-4))  # an interval may extend to zero
         remarks += _rmse_claims(study, SCENES[name])
         for snr in SNR_DB:
             rows += [(name, *_rmse_row(study, name, snr, method), bounds[f"{snr:g}"].rmse)
@@ -169,9 +169,15 @@ def _rmse_claims(study: Study, scene: str) -> Iterator[str]:
 
 def _rmse_row(study: Study, name: str, snr: float, method: str) -> tuple[Any, ...]:
     case = f"{snr:g}"
-    known = (
+    reference = (
         SWEEP[name][snr][SWEPT.index(tracker_name(method))][1]
         if tracker_name(method) in SWEPT
         else NAN
     )
-    return snr, method, study.mean("rmse", method, case), study.spread("rmse", method, case), known
+    return (
+        snr,
+        method,
+        study.mean("rmse", method, case),
+        study.spread("rmse", method, case),
+        reference,
+    )

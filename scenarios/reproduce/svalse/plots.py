@@ -49,7 +49,7 @@ def draw_runs(
     trial = scenario.sample(np.random.default_rng(seed_sequence))
     n_rows = -(-len(shown) // 2)
     figure, axes = panels(n_rows, 2, (12.0, 2.9 * n_rows + 0.5))
-    for ax, method, known in zip(axes, shown, paper, strict=False):
+    for ax, method, value in zip(axes, shown, paper, strict=False):
         run = method.make(trial, seed_sequence).run(trial.measurements)
         plot_bearing_time(
             run, snapshots=trial.measurements, measurement=trial.measurement,  # type: ignore[arg-type]  # complex
@@ -57,7 +57,7 @@ def draw_runs(
         )  # fmt: skip
         steps = np.broadcast_to(np.arange(len(trial.truth))[:, None], trial.truth.shape)
         ax.plot(steps, np.rad2deg(trial.truth), ".", color=TRUTH, markersize=2, zorder=4)
-        published = "" if np.isnan(known) else f" (paper {known:g}°)"
+        published = "" if np.isnan(value) else f" (paper {value:g}°)"
         gospa, rmse = (METRICS[metric](trial, run) for metric in ("gospa", "rmse"))
         title = f"{method.label}: GOSPA {gospa:.1f}°{published}, RMSE {rmse:.1f}°"
         ax.set_title(title, fontsize=10)
@@ -111,10 +111,10 @@ def draw_parts(study: Study, name: str) -> Figure:
     ends = np.array([study.interval("gospa", method) for method in labels]).T
     ax.errorbar(at, base, yerr=np.abs(ends - base), color="black", fmt="none", capsize=3,
                 label="95 % of the mean")  # fmt: skip
-    rebuilt = {method: known.gospa for method, known in REBUILT[name].items()}
-    for known, marker, origin in ((rebuilt, "D", "rebuilt"), (PAPER[name], "*", "paper, one run")):
-        index = [n for n, method in enumerate(labels) if tracker_name(method) in known]
-        ax.plot(np.array(index) + 0.2, [known[tracker_name(labels[n])] for n in index], marker,
+    rebuilt = {method: values.gospa for method, values in REBUILT[name].items()}
+    for values, marker, origin in ((rebuilt, "D", "rebuilt"), (PAPER[name], "*", "paper, one run")):
+        index = [n for n, method in enumerate(labels) if tracker_name(method) in values]
+        ax.plot(np.array(index) + 0.2, [values[tracker_name(labels[n])] for n in index], marker,
                 color="black", markerfacecolor="white", label=origin)  # fmt: skip
     ax.set_xticks(at, [label.replace(" ", "\n", 1) for label in labels])
     ax.set(ylabel="GOSPA, degrees")

@@ -14,8 +14,8 @@ class Rebuilt(NamedTuple):
 
     gospa: float
     std: float
-    least: float
-    most: float
+    minimum: float
+    maximum: float
     rmse: float
 
 

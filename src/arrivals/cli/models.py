@@ -68,20 +68,20 @@ def make_tracker(
 ) -> Tracker:
     """Return a direction tracker with settings by (nested) names."""
     kind = find(name)
-    known = inspect.signature(kind).parameters
-    if "measurement" not in known:
+    parameters = inspect.signature(kind).parameters
+    if "measurement" not in parameters:
         raise ValueError(
             f"the tracker {name!r} has no parameter 'measurement': it cannot track snapshots"
         )
     for setting in settings:
         if setting.partition("__")[0] == "measurement":
             raise ValueError(f"--set {setting}: the measurement comes from --array and --frequency")
-    required = [key for key, value in known.items() if value.default is value.empty]
+    required = [key for key, value in parameters.items() if value.default is value.empty]
     if required != ["measurement"]:
         raise ValueError(
             f"the tracker {name!r} requires {', '.join(required)}, not an array file alone"
         )
-    plain = {key: value for key, value in settings.items() if key in known}
+    plain = {key: value for key, value in settings.items() if key in parameters}
     with printed_warnings():
         tracker = kind(**{"measurement": measurement} | plain)
         return kind(**tracker.set_params(**settings).get_params(deep=False))

@@ -37,7 +37,7 @@ def _track_file(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -> 
         measurement = model_at(array, arguments, frequencies)
         tracker = make_tracker(arguments.tracker, measurement, dict(arguments.set))
     frames = _frames(arguments, recording, frequencies)
-    time = _known_times(frames)
+    time = _finite_times(frames)
     result = tracker.run(bar(frames.values, desc=arguments.tracker))
     result = result if time is None else result.at(time)
     write_table(result, arguments.out)
@@ -54,7 +54,7 @@ def _frames(
     return frames
 
 
-def _known_times(frames: FramedSnapshots) -> Float | None:
+def _finite_times(frames: FramedSnapshots) -> Float | None:
     return frames.time if np.isfinite(frames.time).all() else None
 
 

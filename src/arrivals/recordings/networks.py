@@ -93,7 +93,7 @@ class Network:
     def __len__(self) -> int:
         return len(self.time)
 
-    def take(self, steps: Any) -> Network:
+    def select(self, steps: Any) -> Network:
         """Return the network at some of the steps."""
         truth = None if self.truth is None else self.truth[steps]
         return Network(
@@ -115,8 +115,8 @@ class Network:
         z : ndarray, shape (n_sensors,)
         """
         positions = self.sensors[step]
-        known = np.isfinite(positions).all(axis=-1, keepdims=True)
-        return model.replace(sensors=np.where(known, positions, 0.0)), self.readings[step]
+        is_finite = np.isfinite(positions).all(axis=-1, keepdims=True)
+        return model.replace(sensors=np.where(is_finite, positions, 0.0)), self.readings[step]
 
 
 def read_network(
@@ -197,7 +197,7 @@ def _levels(path: str | PathLike[str], name: list[str]) -> tuple[Float, Float]:
     if "sensor" in rows[0] and level is not None:
         return _long(path, rows, name, time, level)
     columns = [key for key in rows[0] if key != time]
-    _check_sensors_known(path, columns, name)
+    _check_sensor_names(path, columns, name)
     rss_db = np.full((len(rows), len(name)), np.nan)
     for column in columns:
         rss_db[:, name.index(column)] = [_number(path, row[column]) for row in rows]
@@ -215,7 +215,7 @@ def _long(
 ) -> tuple[Float, Float]:
     if time is None:
         raise ValueError(f"{path}: the column 'time_s' is missing")
-    _check_sensors_known(path, [row["sensor"].strip() for row in rows], name)
+    _check_sensor_names(path, [row["sensor"].strip() for row in rows], name)
     times = np.array([_number(path, row[time]) for row in rows])
     steps, at = np.unique(times, return_inverse=True)
     rss_db = np.full((len(steps), len(name)), np.nan)
@@ -227,9 +227,9 @@ def _long(
     return steps, rss_db
 
 
-def _check_sensors_known(path: str | PathLike[str], names: list[str], known: list[str]) -> None:
+def _check_sensor_names(path: str | PathLike[str], names: list[str], table: list[str]) -> None:
     for name in names:
-        if name not in known:
+        if name not in table:
             raise ValueError(f"{path}: the sensor {name!r} is not in the table of sensors")
 
 

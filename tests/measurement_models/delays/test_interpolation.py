@@ -82,8 +82,8 @@ def test_golden_loaded_taps() -> None:
 
 def test_golden_four_taps_a_tone_and_the_full_band() -> None:
     four = DelayInterpolator(BAND, range(-1, 3)).coefficients(0.4)
-    wanted = (-0.1883674137, 0.6701275223, 0.4313994634, -0.1722974839)
-    np.testing.assert_allclose(four, wanted, atol=5e-11)
+    expected = (-0.1883674137, 0.6701275223, 0.4313994634, -0.1722974839)
+    np.testing.assert_allclose(four, expected, atol=5e-11)
     tone = DelayInterpolator(Tones(0.2)).coefficients(0.7)
     np.testing.assert_allclose(tone, (0.3870690610, 0.8101655681), atol=5e-11)
     full = DelayInterpolator(FlatBand(0, 0.5)).coefficients(0.5)
@@ -91,19 +91,19 @@ def test_golden_four_taps_a_tone_and_the_full_band() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "wanted"),
+    ("name", "expected"),
     [
         ("tone", (0.11690, 0.13038, 0.15968, 0.22583, 0.43626)),
         ("qpc", (0.16423, 0.18317, 0.22434, 0.31726, 0.61290)),
         ("band", (0.16046, 0.17897, 0.21919, 0.30998, 0.59884)),
     ],
 )
-def test_golden_bounds(name: str, wanted: tuple[float, ...]) -> None:
+def test_golden_bounds(name: str, expected: tuple[float, ...]) -> None:
     """The specification's figures for the band stem from a quadrature, 4e-5 off the integral."""
     model = SOURCES[name].measurement
     bound = band_bound if name == "band" else tone_bound
     ours = [np.rad2deg(bound(model, np.deg2rad(doa), 100)) for doa in (15, 30, 45, 60, 75)]
-    np.testing.assert_allclose(ours, wanted, rtol=4e-5 if name == "band" else 0, atol=5.1e-6)
+    np.testing.assert_allclose(ours, expected, rtol=4e-5 if name == "band" else 0, atol=5.1e-6)
 
 
 def test_exact_bound_is_above_the_formula_and_converges_to_it() -> None:
@@ -145,14 +145,14 @@ def test_coefficients_at_a_tap_select_that_tap(tap: int) -> None:
 @given(tau=delays, frequency=st.floats(0.05, 0.45))
 def test_two_taps_reproduce_a_tone_at_any_delay(tau: float, frequency: float) -> None:
     omega = 2 * np.pi * frequency
-    wanted = np.sin(omega * np.array([1 - tau, tau])) / np.sin(omega)
-    np.testing.assert_allclose(DelayInterpolator(Tones(frequency)).coefficients(tau), wanted,
+    expected = np.sin(omega * np.array([1 - tau, tau])) / np.sin(omega)
+    np.testing.assert_allclose(DelayInterpolator(Tones(frequency)).coefficients(tau), expected,
                                atol=1e-9)  # fmt: skip
 
 
 @given(tau=delays, ratio=st.floats(0.01, 10))
 def test_taps_with_true_loading_are_orthogonal_to_the_error(tau: float, ratio: float) -> None:
-    """Section 5: with ε_c = ε the noise moves no stationary point."""
+    """Section 5: with ε_c = ε the noise does not shift a stationary point."""
     taps = DelayInterpolator(BAND, (0, 1), loading=ratio)
     c, dc = taps.coefficients(tau), taps.jacobian(tau)
     p = BAND.rho(tau - np.array([0, 1]))

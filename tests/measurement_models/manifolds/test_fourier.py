@@ -215,7 +215,7 @@ def test_elevated_waves_have_shorter_ground_phases_and_height_phases() -> None:
 # what is ambiguous, and what is refused
 
 
-def alike(model: ArraySnapshot, pair: tuple[float, float]) -> float:
+def coherence(model: ArraySnapshot, pair: tuple[float, float]) -> float:
     a = model.waves.steering(np.array(pair))[0]
     b: Complex = a / np.linalg.norm(a, axis=1, keepdims=True)
     return float(np.mean(np.abs((b[..., 0].conj() * b[..., 1]).sum(axis=1)) ** 2))
@@ -242,7 +242,7 @@ def test_ambiguity_returns_a_pair_of_equal_response(
     pair = model.ambiguity()
     assert (pair is not None) is is_ambiguous
     if pair is not None:
-        assert alike(model, pair) > 0.99
+        assert coherence(model, pair) > 0.99
         assert abs(pair[0] - pair[1]) > 0.1
 
 

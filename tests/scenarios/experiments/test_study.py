@@ -82,7 +82,7 @@ def test_plot_metric_shows_means_and_bounds() -> None:
     curves = [np.asarray(line.get_ydata()).tolist() for line in ax.get_lines()]
     assert means in curves
     assert plot_metric(study, "gospa").get_xticklabels()[1].get_text() == "20"
-    with pytest.raises(ValueError, match="no 'n_sourcs'"):
+    with pytest.raises(ValueError, match="must be a parameter of every scenario; got 'n_sourcs'"):
         plot_metric(study, "gospa", x="n_sourcs")
     with pytest.raises(ValueError, match="nees is not defined"):
         plot_metric(study, "nees", methods=["cbf"])

@@ -42,8 +42,8 @@ def test_rays_at_constant_speed_match_image_sources(
         assert doa == pytest.approx(np.arctan2(height, distance), abs=1e-5)
         assert time == pytest.approx(r / 1500, rel=1e-6)
         sign = (-1.0) ** path.count("S")
-        wanted = sign * np.exp(-2j * np.pi * 100 * r / 1500) / (4 * np.pi * r)
-        assert abs(p - wanted) < 1e-2 * abs(wanted)
+        expected = sign * np.exp(-2j * np.pi * 100 * r / 1500) / (4 * np.pi * r)
+        assert abs(p - expected) < 1e-2 * abs(expected)
 
 
 @pytest.mark.parametrize("slope", [0.05, -0.05])

@@ -74,9 +74,9 @@ def test_mvdr_handles_missing_sensors_and_zero_power() -> None:
     z[5:, 3] = np.nan
     run = MVDR(MODEL, max_sources=1).run(z)
     assert run.doa[-1, 0] == pytest.approx(0.4, abs=0.02)
-    silent = MVDR(MODEL)
-    silent.update(np.zeros(10))
-    assert silent.estimate.n_found == 0
+    zero = MVDR(MODEL)
+    zero.update(np.zeros(10))
+    assert zero.estimate.n_found == 0
 
 
 def test_scan_invalid_argument_is_rejected() -> None:

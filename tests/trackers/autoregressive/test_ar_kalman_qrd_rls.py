@@ -27,9 +27,11 @@ from arrivals.trackers.autoregressive.initialization import direction_hypotheses
 def test_source_without_power_leaves_other_estimates_unchanged() -> None:
     array, n = symmetric_array(0.25, 0.5), 1500
     z = snapshots(array, DOA, sources(TWO, 1, n)[0])
-    silent = AutoregressiveSources([*TWO.coefficients, [0.5, 0.0]], [*np.array(TWO.noise), 1e-24])
+    with_inactive = AutoregressiveSources(
+        [*TWO.coefficients, [0.5, 0.0]], [*np.array(TWO.noise), 1e-24]
+    )
     alone = make_tracker(array, TWO, doa=DOA + 0.1).run(z)
-    both = make_tracker(array, silent, doa=[*(DOA + 0.1), 0.9]).run(z)
+    both = make_tracker(array, with_inactive, doa=[*(DOA + 0.1), 0.9]).run(z)
     for name in ("doa", "amplitude", "coefficients", "innovation_variance", "signals"):
         one, other = getattr(alone, name), getattr(both, name)
         np.testing.assert_allclose(other[:, :2], one, atol=1e-6)

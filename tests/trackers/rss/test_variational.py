@@ -92,7 +92,7 @@ def test_golden_literal_refresh() -> None:
 def test_fixed_point_is_the_joint_maximum() -> None:
     found = golden(max_iterations=400)
     assert np.abs(GOLDEN.gradient(found.u, found.theta)).max() < 1e-9
-    one = JointPosterior(FIELD, XI[0], GOLDEN.W[0], PRIOR.take(0))
+    one = JointPosterior(FIELD, XI[0], GOLDEN.W[0], PRIOR.select(0))
     for method, tolerance in (("lm", 1e-6), ("bfgs", 1e-2)):
         solver = MAPSolver(method, tolerance=1e-12)  # type: ignore[arg-type]
         maximum = maximize(one, found.u[0], found.theta[0], solver)

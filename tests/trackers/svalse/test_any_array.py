@@ -130,12 +130,12 @@ def test_fourier_and_electrical_form_of_a_line_agree(reference: Any) -> None:
         a, b = one.estimate(step), other.estimate(step)
         order, other_order = np.argsort(a.doa), np.argsort(b.doa)  # type: ignore[attr-defined]
         for name, rtol in (("doa", 5e-3), ("std", 0.1), ("amplitude", 0.02)):
-            found, wanted = getattr(b, name)[other_order], getattr(a, name)[order]
-            np.testing.assert_allclose(found, wanted, rtol=rtol)
+            found, expected = getattr(b, name)[other_order], getattr(a, name)[order]
+            np.testing.assert_allclose(found, expected, rtol=rtol)
 
 
 def test_whole_posterior_and_von_mises_density_of_a_line_agree() -> None:
-    """Specification, section 11: 5.57 and 5.57 on Fig. 4; nothing is ambiguous there."""
+    """Specification, section 11: 5.57 and 5.57 on Fig. 4; its directions are unambiguous."""
     trial = create("svalse_fig4", n_steps=6).sample(np.random.default_rng(1))
     one = trial.tracker("svalse", engine="coordinate").run(trial.measurements)
     other = trial.tracker("svalse", memory="posterior").run(trial.measurements)

@@ -200,7 +200,7 @@ def test_newton_step_never_decreases_the_objective(
 
 
 def test_backtracking_shortens_the_step_of_the_variances() -> None:
-    """Far from the top, the variances' fixed point alone made F fall: the step was refused."""
+    """Far from the maximum, the fixed point of the variances alone would decrease F."""
     rng, response = np.random.default_rng(70147), ExpectedResponse(MODEL.manifold())
     state = of_a_line(70147)
     components = state.components.copy()

@@ -42,7 +42,7 @@ def test_conjugation_mirrors_every_direction(form: dict[str, Any], reference: An
 
 
 def test_reversed_line_mirrors_every_direction() -> None:
-    """Array and source together: the reversed line hears from -β what the line hears from β."""
+    """The reversed line receives from -β the snapshot that the line receives from β."""
     trial = short(3, 3)
     reversed_line = LINE.replace(array=SensorArray(-LINE.array.positions))
     one = SVALSE(LINE).run(trial.measurements)
@@ -214,7 +214,7 @@ def test_step_that_does_not_converge_is_reported() -> None:
 
 
 def test_limit_cycle_of_merging_is_stopped_and_reported() -> None:
-    """Two sources half a degree apart: the search revives what merging removes."""
+    """Two sources half a degree apart: the search reactivates what merging removes."""
     z = tone([[0.0, np.deg2rad(0.5)]] * 5, noise=1e-3)
     run = SVALSE(LINE, BernoulliVonMises(), **COORDINATE).run(z)
     assert run.iterations[~run.converged].tolist() == pytest.approx([120, 120], abs=10)
@@ -223,10 +223,10 @@ def test_limit_cycle_of_merging_is_stopped_and_reported() -> None:
 
 
 def test_components_without_power_at_0_db_remain_and_the_step_is_reported() -> None:
-    """Section 12.4 lays these steps to merging; but nothing merges in them.
+    """Section 12.4 attributes these steps to merging, but no components merge in them.
 
-    Carried components whose source has gone share a variance τ that shrinks to nothing and takes
-    the evidence against them along: their prior odds of 3 to 1 keep them, ever weaker.
+    Tracked components without a source share a variance τ that converges to zero, and with it the
+    evidence against them: their prior odds of 3 to 1 keep them active at decreasing power.
     """
     trial = create("svalse_scenario2", snr_db=0.0, n_steps=20).sample(np.random.default_rng(4))
     tracker = trial.tracker("svalse", motion=BernoulliVonMises(), **COORDINATE)

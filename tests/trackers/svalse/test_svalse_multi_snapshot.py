@@ -49,7 +49,7 @@ def turned(model: ArraySnapshot, turn: float) -> ArraySnapshot:
 
 
 def test_circle_turned_by_any_angle_turns_the_estimates() -> None:
-    """To where Newton's steps rest; another start decides otherwise in some of 100 steps."""
+    """Up to the tolerance of Newton's steps; another start differs in some of 100 steps."""
     trial = create("circle", n_bins=3, n_steps=25).sample(np.random.default_rng(0))
     tracker = trial.tracker("svalse")
     assert isinstance(tracker, SVALSE)
@@ -110,7 +110,7 @@ def test_run_batch_equals_single_runs() -> None:
 
 
 def test_mirrored_angle_is_reported_and_tracked_in_front() -> None:
-    """A source that goes through endfire and comes back."""
+    """A source moves to endfire and back."""
     doa = np.deg2rad([[80.0], [84.0], [88.0], [89.0], [86.0], [82.0], [78.0]])
     model = SPARSE.replace(array=SensorArray(0.45 * np.arange(8.0)))
     tracker = SVALSE(model, SLOW)

@@ -77,12 +77,10 @@ def test_certain_births_and_deaths_are_allowed(
     run = SVALSE(LINE, motion, solver=NewtonSolver(max_iterations=60), **form).run(
         trial.measurements
     )
-    if (
-        p[1] == 1.0
-    ):  # four are there; the Newton solver merges what is forced on and detects nothing
+    if p[1] == 1.0:  # four sources; the Newton solver merges forced components and detects none
         assert run.n_found[1:].min() > (4 if form else 3)
     if p[1] == 0.0:
-        assert run.label.max() < run.n_found[0]  # nothing new after the first step
+        assert run.label.max() < run.n_found[0]  # no new label after the first step
     if p[0] == 0.0:
         assert set(run.label[0][run.label[0] >= 0]) <= set(run.label[-1])
 

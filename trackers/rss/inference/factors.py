@@ -148,10 +148,14 @@ class PositionCost(NamedTuple):
         phi = 0.5 * (dot(W * rho, rho) + (step * of_prior).sum(axis=-1))
         return CostEvaluation(offsets, rho, phi)
 
-    def take(self, rows: Int) -> PositionCost:
+    def select(self, rows: Int) -> PositionCost:
         """Return the cost at some rows of the batch axis."""
         return PositionCost(
-            self.problem.take(rows), self.c[rows], self.half_c[rows], self.base[rows], self.sources
+            self.problem.select(rows),
+            self.c[rows],
+            self.half_c[rows],
+            self.base[rows],
+            self.sources,
         )
 
     def prior_gradient(self, theta: Float) -> tuple[Float, Float]:
@@ -222,7 +226,7 @@ def backtrack(
     rows = np.flatnonzero(_increases(after.phi, before.phi, step).any(axis=-1))
     if len(rows) == 0:
         return shifted, after
-    part, step = cost.take(rows), step[rows]
+    part, step = cost.select(rows), step[rows]
     for halving in range(MAX_HALVINGS):
         phi = part.evaluate(theta[rows] + step).phi
         increases = _increases(phi, before.phi[rows], step)

@@ -39,7 +39,7 @@ class Prior(NamedTuple):
     theta: Float
     P: Float
 
-    def take(self, rows: Any) -> Prior:
+    def select(self, rows: Any) -> Prior:
         """Return the priors at some rows of the first axis."""
         return Prior(*(part[rows] for part in self))
 
@@ -69,10 +69,10 @@ class JointPosterior(NamedTuple):
     W: Float
     prior: Prior
 
-    def take(self, rows: Any) -> JointPosterior:
+    def select(self, rows: Any) -> JointPosterior:
         """Return the problems at some rows of the batch axis; None adds one of length one."""
         return JointPosterior(
-            self.propagation.take(rows), self.xi[rows], self.W[rows], self.prior.take(rows)
+            self.propagation.select(rows), self.xi[rows], self.W[rows], self.prior.select(rows)
         )
 
     def misfit(self, levels: Levels) -> Float:
@@ -206,7 +206,7 @@ class ExpansionPoint(NamedTuple):
         levels = problem.propagation.levels(u, theta)
         return cls(u, theta, levels, problem.log_posterior(u, theta, levels))
 
-    def take(self, rows: Any) -> ExpansionPoint:
+    def select(self, rows: Any) -> ExpansionPoint:
         """Return the point at some rows of the batch axis."""
         log_sigma, responsibilities, (dx, dy, square, floor) = self.levels
         levels = Levels(

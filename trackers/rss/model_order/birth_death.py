@@ -150,5 +150,5 @@ def solved(candidate: Candidate, solve: Solve) -> Candidate:
     """Return the joint maximum that starts at the solution of a tracker's own method."""
     if len(candidate.u) == 0:
         return candidate
-    solution = solve(candidate.problem.take(None), candidate.u[None], candidate.theta[None])
+    solution = solve(candidate.problem.select(None), candidate.u[None], candidate.theta[None])
     return Candidate(candidate.problem, solution.u[0], solution.theta[0]).refitted()

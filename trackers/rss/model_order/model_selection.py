@@ -99,7 +99,7 @@ class Candidate:
 
     def part(self, rows: Int) -> Candidate:
         """Return some of the sources, unchanged."""
-        problem = self.problem._replace(prior=self.problem.prior.take(rows))
+        problem = self.problem._replace(prior=self.problem.prior.select(rows))
         return Candidate(problem, self.u[rows], self.theta[rows])
 
     def without(self, j: int) -> Candidate:

@@ -58,7 +58,7 @@ class TrackTable:
         label = padded(self.label, n_slots, -1).astype(np.int64)
         return label, padded(self.existence, n_slots, np.nan)
 
-    def take(self, rows: Int | Bool) -> TrackTable:
+    def select(self, rows: Int | Bool) -> TrackTable:
         """Return some of the sources."""
         return TrackTable(
             self.label[rows], self.log_odds[rows], self.confirmed[rows], self.next_label

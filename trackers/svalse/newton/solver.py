@@ -66,7 +66,7 @@ class NewtonSolver(SolverSettings):
         with fewer 20, or for one snapshot of a line without a prior (VALSE) that of the lags.
     tempering : float
         Number of snapshots that count as one, at least 1: overlapping windows and neighbouring
-        bins of a recording are not independent, and deviate from a plane wave alike.
+        bins of a recording are not independent, and deviate equally from a plane wave.
     power_floor : float, optional
         Smallest power of a source, in units of the noise of one snapshot after beamforming. None
         is 0 for one snapshot a step, which is the paper's model, and 3 for several.

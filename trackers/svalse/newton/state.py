@@ -266,7 +266,7 @@ def mean_amplitudes(W: Complex, power: Float) -> Complex:
 
 
 def front_angles(manifold: Manifold, mu: Float) -> Float:
-    """Return the angles within ±π, where two are of one direction that in front."""
+    """Return the angles within ±π, of two with one direction the front one."""
     theta = np.angle(np.exp(1j * mu))
     return manifold.from_doa(manifold.to_doa(theta)) if manifold.front_back_ambiguous else theta
 
