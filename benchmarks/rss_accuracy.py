@@ -76,9 +76,9 @@ def table(runs: int) -> None:
         each, strict = [], []
         for seed in SEEDS:
             trials = draws(CASES[case], runs, seed)
-            found = estimates(trials, method)
-            each.append(scores(found.theta, trials.theta, found.u, trials.u))
-            strict.append(scores(found.theta, trials.theta, found.u, trials.u, "one-to-one"))
+            result = estimates(trials, method)
+            each.append(scores(result.theta, trials.theta, result.u, trials.u))
+            strict.append(scores(result.theta, trials.theta, result.u, trials.u, "one-to-one"))
         limits = LIMITS.get((case, method))
         rms[case, method] = _mean(each, "location_rms")
         wanted = f"{known[0]} m, {known[1]} dB, {known[2]} m, {known[3]:.2f}"
@@ -110,8 +110,8 @@ def single_and_divergence(runs: int) -> None:
     """Print one source alone, undamped updates, and the literal covariance."""
     heading("Section 13, one source; undamped updates; the literal covariance")
     trials = draws(Table1K7(n_sources=1, prior_std=20.0), 12 * runs, 3)
-    found = estimates(trials, "vb")
-    far = np.linalg.norm(found.theta - trials.theta, axis=-1)[:, 0]
+    result = estimates(trials, "vb")
+    far = np.linalg.norm(result.theta - trials.theta, axis=-1)[:, 0]
     near = float(np.mean(far < 5))
     rms = float(np.sqrt(np.mean(far[far < 5] ** 2)))
     blocks = bounds(trials)
@@ -119,7 +119,7 @@ def single_and_divergence(runs: int) -> None:
     line("K=1: share within 5 m", f"{near:.3f}", "0.95..0.99", between(near, 0.95, 0.99))
     line("K=1: RMS of those", f"{rms:.2f} m (bound {bound:.2f})", "0.72..0.76 (0.72)",
          between(rms, 0.72 * 0.95, 0.76 * 1.05))  # fmt: skip
-    n = 0 if found.posterior is None else int(np.median(found.posterior.iterations))
+    n = 0 if result.posterior is None else int(np.median(result.posterior.iterations))
     line("K=1: iterations", f"{n}", "2", n in (2, 3))
     for case in ("K=3 prior", "K=7 prior"):
         trials = draws(CASES[case], runs, 4)
@@ -142,12 +142,12 @@ def covariances_and_flags(runs: int) -> None:
     trials = draws(Table1K3(), 6 * runs, 5)
     problem = trials.problem
     solver = VariationalSolver(max_iterations=60, tol_u=1e-4, tol_theta=1e-3)
-    found = variational_posterior(problem, problem.prior.mu, problem.prior.theta, solver)
-    J = problem.information(problem.propagation.levels(found.u, found.theta))
-    joint, factor = marginals(J).Sigma, inverse_2x2(found.P)
-    pairs = zip(found.theta, trials.theta, strict=True)
+    result = variational_posterior(problem, problem.prior.mu, problem.prior.theta, solver)
+    J = problem.information(problem.propagation.levels(result.u, result.theta))
+    joint, factor = marginals(J).Sigma, inverse_2x2(result.P)
+    pairs = zip(result.theta, trials.theta, strict=True)
     which = np.array([np.argsort(assign(one, truth, "one-to-one")) for one, truth in pairs])
-    miss = found.theta - np.take_along_axis(trials.theta, which[..., None], axis=1)
+    miss = result.theta - np.take_along_axis(trials.theta, which[..., None], axis=1)
     wrong = (np.hypot(miss[..., 0], miss[..., 1]) > 10).any(axis=1)
     for name, Sigma, known in (("joint", joint, "0.89"), ("factor", factor, "0.73")):
         nees = np.einsum("bki,bkij,bkj->bk", miss, np.linalg.inv(Sigma), miss)
@@ -156,10 +156,10 @@ def covariances_and_flags(runs: int) -> None:
              f"{np.mean(inside[~wrong]):.2f}, {np.mean(inside):.2f}", known)  # fmt: skip
     ratio = np.sqrt(np.trace(factor, axis1=-2, axis2=-1) / np.trace(joint, axis1=-2, axis2=-1))
     line("position std, factor over joint, median", f"{np.median(ratio):.2f}", "0.77")
-    power = np.sqrt(1 / found.w / marginals(J).v)
+    power = np.sqrt(1 / result.w / marginals(J).v)
     line("power std, factor over joint, median", f"{np.median(power):.2f}", "0.40")
-    solution = Solution(found.u, found.theta, marginals(J), found.log_posterior, found.initial,
-                        found.log_posterior, found.iterations, found.converged)  # fmt: skip
+    solution = Solution(result.u, result.theta, marginals(J), result.log_posterior, result.initial,
+                        result.log_posterior, result.iterations, result.converged)  # fmt: skip
     flagged = np.asarray(problem.diagnose(solution).poor_fit)
     line("wrong solutions (a source more than 10 m off) that are flagged",
          f"{np.mean(flagged[wrong]):.2f}", "0.35..0.88")  # fmt: skip

@@ -113,12 +113,12 @@ def _crossed(kind: str, params: dict[str, Any], runs: int) -> tuple[float, ...]:
     for run in range(runs):
         trial = CrossingSources().sample(np.random.default_rng([10, run]))
         started = time.process_time()
-        found = _tracked(trial, kind, params)
+        estimate = _tracked(trial, kind, params)
         took += time.process_time() - started
-        miss = found.position - trial.truth
+        miss = estimate.position - trial.truth
         far.append(np.hypot(miss[..., 0], miss[..., 1]))
         lost += bool((far[-1][-1] > 10).any())
-        nees.append(np.einsum("tki,tkij,tkj->tk", miss, np.linalg.inv(found.covariance), miss))
+        nees.append(np.einsum("tki,tkij,tkj->tk", miss, np.linalg.inv(estimate.covariance), miss))
     e, q = np.array(far), np.array(nees)
     rms, inside = np.sqrt(np.mean(e**2)), np.mean(q < 5.991)
     ms = 1e3 * took / e[..., 0].size
@@ -172,12 +172,12 @@ def measured(folder: Path) -> None:
     for name, calibration in (("", known), (", calibrated on the rest of the data", before)):
         for tau, wanted in ((4.0, "121, 224, 10.1"), (30.0, "124, 228, 2.99"),
                             (120.0, "110..140, 230, 0.7..2")):  # fmt: skip
-            found = track_transmitter(single.select(first), calibration, tau=tau)
-            median, nees = float(np.median(found.error)), float(np.median(found.nees))
-            inside = float(np.mean(found.nees < 5.991))
+            estimate = track_transmitter(single.select(first), calibration, tau=tau)
+            median, nees = float(np.median(estimate.error)), float(np.median(estimate.nees))
+            inside = float(np.mean(estimate.nees < 5.991))
             passed = between(median, 110, 140) and between(nees, 0.7, 2) if tau == 120 else None
             line(f"tracker, τ = {tau:g} s{name}: median, p90, NEES (inside 95 %)",
-                 f"{median:.0f}, {np.quantile(found.error, 0.9):.0f}, {nees:.2f} ({inside:.2f})",
+                 f"{median:.0f}, {np.quantile(estimate.error, 0.9):.0f}, {nees:.2f} ({inside:.2f})",
                  wanted, passed)  # fmt: skip
     _two(read_network(folder / "powder_two_tx.npz"), single)
 
@@ -221,8 +221,8 @@ def _two(network: Network, single: Network) -> None:
                     )
                 )
                 start = readings.model.sensors[loud[:2]] + readings.model.r_min
-                found = snapshot(readings, calibration, start, method)
-                apart = distances(found, network.truth[readings.step])
+                estimate = snapshot(readings, calibration, start, method)
+                apart = distances(estimate, network.truth[readings.step])
                 far += (
                     (min(apart[0, 0] + apart[1, 1], apart[0, 1] + apart[1, 0]) / 2)
                     .reshape(1)

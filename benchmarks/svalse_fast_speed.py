@@ -159,10 +159,10 @@ def calls() -> None:
     counted: list[Any] = [Components(each.packed.view(Counted)) if isinstance(each, Components)
                else each.view(Counted) for each in given]  # fmt: skip
     state = evaluate(response, *counted)
-    for learn in (False, True):
+    for estimate_nu in (False, True):
         Counted.calls = 0
-        newton_step(response, state, np.array([learn]))
-        what = f"array calls of a Newton step {'with' if learn else 'without'} ν and τ"
+        newton_step(response, state, np.array([estimate_nu]))
+        what = f"array calls of a Newton step {'with' if estimate_nu else 'without'} ν and τ"
         row(what, f"{Counted.calls}", "", None)
 
 

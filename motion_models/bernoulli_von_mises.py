@@ -175,5 +175,5 @@ class BernoulliVonMises(MotionModel):
             raise ValueError(
                 f"dt must be whole where p_activate + p_deactivate exceeds 1; got dt={dt}"
             )
-        forgotten = (1 - eigenvalue**dt) / switching
-        return self.p_activate * forgotten, self.p_deactivate * forgotten
+        weight = (1 - eigenvalue**dt) / switching
+        return self.p_activate * weight, self.p_deactivate * weight

@@ -126,12 +126,12 @@ def test_particle_filter_weights_of_complex_and_composite_snapshots_are_equal() 
     walk = DirectionAmplitudeWalk(VonMisesWalk(500.0), amplitude_noise=0.02)
     z = SNAPSHOT.simulate([0.3], [1.0 + 0.5j], np.random.default_rng(0))
     for motion, x in ((walk, [0.2, 1.0, 0.5]), (VonMisesWalk(500.0), [0.2])):
-        found = []
+        result = []
         for measured in (z, composite(z)):
             tracker = Particle(motion, SNAPSHOT, x, 0.1 * np.eye(len(x)), 200, rng=1)
             tracker.update(measured)
-            found.append(tracker.log_likelihood)
-        assert found[0] == pytest.approx(found[1], abs=1e-9)
+            result.append(tracker.log_likelihood)
+        assert result[0] == pytest.approx(result[1], abs=1e-9)
 
 
 def test_known_amplitudes_give_the_density_of_gaussian_noise() -> None:

@@ -35,12 +35,12 @@ def packaged(folder: Path) -> dict[str, Path]:
 
 
 def test_every_folder_with_an_init_is_a_package() -> None:
-    found = {
+    result = {
         place.rpartition("/")[0].replace("/", ".")
         for place in packaged(ROOT)
         if place.endswith("/__init__.py")
     }
-    assert sorted(SETUPTOOLS["packages"]) == sorted(found)
+    assert sorted(SETUPTOOLS["packages"]) == sorted(result)
 
 
 def test_every_module_lies_in_a_package() -> None:

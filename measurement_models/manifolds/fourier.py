@@ -156,7 +156,7 @@ def _origin(waves: PlaneWaves, reference: Reference) -> Float:
 
 @lru_cache(maxsize=64)  # of several megabytes each, where the array is large
 def fourier_manifold(waves: PlaneWaves, reference: Reference = "middle") -> FourierManifold:
-    """Return the manifold of any array: one FFT, remembered, as the waves never change.
+    """Return the manifold of any array: by one FFT, cached.
 
     Parameters
     ----------

@@ -56,8 +56,8 @@ def test_locate_writes_positions_and_a_map(tmp_path: Path) -> None:
     assert list(rows[0]) == ["step", "time_s", "label", "x_m", "y_m", "std_x_m", "std_y_m",
                              "corr", "existence", "level_db"]  # fmt: skip
     assert [float(row["time_s"]) for row in rows] == [4.0 * k for k in range(12)]
-    found = np.array([[float(row["x_m"]), float(row["y_m"])] for row in rows])
-    assert np.abs(found - walk()[1]).max() < 8
+    result = np.array([[float(row["x_m"]), float(row["y_m"])] for row in rows])
+    assert np.abs(result - walk()[1]).max() < 8
     assert {row["label"] for row in rows} == {"0"}
     assert float(rows[-1]["level_db"]) == pytest.approx(-20.0, abs=1.5)
     assert plot.read_bytes().startswith(b"\x89PNG")
@@ -146,6 +146,6 @@ def test_shipped_walk_is_tracked() -> None:
     assert network.rss_db.shape[0] == 300
     known = calibrate(network.select(slice(150, 300)), floor_db=FLOOR_DB)
     assert 2.0 < known.alpha < 3.2
-    found = track_transmitter(network.select(slice(0, 150)), known)
-    assert np.median(found.error) < 250  # ten minutes calibrate the receivers poorly
-    assert np.median(found.nees) < 5.991
+    result = track_transmitter(network.select(slice(0, 150)), known)
+    assert np.median(result.error) < 250  # ten minutes calibrate the receivers poorly
+    assert np.median(result.nees) < 5.991

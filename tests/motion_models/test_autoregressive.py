@@ -80,11 +80,11 @@ def test_both_layouts_have_equal_models_up_to_permutation() -> None:
 @given(st.lists(st.floats(-2, 2), min_size=1, max_size=5))
 def test_stabilised_models_are_stable_and_stable_ones_unchanged(a: list[float]) -> None:
     coefficients = np.array(a)
-    found = stabilised(coefficients)
+    result = stabilised(coefficients)
     # the poles of nearly degenerate companions carry eps^(1/p) of rounding
-    assert pole_radius(found) <= 0.995 + 2e-3
+    assert pole_radius(result) <= 0.995 + 2e-3
     if pole_radius(coefficients) < 0.995:
-        np.testing.assert_array_equal(found, coefficients)
+        np.testing.assert_array_equal(result, coefficients)
 
 
 def test_models_with_equal_numbers_are_equal_after_copies() -> None:

@@ -20,9 +20,9 @@ def test_existence_over_whole_steps_equals_the_chain_of_steps(
     model = BernoulliVonMises(148.0, p_activate, p_deactivate)
     chain = np.array([[1 - p_activate, p_activate], [p_deactivate, 1 - p_deactivate]])
     expected = np.array([1 - existence, existence]) @ np.linalg.matrix_power(chain, n)
-    found = model.predict_existence(existence, dt=n)
-    assert found == pytest.approx(expected[1], abs=1e-13)
-    assert 0 <= found <= 1
+    result = model.predict_existence(existence, dt=n)
+    assert result == pytest.approx(expected[1], abs=1e-13)
+    assert 0 <= result <= 1
 
 
 @given(st.floats(0, 0.5), st.floats(0, 0.5), probabilities, steps, steps)
@@ -30,8 +30,8 @@ def test_existence_over_two_durations_equals_that_over_their_sum(
     p_activate: float, p_deactivate: float, existence: float, a: float, b: float
 ) -> None:
     model = BernoulliVonMises(148.0, p_activate, p_deactivate)
-    found = model.predict_existence(model.predict_existence(existence, a), b)
-    assert found == pytest.approx(model.predict_existence(existence, a + b), abs=1e-12)
+    result = model.predict_existence(model.predict_existence(existence, a), b)
+    assert result == pytest.approx(model.predict_existence(existence, a + b), abs=1e-12)
 
 
 def test_existence_converges_to_its_stationary_probability() -> None:

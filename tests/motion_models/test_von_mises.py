@@ -38,11 +38,11 @@ def exact_ratios(kappa: float, n: int) -> list[Decimal]:
     """Return I_m/I_{m-1}, m = 1..n, to 40 digits by the continued fraction."""
     with localcontext(prec=45):
         k, order = Decimal(kappa), n + int(11 * kappa**0.5) + 60
-        ratio, found = Decimal(1), []
+        ratio, result = Decimal(1), []
         for m in range(order, 0, -1):
             ratio = k / (2 * m + k * ratio)
-            found.append(ratio)
-        return found[: -n - 1 : -1]
+            result.append(ratio)
+        return result[: -n - 1 : -1]
 
 
 EXACT = {kappa: exact_ratios(kappa, 1)[0] for kappa in KAPPAS}
@@ -104,8 +104,8 @@ def test_log_bessel_ratio_keeps_its_digits_near_zero(kappa: float) -> None:
 @pytest.mark.parametrize("kappa", KAPPAS)
 def test_inverse_bessel_ratio_has_the_error_of_rounding_only(kappa: float) -> None:
     # Half a unit in the last place of R moves κ by 1.1e-16 κ, relative.
-    found = inverse_bessel_ratio(float(EXACT[kappa]))
-    assert found == pytest.approx(kappa, rel=1e-12 + 1.2e-16 * kappa)
+    result = inverse_bessel_ratio(float(EXACT[kappa]))
+    assert result == pytest.approx(kappa, rel=1e-12 + 1.2e-16 * kappa)
 
 
 @given(st.floats(0, 1))

@@ -118,10 +118,10 @@ def test_calibration_recovers_the_simulated_values_with_outliers() -> None:
     network = moving()
     rss_db = network.rss_db.copy()
     rss_db[::15] += 40.0
-    found = calibrate(Network(network.name, network.time, rss_db, network.sensors, network.truth))
-    assert found.alpha == pytest.approx(2.5, abs=0.25)
+    result = calibrate(Network(network.name, network.time, rss_db, network.sensors, network.truth))
+    assert result.alpha == pytest.approx(2.5, abs=0.25)
     offsets = np.random.default_rng(1).normal(0, 6, 14)
-    error = neper_to_db(found.offsets) - offsets
+    error = neper_to_db(result.offsets) - offsets
     assert np.std(error) < 1.5
     clean = calibrate(network)
     assert float(neper_to_db(clean.sigma)) == pytest.approx(4.0, rel=0.1)
@@ -131,10 +131,10 @@ def test_uncalibrated_sensors_have_a_larger_variance() -> None:
     network = moving()
     rss_db = network.rss_db.copy()
     rss_db[:, 2] = np.nan
-    found = calibrate(Network(network.name, network.time, rss_db, network.sensors, network.truth))
-    model = found.model(network.sensors[0])
-    assert found.offsets[2] == 0
-    assert model.variance[2] == pytest.approx(found.sigma**2 + float(db_to_neper(7.0)) ** 2)
+    result = calibrate(Network(network.name, network.time, rss_db, network.sensors, network.truth))
+    model = result.model(network.sensors[0])
+    assert result.offsets[2] == 0
+    assert model.variance[2] == pytest.approx(result.sigma**2 + float(db_to_neper(7.0)) ** 2)
 
 
 def test_calibration_requires_one_known_transmitter() -> None:
@@ -152,9 +152,9 @@ def test_calibration_requires_one_known_transmitter() -> None:
 
 def test_track_transmitter_follows_a_walk() -> None:
     known = calibrate(moving(seed=5))
-    found = track_transmitter(moving(120), known, tau=4.0)
-    assert np.median(found.error[20:]) < 40
-    assert np.mean(found.nees[20:] < 5.991) > 0.8
+    result = track_transmitter(moving(120), known, tau=4.0)
+    assert np.median(result.error[20:]) < 40
+    assert np.mean(result.nees[20:] < 5.991) > 0.8
 
 
 # measured data
@@ -179,9 +179,9 @@ def test_measured_transmitter_snapshots_and_track() -> None:
                for one in steps_of(eighth, known)]  # fmt: skip
         assert 145 <= np.median(far) <= 190
     july = int(np.argmax(np.diff(single.time))) + 1
-    found = track_transmitter(single.select(np.arange(july, july + 700)), known)
-    assert 110 <= np.median(found.error) <= 140
-    assert 0.7 <= np.median(found.nees) <= 2
+    result = track_transmitter(single.select(np.arange(july, july + 700)), known)
+    assert 110 <= np.median(result.error) <= 140
+    assert 0.7 <= np.median(result.nees) <= 2
 
 
 def distance(place: Float, network: Network, step: int) -> float:

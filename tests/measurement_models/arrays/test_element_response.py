@@ -23,8 +23,8 @@ def test_gains_interpolate_their_table_with_its_slope(azimuth: float, even: int)
 
 def test_first_order_elements_are_omni_plus_cosine() -> None:
     facing, omni = np.array([0.3, 2.0]), np.array([0.5, 1.0])
-    found = ElementResponse.first_order(facing, omni)(1.1)[0]
-    np.testing.assert_allclose(found, omni + (1 - omni) * np.cos(1.1 - facing), atol=1e-12)
+    result = ElementResponse.first_order(facing, omni)(1.1)[0]
+    np.testing.assert_allclose(result, omni + (1 - omni) * np.cos(1.1 - facing), atol=1e-12)
 
 
 @pytest.mark.parametrize(

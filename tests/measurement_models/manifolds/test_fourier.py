@@ -52,11 +52,11 @@ def test_series_equals_the_response_up_to_a_phase(model: ArraySnapshot, referenc
     assert isinstance(manifold, FourierManifold)
     doa = directions(model)
     exact = model.waves.steering(doa)
-    found = manifold.steering(manifold.from_doa(doa))
-    np.testing.assert_allclose(np.abs(found), np.abs(exact), atol=1e-7)
-    turn = (found * exact.conj()).sum(axis=2, keepdims=True)
+    result = manifold.steering(manifold.from_doa(doa))
+    np.testing.assert_allclose(np.abs(result), np.abs(exact), atol=1e-7)
+    turn = (result * exact.conj()).sum(axis=2, keepdims=True)
     turn /= np.abs(turn)
-    np.testing.assert_allclose(found, exact * turn, atol=1e-7)
+    np.testing.assert_allclose(result, exact * turn, atol=1e-7)
 
 
 @pytest.mark.parametrize("radius", [0.3, 0.65, 2.0, 5.0])
@@ -201,8 +201,8 @@ def test_likelihood_averages_over_an_unknown_slowness() -> None:
     z = ArraySnapshot(PLANE, 1.0, noise=0.3).simulate([0.4], 1.0, np.random.default_rng(0))
     doa = np.array([[0.4], [2.0]])
     each = [ArraySnapshot(PLANE, 1 / s, noise=0.3).log_likelihood(z, doa) for s in (0.8, 1.0)]
-    found = slow.log_likelihood(z, doa)
-    np.testing.assert_allclose(found, logsumexp(each, axis=0) - np.log(2), rtol=1e-12)
+    result = slow.log_likelihood(z, doa)
+    np.testing.assert_allclose(result, logsumexp(each, axis=0) - np.log(2), rtol=1e-12)
 
 
 def test_elevated_waves_have_shorter_ground_phases_and_height_phases() -> None:

@@ -15,23 +15,23 @@ def water(depth: float = 100.0, *, rigid: bool = False) -> Waveguide:
     return Waveguide(np.array([0.0, depth]), np.array([1500.0, 1500.0]), rigid=rigid)
 
 
-def overlap(found: Modes, guide: Waveguide) -> Float:
+def overlap(result: Modes, guide: Waveguide) -> Float:
     """Return ∫ ψ_m ψ_n / ρ dz, summed over the layers."""
-    total = np.zeros((len(found.wavenumber),) * 2)
+    total = np.zeros((len(result.wavenumber),) * 2)
     parts = [(0.0, guide.water_depth, 1.0)] + [(b.top, b.bottom, b.density) for b in guide.layers]
     for top, bottom, density in parts:
-        inside = (found.depth >= top - 1e-9) & (found.depth <= bottom + 1e-9)
-        psi = found.shape[:, inside]
+        inside = (result.depth >= top - 1e-9) & (result.depth <= bottom + 1e-9)
+        psi = result.shape[:, inside]
         products = psi[:, None] * psi[None]
-        total += np.trapezoid(products, found.depth[inside], axis=-1) / density
+        total += np.trapezoid(products, result.depth[inside], axis=-1) / density
     return total
 
 
 def test_modes_of_a_layered_floor_are_orthonormal() -> None:
     guide = environment()
-    found = modes(guide, 60.0, step=0.5)
-    assert len(found.wavenumber) > 8
-    np.testing.assert_allclose(overlap(found, guide), np.eye(len(found.wavenumber)), atol=1e-9)
+    result = modes(guide, 60.0, step=0.5)
+    assert len(result.wavenumber) > 8
+    np.testing.assert_allclose(overlap(result, guide), np.eye(len(result.wavenumber)), atol=1e-9)
 
 
 @settings(max_examples=20)
@@ -45,20 +45,20 @@ def test_modes_of_ideal_water_match_the_closed_form(
     expected = np.sqrt(k**2 - vertical[vertical < k] ** 2)
     assume(len(expected) > 0)
     assume(expected[-1] > 0.2 * k and np.abs(vertical - k).min() > 1e-3 * k)  # away from the edge
-    found = modes(water(depth, rigid=rigid), frequency, step=1500 / frequency / 400)
-    assert len(found.wavenumber) == len(expected)
-    np.testing.assert_allclose(found.wavenumber.real, expected, rtol=2e-3)
-    shape = np.sqrt(2 / depth) * np.sin(vertical[0] * found.depth)
-    np.testing.assert_allclose(np.abs(found.shape[0]), np.abs(shape), atol=1e-3 / np.sqrt(depth))
-    assert (found.wavenumber.imag == 0).all()
+    result = modes(water(depth, rigid=rigid), frequency, step=1500 / frequency / 400)
+    assert len(result.wavenumber) == len(expected)
+    np.testing.assert_allclose(result.wavenumber.real, expected, rtol=2e-3)
+    shape = np.sqrt(2 / depth) * np.sin(vertical[0] * result.depth)
+    np.testing.assert_allclose(np.abs(result.shape[0]), np.abs(shape), atol=1e-3 / np.sqrt(depth))
+    assert (result.wavenumber.imag == 0).all()
 
 
 def test_modes_over_a_fast_fluid_solve_the_pekeris_equation() -> None:
     """tan(q D) = -ρ q/γ with jumps of speed and density; evanescent field in the floor."""
     depth, c, density, frequency = 100.0, 1800.0, 1.8, 60.0
     layer = BottomLayer(depth, 1500.0, c, c, density)
-    found = modes(Waveguide(np.array([0.0, depth]), np.array([1500.0] * 2), [layer]), frequency)
-    k = found.wavenumber.real
+    result = modes(Waveguide(np.array([0.0, depth]), np.array([1500.0] * 2), [layer]), frequency)
+    k = result.wavenumber.real
     q = np.sqrt((2 * np.pi * frequency / 1500) ** 2 - k**2)
     gamma = np.sqrt(k**2 - (2 * np.pi * frequency / c) ** 2)
     residual = gamma * np.sin(q * depth) + density * q * np.cos(q * depth)
@@ -80,20 +80,20 @@ def test_modal_loss_is_proportional_to_the_power_in_the_floor() -> None:
     """Floor that differs from the water in loss alone: Im k in closed form."""
     layer = BottomLayer(50.0, 100.0, 1500.0, 1500.0, 1.0, 0.5)
     guide = Waveguide(np.array([0.0, 50.0]), np.array([1500.0] * 2), [layer])
-    found = modes(guide, 40.0, steepest=1e9)
-    k, n = 2 * np.pi * 40 / 1500, np.arange(1, len(found.wavenumber) + 1)
+    result = modes(guide, 40.0, steepest=1e9)
+    k, n = 2 * np.pi * 40 / 1500, np.arange(1, len(result.wavenumber) + 1)
     alpha = 0.5 * 0.04 / (20 / np.log(10))
     share = 0.5  # of sin² over the lower half of the water
     expected = alpha * k * share / np.sqrt(k**2 - (n * np.pi / 100) ** 2)
-    np.testing.assert_allclose(-found.wavenumber.imag, expected, rtol=2e-3)
+    np.testing.assert_allclose(-result.wavenumber.imag, expected, rtol=2e-3)
 
 
 @settings(max_examples=10)
 @given(st.floats(1, 216), st.floats(1, 216), st.floats(300, 9000))
 def test_mode_field_is_reciprocal(one: float, other: float, distance: float) -> None:
-    found = modes(environment(), 60.0, step=0.5)
-    there = mode_field(found, one, [other], [distance])
-    back = mode_field(found, other, [one], [distance])
+    result = modes(environment(), 60.0, step=0.5)
+    there = mode_field(result, one, [other], [distance])
+    back = mode_field(result, other, [one], [distance])
     np.testing.assert_allclose(there, back, rtol=1e-9)
 
 
@@ -112,8 +112,8 @@ def images(source: float, depths: Float, distance: float, k: float, n_images: in
 
 def test_mode_field_matches_image_sources() -> None:
     depths, distance, frequency = np.linspace(5, 95, 19), 3000.0, 45.0
-    found = modes(water(rigid=True), frequency, step=0.1)
-    field = mode_field(found, 30.0, depths, [distance])[0]
+    result = modes(water(rigid=True), frequency, step=0.1)
+    field = mode_field(result, 30.0, depths, [distance])[0]
     exact = images(30.0, depths, distance, 2 * np.pi * frequency / 1500, 20000)
     assert np.linalg.norm(field - exact) < 0.02 * np.linalg.norm(exact)
 

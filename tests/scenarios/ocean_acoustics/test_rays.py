@@ -34,9 +34,11 @@ def test_rays_at_constant_speed_match_image_sources(
 ) -> None:
     assume(abs(source - depth) > 10)  # the fan excludes the horizontal
     steep = np.deg2rad(75)
-    found = eigenrays(FLAT, 100.0, source, [depth], [distance], n_bottom=1, steepest=steep)
-    assert sorted(found.path) == sorted(path_names(1))
-    for path, doa, time, p in zip(found.path, found.doa, found.time, found.pressure, strict=True):
+    result = eigenrays(FLAT, 100.0, source, [depth], [distance], n_bottom=1, steepest=steep)
+    assert sorted(result.path) == sorted(path_names(1))
+    for path, doa, time, p in zip(
+        result.path, result.doa, result.time, result.pressure, strict=True
+    ):
         height = image_depth(path, source, depth)
         r = np.hypot(distance, height)
         assert doa == pytest.approx(np.arctan2(height, distance), abs=1e-5)
@@ -59,11 +61,11 @@ def test_rays_in_linear_profile_are_circles(
     c1, c2 = 1500 + slope * source, 1500 + slope * depth
     straight = np.hypot(distance, source - depth)
     time = np.arccosh(1 + (slope * straight) ** 2 / (2 * c1 * c2)) / abs(slope)
-    found = eigenrays(guide, 100.0, source, [depth], [distance], n_bottom=1)
-    first = np.argmin(found.time)
-    assert found.path[first] == ("D" if distance == 400 else "B" if slope > 0 else "S")
-    assert found.time[first] == pytest.approx(time, rel=1e-7)
-    p = found.pressure[first] * np.exp(2j * np.pi * 100 * time)
+    result = eigenrays(guide, 100.0, source, [depth], [distance], n_bottom=1)
+    first = np.argmin(result.time)
+    assert result.path[first] == ("D" if distance == 400 else "B" if slope > 0 else "S")
+    assert result.time[first] == pytest.approx(time, rel=1e-7)
+    p = result.pressure[first] * np.exp(2j * np.pi * 100 * time)
     assert np.angle(p) == pytest.approx(0, abs=0.01)
     assert abs(p) == pytest.approx(1 / (4 * np.pi * straight), rel=0.03)
 
@@ -71,17 +73,22 @@ def test_rays_in_linear_profile_are_circles(
 def test_travel_times_satisfy_the_eikonal_equation() -> None:
     """∂t/∂r = cos β/c and ∂t/∂z = sin β/c at the sensor: Snell's and Fermat's laws at once."""
     guide, z, r = environment(), np.array([149.9, 150.0, 150.1]), np.array([2999.0, 3000.0, 3001.0])
-    found = eigenrays(guide, 198.0, 9.0, z, r, n_bottom=4)
+    result = eigenrays(guide, 198.0, 9.0, z, r, n_bottom=4)
     c = float(guide.speed(150.0))
     times: dict[str, Float] = {}
-    for path in np.unique(found.path):
-        mine = found.path == path
-        if np.bincount(found.step[mine] * 3 + found.sensor[mine], minlength=9).tolist() == [1] * 9:
+    for path in np.unique(result.path):
+        mine = result.path == path
+        if (
+            np.bincount(result.step[mine] * 3 + result.sensor[mine], minlength=9).tolist()
+            == [1] * 9
+        ):
             times[path] = np.zeros((3, 3))
-            times[path][found.step[mine], found.sensor[mine]] = found.time[mine]
+            times[path][result.step[mine], result.sensor[mine]] = result.time[mine]
     assert len(times) >= 8
     for path, t in times.items():
-        doa = float(found.doa[(found.path == path) & (found.step == 1) & (found.sensor == 1)][0])
+        doa = float(
+            result.doa[(result.path == path) & (result.step == 1) & (result.sensor == 1)][0]
+        )
         assert (t[2, 1] - t[0, 1]) / 2 == pytest.approx(np.cos(doa) / c, rel=1e-4)
         assert (t[1, 2] - t[1, 0]) / 0.2 == pytest.approx(np.sin(doa) / c, rel=3e-2)
 
@@ -99,9 +106,9 @@ def test_traced_rays_stay_between_their_turning_points() -> None:
 
 def test_ray_line_connects_source_and_sensor() -> None:
     guide = environment()
-    found = eigenrays(guide, 198.0, 9.0, [153.0], [2540.0])
-    for path, doa, p in zip(found.path, found.doa, found.pressure, strict=True):
-        if abs(p) < 1e-3 * np.abs(found.pressure).max():
+    result = eigenrays(guide, 198.0, 9.0, [153.0], [2540.0])
+    for path, doa, p in zip(result.path, result.doa, result.pressure, strict=True):
+        if abs(p) < 1e-3 * np.abs(result.pressure).max():
             continue
         x, z = ray_line(guide, 9.0, 153.0, path, doa)
         assert (x[0], z[0], z[-1]) == (0.0, 9.0, 153.0)

@@ -66,10 +66,10 @@ def replayed(name: str, n_steps: int, engine: CoordinateSolver) -> tuple[Float, 
             widened = 1 / (1 / 148 + 1 / kappa[carried])  # (63), the large-κ limit
             known = ComponentPrior(-mu[carried], widened, np.where(active, 0.75, 0.1), 0.1)
         fit = engine.solve(z["y"].T[t][None, :, None], manifold, known)
-        found = np.sort(np.rad2deg(manifold.to_doa(fit.theta[fit.active], slack=np.inf)))
+        result = np.sort(np.rad2deg(manifold.to_doa(fit.theta[fit.active], slack=np.inf)))
         recorded = np.sort(z["svalse_doa_deg"][t][: z["svalse_K"][t]])
-        assert len(found) == len(recorded)
-        worst.append(np.abs(found - recorded).max())
+        assert len(result) == len(recorded)
+        worst.append(np.abs(result - recorded).max())
         iterations.append(fit.iterations)
     return np.array(worst), np.array(iterations), z["svalse_iterations"][:n_steps] - 1
 

@@ -121,10 +121,10 @@ def test_priors_reduce_the_rss_bound_and_resolve_ambiguity() -> None:
 
 def test_rss_bound_matches_section_11() -> None:
     for case, position, level in ((Table1K3(), 1.9, 0.62), (Table1K7(), 1.6, 0.50)):
-        found = bounds(draws(case, 200, 0))
-        far = np.median(np.sqrt(np.trace(found.Sigma, axis1=-2, axis2=-1)))
+        result = bounds(draws(case, 200, 0))
+        far = np.median(np.sqrt(np.trace(result.Sigma, axis1=-2, axis2=-1)))
         assert far == pytest.approx(position, rel=0.1)
-        assert np.median(np.sqrt(found.v)) / db_to_neper(1.0) == pytest.approx(level, rel=0.1)
+        assert np.median(np.sqrt(result.v)) / db_to_neper(1.0) == pytest.approx(level, rel=0.1)
 
 
 # detection: the table of section 8
@@ -209,9 +209,9 @@ def test_nearest_assignment_favours_merged_solutions() -> None:
 
 def test_estimates_that_are_not_finite_count_as_lost() -> None:
     truth = np.zeros((4, 1, 2))
-    found = np.array([[[0.1, 0.0]], [[0.0, 0.2]], [[np.nan, 0.0]], [[np.inf, 0.0]]])
+    result = np.array([[[0.1, 0.0]], [[0.0, 0.2]], [[np.nan, 0.0]], [[np.inf, 0.0]]])
     u = np.zeros((4, 1))
-    assert scores(found, truth, u, u).lost == 0.5
+    assert scores(result, truth, u, u).lost == 0.5
 
 
 def test_table_1_has_rows_claims_and_a_figure(

@@ -40,8 +40,8 @@ def test_two_static_sources_meet_the_limits_of_section_7(
     runs = make_tracker(array, TWO, doa=DOA + INWARDS, **params).run_batch(snapshots(array, DOA, s))
     assert rmse_deg(runs, constant(DOA, 6000), 3000) < limit
     if name in ("SNR 10", "SNR 30, λ .95"):
-        found = np.array([run.signals for run in runs])[:, 3000:]
-        nmse = (abs(found - s[:, 3000:]) ** 2).mean() / (abs(s[:, 3000:]) ** 2).mean()
+        result = np.array([run.signals for run in runs])[:, 3000:]
+        nmse = (abs(result - s[:, 3000:]) ** 2).mean() / (abs(s[:, 3000:]) ** 2).mean()
         assert 10 * np.log10(nmse) < (-13.0 if name == "SNR 10" else -32.5)
         wrong = np.array([run.coefficients[3000:] for run in runs]) - TWO.coefficient_matrix
         assert np.sqrt((wrong**2).mean()) < 0.03
@@ -109,8 +109,8 @@ def test_real_sources_are_received_with_half_of_the_noise() -> None:
 
     def nmse(motion: AutoregressiveSources) -> float:
         runs = make_tracker(array, motion, doa=DOA).run_batch(z)
-        found = np.array([run.signals for run in runs])[:, 1500:]
-        return float(10 * np.log10((abs(found - s[:, 1500:]) ** 2).mean()))
+        result = np.array([run.signals for run in runs])[:, 1500:]
+        return float(10 * np.log10((abs(result - s[:, 1500:]) ** 2).mean()))
 
     assert nmse(TWO) - nmse(real) == pytest.approx(2.8, abs=0.5)
 

@@ -61,5 +61,5 @@ def test_kalman_filter_with_the_real_manifold_estimates_signals() -> None:
     y = ArrayManifold(SensorArray.symmetric([0.25]), 1.0).transform(
         snapshots(symmetric_array(0.25), DOA, s)
     )
-    found = parts.signals(tracker.run(y.real).x)
-    assert 10 * np.log10((abs(found - s) ** 2).mean()) < -13.0
+    result = parts.signals(tracker.run(y.real).x)
+    assert 10 * np.log10((abs(result - s) ** 2).mean()) < -13.0

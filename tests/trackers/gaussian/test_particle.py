@@ -42,8 +42,8 @@ def test_particle_posterior_of_complex_snapshots_equals_grid() -> None:
     tracker = Particle(walk, CIRCLE, [-3.0], [[0.5]], n_particles=20000, rng=2)
     tracker.run(zs)
     expected = grid_posterior(zs, walk, -3.0, 0.5)
-    found = complex(tracker.weights @ np.exp(1j * tracker.particles[:, 0]))
-    assert abs(found - expected) < 0.02
+    result = complex(tracker.weights @ np.exp(1j * tracker.particles[:, 0]))
+    assert abs(result - expected) < 0.02
     assert abs(np.exp(1j * tracker.x[0]) - expected / abs(expected)) < 0.05
 
 

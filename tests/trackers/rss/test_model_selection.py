@@ -103,8 +103,8 @@ def test_local_search_removes_a_superfluous_source() -> None:
     fit = Candidate(
         JointPosterior(model.propagation, xi, 1 / model.variance, prior), u, split
     ).refitted()
-    found = best_model([fit], new)
-    assert len(found.u) == 3
+    result = best_model([fit], new)
+    assert len(result.u) == 3
     assert local_search(fit, new, same_number=True).theta.shape == (4, 2)
 
 

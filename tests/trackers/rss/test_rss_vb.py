@@ -131,8 +131,8 @@ def test_batch_with_missing_readings_equals_the_loop() -> None:
 
 def rms(case: Any, method: str, runs: int = 60) -> float:
     trials = draws(case, runs, 1)
-    found = estimates(trials, method)
-    return scores(found.theta, trials.theta, found.u, trials.u).location_rms
+    result = estimates(trials, method)
+    return scores(result.theta, trials.theta, result.u, trials.u).location_rms
 
 
 def test_one_source_reaches_the_bound() -> None:

@@ -49,10 +49,10 @@ def same(value: Any, expected: Any) -> None:
 
 def test_golden_readings_and_responsibilities() -> None:
     same(XI, [6.064946, 5.788684, 5.868353, 5.787123, 5.829661, 5.809926, 5.700325, 5.914332])
-    found = FIELD.levels(MU, START)
-    same(found.log_sigma, [5.96198, 5.838962, 6.052577, 5.779475, 5.882808, 5.845435, 5.866214,
+    result = FIELD.levels(MU, START)
+    same(result.log_sigma, [5.96198, 5.838962, 6.052577, 5.779475, 5.882808, 5.845435, 5.866214,
                            5.764477])  # fmt: skip
-    same(found.responsibilities, [
+    same(result.responsibilities, [
         [0.736627, 0.523392, 0.180749, 0.408127, 0.690407, 0.304914, 0.24442, 0.591051],
         [0.197076, 0.391818, 0.763941, 0.496371, 0.231922, 0.611387, 0.675289, 0.310539],
     ])  # fmt: skip
@@ -60,43 +60,43 @@ def test_golden_readings_and_responsibilities() -> None:
 
 
 def test_golden_jacobi_iteration() -> None:
-    found = golden(sweep="jacobi", damping=1.0, line_search=False, max_iterations=1)
-    same(found.u, [9.220093, 9.094960])
-    same(1 / found.w, [0.002455, 0.002446])
-    same(found.theta, [(17.365096, 18.005596), (34.745842, 35.767836)])
-    same(inverse_2x2(found.P), [[(5.764337, -1.158485), (-1.158485, 4.992632)],
+    result = golden(sweep="jacobi", damping=1.0, line_search=False, max_iterations=1)
+    same(result.u, [9.220093, 9.094960])
+    same(1 / result.w, [0.002455, 0.002446])
+    same(result.theta, [(17.365096, 18.005596), (34.745842, 35.767836)])
+    same(inverse_2x2(result.P), [[(5.764337, -1.158485), (-1.158485, 4.992632)],
                                 [(7.692249, -0.421781), (-0.421781, 6.348430)]])  # fmt: skip
 
 
 @pytest.mark.parametrize("settings", [{}, {"sweep": "jacobi", "damping": 0.5}])
 def test_golden_fixed_point(settings: dict[str, Any]) -> None:
-    found = golden(max_iterations=800 if settings else 300, **settings)
-    same(found.u, [9.284684, 9.059046])
-    same(found.theta, [(18.069962, 20.878713), (41.402592, 36.511710)])
-    same(1 / found.w, [0.001860, 0.003563])
-    same(inverse_2x2(found.P), [[(4.694445, -0.527914), (-0.527914, 4.332690)],
+    result = golden(max_iterations=800 if settings else 300, **settings)
+    same(result.u, [9.284684, 9.059046])
+    same(result.theta, [(18.069962, 20.878713), (41.402592, 36.511710)])
+    same(1 / result.w, [0.001860, 0.003563])
+    same(inverse_2x2(result.P), [[(4.694445, -0.527914), (-0.527914, 4.332690)],
                                 [(8.510042, -1.145833), (-1.145833, 7.993878)]])  # fmt: skip
-    same(found.log_posterior, -0.850739)
-    J = GOLDEN.information(FIELD.levels(found.u, found.theta))
+    same(result.log_posterior, -0.850739)
+    J = GOLDEN.information(FIELD.levels(result.u, result.theta))
     std = np.sqrt(np.diag(np.linalg.inv(J[0])))
     same(std, [0.130671, 0.194443, 3.376997, 2.763690, 4.606965, 3.786303])
 
 
 def test_golden_literal_refresh() -> None:
-    found = golden(sweep="jacobi", damping=1.0, refresh="literal", max_iterations=10)
-    same(found.u, [9.231220, 9.138542])
-    same(found.theta, [(17.289441, 20.130556), (39.245817, 35.421061)])
-    same(1 / found.w, [0.000226, 0.000297])
+    result = golden(sweep="jacobi", damping=1.0, refresh="literal", max_iterations=10)
+    same(result.u, [9.231220, 9.138542])
+    same(result.theta, [(17.289441, 20.130556), (39.245817, 35.421061)])
+    same(1 / result.w, [0.000226, 0.000297])
 
 
 def test_fixed_point_is_the_joint_maximum() -> None:
-    found = golden(max_iterations=400)
-    assert np.abs(GOLDEN.gradient(found.u, found.theta)).max() < 1e-9
+    result = golden(max_iterations=400)
+    assert np.abs(GOLDEN.gradient(result.u, result.theta)).max() < 1e-9
     one = JointPosterior(FIELD, XI[0], GOLDEN.W[0], PRIOR.select(0))
     for method, tolerance in (("lm", 1e-6), ("bfgs", 1e-2)):
         solver = MAPSolver(method, tolerance=1e-12)  # type: ignore[arg-type]
-        maximum = maximize(one, found.u[0], found.theta[0], solver)
-        np.testing.assert_allclose(maximum.theta, found.theta[0], atol=tolerance)
+        maximum = maximize(one, result.u[0], result.theta[0], solver)
+        np.testing.assert_allclose(maximum.theta, result.theta[0], atol=tolerance)
 
 
 # slopes against differences, for an exponent that is not 2
@@ -116,9 +116,9 @@ def test_gradient_of_the_joint_posterior_is_its_derivative() -> None:
 
 
 def test_gradient_and_hessian_of_the_position_cost_are_its_derivatives() -> None:
-    found = CURVED.propagation.levels(MU, START)
-    r = (CURVED.xi - found.log_sigma)[:, None]
-    c, log_range = 1.5 * found.responsibilities, found.offsets.log_range
+    result = CURVED.propagation.levels(MU, START)
+    r = (CURVED.xi - result.log_sigma)[:, None]
+    c, log_range = 1.5 * result.responsibilities, result.offsets.log_range
     cost = PositionCost.at(CURVED, c, r, log_range, slice(None))
     near = START + np.array([[-3.0, 4.0], [2.0, -5.0]])
     gradient, H = cost.derivatives(near, cost.evaluate(near))
@@ -146,11 +146,11 @@ def test_gradient_and_hessian_of_the_position_cost_are_its_derivatives() -> None
 def test_one_source_without_noise_is_linear_in_its_logarithms() -> None:
     quiet = FIELD._replace(log_noise=-np.inf)
     u, theta = np.array([[9.0]]), np.array([[[20.0, 20.0]]])
-    found = quiet.levels(u, theta)
+    result = quiet.levels(u, theta)
     far = quiet.levels(u + 0.7, theta + 15.0)
-    log_range = far.offsets.log_range - found.offsets.log_range
-    np.testing.assert_allclose(found.responsibilities, 1.0)
-    np.testing.assert_allclose(far.log_sigma, found.log_sigma + 0.7 - log_range[:, 0], atol=1e-12)
+    log_range = far.offsets.log_range - result.offsets.log_range
+    np.testing.assert_allclose(result.responsibilities, 1.0)
+    np.testing.assert_allclose(far.log_sigma, result.log_sigma + 0.7 - log_range[:, 0], atol=1e-12)
 
 
 def test_literal_covariance_shrinks_with_the_iterations() -> None:
@@ -171,10 +171,10 @@ def test_literal_covariance_shrinks_with_the_iterations() -> None:
 
 
 def test_factor_variances_are_smaller_than_the_joint_ones() -> None:
-    found = golden(max_iterations=100)
-    joint = marginals(GOLDEN.information(FIELD.levels(found.u, found.theta)))
-    assert (1 / found.w < joint.v).all()
-    wider = np.linalg.eigvalsh(joint.Sigma - inverse_2x2(found.P))
+    result = golden(max_iterations=100)
+    joint = marginals(GOLDEN.information(FIELD.levels(result.u, result.theta)))
+    assert (1 / result.w < joint.v).all()
+    wider = np.linalg.eigvalsh(joint.Sigma - inverse_2x2(result.P))
     assert (wider > 0).all()
 
 
@@ -188,9 +188,9 @@ def test_iterations_with_line_search_never_end_below_their_start() -> None:
 def test_readings_without_weight_leave_the_prior() -> None:
     missing = GOLDEN._replace(W=np.zeros((1, 8)))
     solver = VariationalSolver(max_iterations=60, **EXACT)
-    found = variational_posterior(missing, MU + 1, START + 9.0, solver)
-    np.testing.assert_allclose(found.theta, START, atol=1e-6)
-    np.testing.assert_allclose(found.u, MU, atol=1e-9)
+    result = variational_posterior(missing, MU + 1, START + 9.0, solver)
+    np.testing.assert_allclose(result.theta, START, atol=1e-6)
+    np.testing.assert_allclose(result.u, MU, atol=1e-9)
 
 
 def test_update_of_a_state_is_the_kalman_filters() -> None:

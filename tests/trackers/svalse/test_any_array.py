@@ -37,8 +37,8 @@ def short(seed: int = 0, n_steps: int = 4, **numbers: Any) -> Trial:
 
 
 def total(trial: Trial, run: Run) -> float:
-    truth, found = np.rad2deg(trial.truth), np.rad2deg(run.doa)
-    return mean_gospa(truth, found, c=10.0, period=360.0).total
+    truth, result = np.rad2deg(trial.truth), np.rad2deg(run.doa)
+    return mean_gospa(truth, result, c=10.0, period=360.0).total
 
 
 def wrapped(angle: Any) -> Float:
@@ -130,8 +130,8 @@ def test_fourier_and_electrical_form_of_a_line_agree(reference: Any) -> None:
         a, b = one.estimate(step), other.estimate(step)
         order, other_order = np.argsort(a.doa), np.argsort(b.doa)  # type: ignore[attr-defined]
         for name, rtol in (("doa", 5e-3), ("std", 0.1), ("amplitude", 0.02)):
-            found, expected = getattr(b, name)[other_order], getattr(a, name)[order]
-            np.testing.assert_allclose(found, expected, rtol=rtol)
+            result, expected = getattr(b, name)[other_order], getattr(a, name)[order]
+            np.testing.assert_allclose(result, expected, rtol=rtol)
 
 
 def test_whole_posterior_and_von_mises_density_of_a_line_agree() -> None:
@@ -148,8 +148,8 @@ def test_amplitudes_reproduce_the_snapshot() -> None:
     z = snapshots_of(model, [[0.3, -2.0]], noise=1e-8)[0]
     tracker = VALSE(model, solver=NewtonSolver(tolerance=1e-8))
     tracker.update(z)
-    found = tracker.estimate
-    np.testing.assert_allclose(found.amplitude @ model.steering_vector(found.doa), z, atol=1e-3)
+    result = tracker.estimate
+    np.testing.assert_allclose(result.amplitude @ model.steering_vector(result.doa), z, atol=1e-3)
 
 
 # -- detected sources ------------------------------------------------------------------------------
@@ -216,19 +216,19 @@ def test_one_frequency_a_step_is_ambiguous_until_others_follow() -> None:
         "von_mises": {"engine": "coordinate"},
         "posterior": {"memory": "posterior"},
     }
-    found: dict[str, list[float]] = {form: [] for form in forms}
+    result: dict[str, list[float]] = {form: [] for form in forms}
     scene = create("grating", n_bins=10, hopping=True, n_steps=25)
     for seed in range(2):
         trial = scene.sample(np.random.default_rng(seed))
-        for form, totals in found.items():
+        for form, totals in result.items():
             run = trial.tracker(
                 "svalse", solver=NewtonSolver(max_iterations=60), **forms[form]
             ).run(trial.measurements)
             late = mean_gospa(np.rad2deg(trial.truth[10:]), np.rad2deg(run.doa[10:]), c=10.0)
             totals.append(late.total)
-    assert np.mean(found["fast"]) < 1.0
-    assert np.mean(found["posterior"]) < 4.0
-    assert np.mean(found["posterior"]) <= np.mean(found["von_mises"]) + 1.0
+    assert np.mean(result["fast"]) < 1.0
+    assert np.mean(result["posterior"]) < 4.0
+    assert np.mean(result["posterior"]) <= np.mean(result["von_mises"]) + 1.0
 
 
 def test_several_frequencies_resolve_the_ambiguity_at_once() -> None:

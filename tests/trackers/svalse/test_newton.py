@@ -125,7 +125,7 @@ def test_divergence_equals_the_integral_of_its_definition() -> None:
 
 @settings(deadline=None, max_examples=20)
 @given(st.integers(0, 10**6), st.booleans(), st.sampled_from([0.003, 0.01, 0.1, 0.5]))
-def test_newton_step_never_decreases_the_objective(seed: int, learn: bool, nu: float) -> None:
+def test_newton_step_never_decreases_the_objective(seed: int, estimate_nu: bool, nu: float) -> None:
     rng, response = np.random.default_rng(seed), ExpectedResponse(MODEL.manifold())
     state = scene(seed)
     components = state.components.copy()
@@ -133,7 +133,7 @@ def test_newton_step_never_decreases_the_objective(seed: int, learn: bool, nu: f
     state = evaluation_of(response, state.Y, components, nu)
     F = [state.F[0]]
     for _ in range(15):
-        state = newton_step(response, state, np.array([learn]))
+        state = newton_step(response, state, np.array([estimate_nu]))
         F.append(state.F[0])
     assert np.diff(F).min() > -1e-6
     assert F[-1] > F[0]
@@ -219,10 +219,12 @@ def test_unused_slots_and_other_problems_have_no_effect() -> None:
     y = np.concatenate([state.Y for state in states])
     nu, tau = np.full((3, 1), 0.01), np.full((3, 1), 0.2)
     batch = evaluate(response, y, components, K, nu, tau, np.zeros(3))
-    learn = np.array([True, False, True])
+    estimate_nu = np.array([True, False, True])
     for _ in range(4):
-        batch = newton_step(response, batch, learn)
-        states = [newton_step(response, state, learn[i : i + 1]) for i, state in enumerate(states)]
+        batch = newton_step(response, batch, estimate_nu)
+        states = [
+            newton_step(response, state, estimate_nu[i : i + 1]) for i, state in enumerate(states)
+        ]
         for i, (state, k) in enumerate(zip(states, K, strict=True)):
             assert batch.F[i] == pytest.approx(state.F[0], abs=1e-9)
             np.testing.assert_allclose(

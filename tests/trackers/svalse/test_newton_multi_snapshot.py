@@ -20,7 +20,7 @@ from arrivals.trackers.svalse.newton.candidates import (
     CandidateGrid,
     first_duplicate,
     grid_evidence,
-    relearning_gains,
+    reestimation_gains,
     removal_gains,
 )
 from arrivals.trackers.svalse.newton.elbo import Components, Evaluation, evaluate
@@ -153,10 +153,10 @@ def test_addition_changes_the_evidence_by_its_gain(model: ArraySnapshot) -> None
         assert change == pytest.approx(gain[g], rel=1e-6, abs=1e-6)
 
 
-def test_relearning_gains_are_not_negative() -> None:
+def test_reestimation_gains_are_not_negative() -> None:
     for seed in range(4):
         response, state = scene(SEVERAL, seed)
-        assert (relearning_gains(response, state) >= 0).all()
+        assert (reestimation_gains(response, state) >= 0).all()
 
 
 @pytest.mark.parametrize(
@@ -185,7 +185,7 @@ def test_first_duplicate_across_pi_and_of_ambiguous_angles(
 @settings(deadline=None, max_examples=25)
 @given(st.sampled_from(MODELS), st.integers(0, 10**6), st.booleans())
 def test_newton_step_never_decreases_the_objective(
-    model: ArraySnapshot, seed: int, learn: bool
+    model: ArraySnapshot, seed: int, estimate_nu: bool
 ) -> None:
     response, state = scene(model, seed)
     components = state.components.copy()
@@ -193,7 +193,7 @@ def test_newton_step_never_decreases_the_objective(
     state = again(response, state, components)
     F = [state.F[0]]
     for _ in range(10):
-        state = newton_step(response, state, np.array([learn]))
+        state = newton_step(response, state, np.array([estimate_nu]))
         F.append(state.F[0])
     assert np.diff(F).min() > -1e-6
     assert F[-1] > F[0]

@@ -75,9 +75,9 @@ def test_amplitudes_reproduce_the_snapshot(reference: Reference) -> None:
     y = tone([-0.6, 0.1, 0.9], noise=1e-8, model=model)[0]
     tracker = VALSE(model, reference=reference, solver=NewtonSolver(tolerance=1e-8))
     tracker.update(y)
-    found = tracker.estimate
-    a = model.array.steering_vector(found.doa, 1.0)
-    np.testing.assert_allclose(found.amplitude @ a, y, atol=1e-3)
+    result = tracker.estimate
+    a = model.array.steering_vector(result.doa, 1.0)
+    np.testing.assert_allclose(result.amplitude @ a, y, atol=1e-3)
 
 
 @pytest.mark.parametrize("scale", [1e-200, 1e-130, 1e130, 1e200])

@@ -127,10 +127,10 @@ def test_floors_of_power_and_noise_hold() -> None:
     power = (np.abs(z) ** 2).mean(axis=(1, 2))
     assert (tracker.bin_noise >= 0.1 * power * (1 - 1e-9)).all()
     weak = snapshots_of(SEVERAL, [[0.3]], noise=3.0, seed=1)[0]
-    for floor, found in ((0.0, True), (1e3, False)):
+    for floor, result in ((0.0, True), (1e3, False)):
         tracker = VALSE(SEVERAL, solver=NewtonSolver(power_floor=floor))
         tracker.update(weak)
-        assert (tracker.estimate.n_found > 0) is found
+        assert (tracker.estimate.n_found > 0) is result
 
 
 def test_noise_of_many_snapshots_is_that_of_the_small_eigenvalues() -> None:
@@ -160,11 +160,11 @@ def test_gospa_equals_the_specification(
     """Over six seeds 4.3, 10.7, 4.3, 0.20 and 2.0; the last limit is of whole posteriors."""
     draws = [create(scenario, **numbers).sample(np.random.default_rng(n)) for n in range(4)]
     runs = draws[0].tracker("svalse").run_batch([trial.measurements for trial in draws])
-    found = [
+    result = [
         mean_gospa(np.rad2deg(t.truth), np.rad2deg(run.doa), c=10.0, period=360.0).total
         for t, run in zip(draws, runs, strict=True)
     ]
-    assert np.mean(found) < limit
+    assert np.mean(result) < limit
 
 
 # -- caches, and arrays of few valid sensors ------------------------------------------------------

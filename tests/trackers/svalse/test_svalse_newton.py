@@ -280,11 +280,11 @@ def test_predicted_widths_equal_those_of_a_step_in_direction() -> None:
 def test_kl_weight_trades_missed_for_false_sources() -> None:
     draws = trials("svalse_scenario1", range(1, 4), 0.0, n_steps=30)
     data = [trial.measurements for trial in draws]
-    found = []
+    result = []
     for kl_weight in (0.0, 0.5, 1.0):
         tracker = SVALSE(LINE, ELECTRICAL, solver=NewtonSolver(kl_weight=kl_weight))
-        found.append(np.mean([run.n_found.mean() for run in tracker.run_batch(data)]))
-    assert found[0] > found[1] > found[2]
+        result.append(np.mean([run.n_found.mean() for run in tracker.run_batch(data)]))
+    assert result[0] > result[1] > result[2]
 
 
 def test_existence_of_detected_components_is_above_one_half() -> None:
@@ -300,5 +300,5 @@ def test_active_components_are_detected() -> None:
     fit = NewtonSolver(merge=0.0, snr_db=None).solve(y[None, :, None], manifold, None)
     tracker = VALSE(LINE)
     tracker.update(y)
-    found: Float = manifold.to_doa(fit.theta[detected(manifold, fit)])
-    np.testing.assert_allclose(found, tracker.estimate.doa)
+    result: Float = manifold.to_doa(fit.theta[detected(manifold, fit)])
+    np.testing.assert_allclose(result, tracker.estimate.doa)

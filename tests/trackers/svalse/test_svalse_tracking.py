@@ -47,14 +47,14 @@ def test_prediction_equals_that_of_the_motion_model() -> None:
 def test_missing_measurements_widen_the_belief_until_the_source_ends() -> None:
     tracker = SVALSE(LINE)
     tracker.run(tone([[0.3]] * 3, 1e-3))
-    std, found = [], []
+    std, result = [], []
     for _ in range(4):
         tracker.predict()
         tracker.update(None)
-        found.append(tracker.estimate.n_found)
+        result.append(tracker.estimate.n_found)
         std += tracker.estimate.std.tolist()
-        assert tracker.estimate.label.tolist() == [0] * found[-1]
-    assert found == [1, 1, 0, 0]  # existence 0.75, 0.5875, 0.48
+        assert tracker.estimate.label.tolist() == [0] * result[-1]
+    assert result == [1, 1, 0, 0]  # existence 0.75, 0.5875, 0.48
     assert np.diff(std).min() > 0
 
 
@@ -88,7 +88,7 @@ def test_certain_births_and_deaths_are_allowed(
 def test_certain_birth_is_the_limit_of_probable_birth() -> None:
     """Coordinate ascent, the paper's form; Fig. 7 (d) has a probability of 1."""
     trial = short(5, 5, "svalse_fig6")
-    found = [
+    result = [
         SVALSE(
             LINE,
             BernoulliVonMises(p_activate=p),
@@ -97,7 +97,7 @@ def test_certain_birth_is_the_limit_of_probable_birth() -> None:
         .run(trial.measurements[:3]).doa
         for p in (1.0, 1 - 1e-12)
     ]  # fmt: skip
-    assert found[0] == pytest.approx(found[1], abs=1e-3, nan_ok=True)
+    assert result[0] == pytest.approx(result[1], abs=1e-3, nan_ok=True)
 
 
 def test_crossing_sources_are_merged_into_one_while_they_are_too_near() -> None:

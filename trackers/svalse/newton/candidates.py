@@ -89,7 +89,7 @@ def removal_gains(response: ExpectedResponse, evaluation: Evaluation, kl_weight:
     return np.where(used, gain, -np.inf)
 
 
-def relearning_gains(response: ExpectedResponse, evaluation: Evaluation) -> Float:
+def reestimation_gains(response: ExpectedResponse, evaluation: Evaluation) -> Float:
     """Return the further increase of F after each removal if ν is updated again, (B, L).
 
     A bin of d' degrees of freedom without the component, whose noise would be x times ν, gains

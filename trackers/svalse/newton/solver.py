@@ -40,7 +40,7 @@ from arrivals.trackers.svalse.noise_initialization import noise_floor, power_flo
 from arrivals.typing import Complex
 from arrivals.validation import instance, probability
 
-FILL_SHARE = 0.5  # components added before the noise is learned: of the sensors of a filled line
+FILL_SHARE = 0.5  # components added before the noise is estimated, per sensor of a filled line
 GRID_POINTS_PER_SENSOR = 4  # angles at which components may be added
 
 
@@ -159,7 +159,7 @@ class NewtonSolver(SolverSettings):
     def _solve(self, steps: list[StepInput], search: SupportSearch) -> list[ComponentPosterior]:
         """Alternate Newton steps and changes of the support until neither gains.
 
-        The support search fills, learns, merges, removes, adds and finishes, in that order.
+        The support search fills, estimates variances, merges, removes, adds and finishes, in that order.
         """
         state = initial_state(
             steps, search.response, self, len(search.grid.theta), search.n_components
@@ -182,7 +182,7 @@ class NewtonSolver(SolverSettings):
     def advance(self, search: SupportSearch, state: SolverState) -> None:
         """Take one Newton step in every problem; those with a large gain take another."""
         before = state.evaluation.F
-        state.evaluation = newton_step(search.response, state.evaluation, state.learn)
+        state.evaluation = newton_step(search.response, state.evaluation, state.estimate_nu)
         state.iterations = state.iterations + 1
         gain = np.abs(state.evaluation.F - before)
         steps = np.where(
@@ -254,5 +254,5 @@ def support_search(
         n_components=n,
         max_active=min(n, M - 1),
         fill_target=min(int(np.ceil(round(FILL_SHARE * response.extent, 6))), n, M - 1),
-        relearn=n_all > 1 or manifold.coefficients is not None,
+        reestimate=n_all > 1 or manifold.coefficients is not None,
     )

@@ -103,7 +103,7 @@ class SolverState(BatchRecord):
         Prior log odds of a new component.
     estimate_rho : ndarray of bool, shape (B,)
         True if ρ is estimated, since no component is tracked.
-    filling, finished, done, on_trial, learn : ndarray of bool, shape (B,)
+    filling, finished, done, on_trial, estimate_nu : ndarray of bool, shape (B,)
         In the fill stage; final steps taken; solved; components on trial; variances updated.
     steps_remaining : ndarray of int, shape (B,)
         Newton steps until the next change of the support.
@@ -128,7 +128,7 @@ class SolverState(BatchRecord):
     finished: Bool
     done: Bool
     on_trial: Bool
-    learn: Bool
+    estimate_nu: Bool
     steps_remaining: Int
     tolerance: Float
     record: Float
@@ -179,7 +179,7 @@ def initial_state(
     return SolverState(
         problem=np.arange(B), evaluation=evaluation, saved=evaluation, removed=removed, n_known=K,
         log_odds_new=log_odds(rho), estimate_rho=estimate_rho, filling=~off, finished=off.copy(),
-        done=off.copy(), on_trial=off.copy(), learn=off.copy(), steps_remaining=zero.copy(),
+        done=off.copy(), on_trial=off.copy(), estimate_nu=off.copy(), steps_remaining=zero.copy(),
         tolerance=np.zeros(B), record=np.full(B, -np.inf), before=nan.copy(), rejected=nan.copy(),
         snr_db=snr, iterations=zero.copy(), n_changes=zero.copy(),
     )  # fmt: skip

@@ -25,14 +25,17 @@ BACKTRACKING = ((1 / 4, 1.0), (1 / 16, 1.0), (1 / 64, 1.0), (1 / 16, 1 / 16), (1
 MIN_RELATIVE_CURVATURE = 1e-3  # smaller eigenvalues are clipped to this fraction of the largest
 
 
-def newton_step(response: ExpectedResponse, evaluation: Evaluation, learn: Bool) -> Evaluation:
-    """Take one Newton step, and update ν and τ in the rows of `learn`; the ELBO never decreases.
+def newton_step(
+    response: ExpectedResponse, evaluation: Evaluation, estimate_nu: Bool
+) -> Evaluation:
+    """Take one Newton step, then update ν and τ in some rows; the ELBO never decreases.
 
     Parameters
     ----------
     response : ExpectedResponse
     evaluation : Evaluation
-    learn : ndarray of bool, shape (B,)
+    estimate_nu : ndarray of bool, shape (B,)
+        Rows in which ν and τ are updated.
     """
     v, P = weights(evaluation)
     g, curvature = slopes(response, evaluation, v, P)  # (33)
@@ -44,8 +47,8 @@ def newton_step(response: ExpectedResponse, evaluation: Evaluation, learn: Bool)
     if any_set(worse):
         shorter = backtrack(response, evaluation.select(worse), d[worse], s[worse])
         best = best.replace_rows(worse, shorter)
-    if any_set(learn):
-        best = best.replace_rows(learn, update_variances(response, best.select(learn)))
+    if any_set(estimate_nu):
+        best = best.replace_rows(estimate_nu, update_variances(response, best.select(estimate_nu)))
     return best
 
 

@@ -12,7 +12,7 @@ from arrivals.trackers.svalse.newton.candidates import (
     CandidateGrid,
     add_candidates,
     first_duplicate,
-    relearning_gains,
+    reestimation_gains,
     removal_gains,
 )
 from arrivals.trackers.svalse.newton.elbo import Components, evaluate
@@ -71,7 +71,7 @@ class SupportSearch:
         Components whose activity is estimated.
     max_active, fill_target : int
         Largest number of active components, and that of the fill stage.
-    relearn : bool
+    reestimate : bool
         True if the gain of a removal includes that of updating the noise.
     """
 
@@ -84,7 +84,7 @@ class SupportSearch:
     n_components: int
     max_active: int
     fill_target: int
-    relearn: bool
+    reestimate: bool
 
     def next_change(self, state: SolverState) -> None:
         """Accept or reject the trial components, then set the next change and Newton steps."""
@@ -111,7 +111,7 @@ class SupportSearch:
         if any_set(better):
             state.record = np.where(better, now, state.record)
             count_change(state, better)
-            remember(state, better)
+            assign_slots(state, better)
         if any_set(worse):
             state.evaluation = state.evaluation.replace_rows(worse, state.saved.select(worse))
             state.rejected = np.where(worse, state.evaluation.F, state.rejected)
@@ -134,8 +134,8 @@ class SupportSearch:
         if not any_set(rows):
             return rows
         gains = removal_gains(self.response, state.evaluation, self.kl_weight)
-        if self.relearn:
-            gains = gains + relearning_gains(self.response, state.evaluation)
+        if self.reestimate:
+            gains = gains + reestimation_gains(self.response, state.evaluation)
         k = gains.argmax(axis=1)
         rows = rows & (gains[np.arange(len(state)), k] > 0)
         if any_set(rows):
@@ -190,16 +190,16 @@ class SupportSearch:
         idle = idle & ~state.done
         filled = idle & state.filling
         if any_set(filled):
-            self.learn(state, filled)
+            self.end_fill_stage(state, filled)
         final = idle & ~filled
         if any_set(final):
             state.finished = state.finished | final
             self.set_steps(state, final, self.limits.final, self.tolerance)
 
-    def learn(self, state: SolverState, rows: Bool) -> None:
+    def end_fill_stage(self, state: SolverState, rows: Bool) -> None:
         """End the fill stage: from now on ν, τ and ρ are updated."""
         state.filling = state.filling & ~rows
-        state.learn = state.learn | rows
+        state.estimate_nu = state.estimate_nu | rows
         state.record = np.where(rows, -np.inf, state.record)
         state.rejected = np.where(rows, np.nan, state.rejected)
         estimated = rows & state.estimate_rho
@@ -248,7 +248,7 @@ def count_change(state: SolverState, rows: Bool) -> None:
     state.rejected = np.where(rows, np.nan, state.rejected)
 
 
-def remember(state: SolverState, rows: Bool) -> None:
+def assign_slots(state: SolverState, rows: Bool) -> None:
     """Assign slots of the memory to the components that passed their trial."""
     now, removed = state.evaluation, state.removed
     slot = now.components.slot
