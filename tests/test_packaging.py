@@ -59,7 +59,7 @@ def test_packages_are_mapped_to_their_folders() -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="links need a privilege there")
-def test_links_lead_to_the_folders() -> None:
+def test_links_point_to_the_folders() -> None:
     for name in FOLDERS:
         link = ROOT / "src" / "arrivals" / name
         assert link.is_symlink()

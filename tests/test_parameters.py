@@ -81,7 +81,7 @@ def test_set_params_reaches_a_nested_tracker() -> None:
         ({"solver__tolerance": 1e-3, "memory": "magic"}, ValueError, "memory must be one of"),
     ],
 )
-def test_refused_parameters_change_nothing(
+def test_refused_parameters_leave_the_object_unchanged(
     params: dict[str, Any], error: type[Exception], message: str
 ) -> None:
     tracker = SVALSE(SNAPSHOTS)
@@ -148,7 +148,7 @@ class Several(FrozenModel):
     parts: Any
 
 
-def test_list_of_parts_survives_the_round_trip() -> None:
+def test_list_of_parts_makes_the_round_trip() -> None:
     several = Several([VonMisesWalk(3.0), RandomWalk(q=0.5), 4])
     assert Several.from_dict(json.loads(json.dumps(several.to_dict()))) == several
 

@@ -57,7 +57,7 @@ def test_plugin_is_not_in_this_environment() -> None:
     assert "lag_one" not in available()
 
 
-def test_plugin_is_listed_found_and_created(python: Path, tmp_path: Path) -> None:
+def test_plugin_is_listed_imported_and_created(python: Path, tmp_path: Path) -> None:
     script = """
 import sys
 import arrivals.trackers

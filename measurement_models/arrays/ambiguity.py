@@ -35,7 +35,7 @@ def ambiguous_pair(waves: PlaneWaves) -> tuple[float, float] | None:
 
 
 def _pair_of_line(waves: PlaneWaves) -> tuple[float, float] | None:
-    """Search the difference of the sines, on which alone the coherence depends."""
+    """Search the difference of the sines, the only variable of the coherence."""
     x = waves.array.positions[:, 0]
     reach = waves.wavenumber.max() * max(waves.slowness or (1.0,)) * np.ptp(x)
     apart = np.linspace(0, 2, max(64, min(int(16 * reach), 1 << 16)) + 1)[1:]

@@ -144,7 +144,7 @@ def test_number_and_spectra_of_the_sources_are_set_by_the_model(
         (("--dtype", "int16"), ("requires samples from standard input",)),
     ],
 )
-def test_signals_invalid_argument_prints_one_line_and_writes_nothing(
+def test_signals_invalid_argument_prints_one_line_and_writes_no_file(
     more: tuple[str, ...], words: tuple[str, ...], scene: Path, tmp_path: Path,
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip

@@ -79,7 +79,7 @@ def test_narrowband_does_not_depend_on_the_block_size(
     assert_allclose(narrowband(samples, RATE, 440.0, 100, hop), at_once, atol=1e-12)
 
 
-def test_long_recordings_take_several_blocks() -> None:
+def test_long_recordings_are_read_in_several_blocks() -> None:
     delays = np.linspace(0, 1e-3, 8)
     samples = plane_wave(delays, 1000.0, n_samples=600_000).astype(np.float32)
     assert samples.size > 2 * narrowband_module.MAX_BLOCK

@@ -41,7 +41,7 @@ def numbers(study: Study) -> list[tuple[Any, ...]]:
     return [row[:5] for row in study.rows() if row.metric != "cpu_ms"]
 
 
-def test_study_with_a_killed_worker_gives_equal_numbers(
+def test_study_with_a_killed_worker_has_equal_numbers(
     cluster: tuple[Path, list[subprocess.Popen[bytes]]], tmp_path: Path
 ) -> None:
     from distributed import Client

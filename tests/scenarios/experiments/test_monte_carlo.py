@@ -28,7 +28,7 @@ def test_methods_share_draws_and_each_run_has_its_seed() -> None:
 
 
 @pytest.mark.parametrize("backend", ["threading", "loky"])
-def test_threads_and_processes_give_serial_numbers(backend: str) -> None:
+def test_threads_and_processes_equal_serial_numbers(backend: str) -> None:
     from joblib import parallel_config
 
     with parallel_config(backend=backend, n_jobs=2):

@@ -107,7 +107,7 @@ def test_set_params_restarts_only_if_the_state_changes_shape() -> None:
 
 @pytest.mark.parametrize("motion", [TWO, THREE], ids=["two", "three"])
 @pytest.mark.parametrize("distances", [(0.25,), (0.5, 1.5, 2.5)], ids=str)
-def test_acquisition_finds_directions_and_labels(
+def test_acquisition_estimates_directions_and_labels(
     motion: AutoregressiveSources, distances: tuple[float, ...]
 ) -> None:
     doa = np.deg2rad([-35.0, 25.0, 5.0])[: motion.n_sources]

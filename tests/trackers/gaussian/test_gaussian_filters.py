@@ -100,7 +100,7 @@ def test_log_likelihoods_sum_to_that_of_all_measurements(kind: type[GaussianFilt
 
 
 @every_kind
-def test_partly_missing_measurement_equals_update_by_the_rest(
+def test_partly_missing_measurement_equals_update_by_the_valid_entries(
     kind: type[GaussianFilter],
 ) -> None:
     tracker, other = kind(WALK, POSITION, X, P), kind(WALK, POSITION, X, P)

@@ -48,7 +48,7 @@ def test_sizes_are_checked_where_entries_have_no_names(kind: type[GaussianFilter
         kind(unnamed, LinearMeasurement([[1.0, 0.0]], [[1.0]]), np.zeros(3), np.eye(3))
 
 
-def test_located_measurement_survives_set_params_and_configuration() -> None:
+def test_measurement_by_state_names_remains_after_set_params_and_configuration() -> None:
     tracker = EKF(WALK, BEARING, X, P)
     tracker.set_params(motion__q=1.0)
     assert tracker.measurement == BEARING.for_state(WALK.state_names)

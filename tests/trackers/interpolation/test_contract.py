@@ -48,7 +48,7 @@ def shapes(tracker: InterpolationEKF) -> dict[str, tuple[int, ...]]:
 
 
 @pytest.mark.parametrize("variant", list(VARIANTS))
-def test_d1_column_state_gives_the_same_numbers(variant: str) -> None:
+def test_d1_column_state_has_equal_results(variant: str) -> None:
     flat, column = made(variant), made(variant)
     column.x = column.x[:, None]
     for z in samples()[:12]:
@@ -256,7 +256,7 @@ def test_d9_batch_filter_equals_run_and_smoother_reduces_the_error() -> None:
 
 
 @pytest.mark.parametrize("again", [copy.deepcopy, lambda t: pickle.loads(pickle.dumps(t))])
-def test_d12_copies_continue_with_the_same_numbers(again: Any) -> None:
+def test_d12_copies_continue_with_equal_results(again: Any) -> None:
     tracker = made("E2", acquisition=5)
     tracker.run(samples()[:3])
     other = again(tracker)

@@ -37,7 +37,7 @@ TRUTH = np.array([[[18.0, 22.0], [44.0, 36.0]]])
 XI = MODEL.levels(db_to_neper([[81.0, 78.0]]), TRUTH).log_sigma
 
 
-def test_tracker_gives_the_golden_fixed_point_and_its_joint_covariance() -> None:
+def test_tracker_returns_the_golden_fixed_point_and_its_joint_covariance() -> None:
     for tracker in (
         RSSVB(STILL, MODEL, *INITIAL, solver=VariationalSolver(max_iterations=300, **EXACT)),
         RSSML(STILL, MODEL, *INITIAL, solver=MAPSolver(tolerance=1e-12)),

@@ -114,7 +114,7 @@ def window_moments(c: Complex) -> Complex | None:
 
 
 def top_mode(c: Complex) -> tuple[Complex, complex]:
-    """Return the highest mode alone, as one von Mises density of its curvature.
+    """Return the highest mode as one von Mises density of its curvature.
 
     It initializes new components, whose density the next iterations sharpen anyway.
 

@@ -78,7 +78,7 @@ class MultiSnapshotAmplitudes(GreedySupport):
         self.C[:], self.W[:] = 0, 0
 
     def reset_gains(self) -> None:
-        """Compute anew what `flip` keeps up to date: Z = H - J W and g = ν/v, for zero W."""
+        """Recompute the quantities that `flip` updates: Z = H - J W and g = ν/v, for zero W."""
         self.Z[:] = self.H
         np.add(self.norm, (self.nu / self.tau)[:, None], out=self.g)
         with np.errstate(divide="ignore"):

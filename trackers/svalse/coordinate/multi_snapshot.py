@@ -155,7 +155,7 @@ class MultiSnapshotAscent(MultiSnapshotAmplitudes):
         return reference
 
     def initialize_component(self, k: int, residual: Complex) -> None:
-        """Set a new component to the density given by its residual alone, its power known."""
+        """Set a new component to the density given its residual, with known power."""
         c = self.spectrum(residual)
         if self.is_simple:
             moments, self.mean[k] = top_mode(c[0])

@@ -101,7 +101,7 @@ class GreedySupport(ABC):
 
     @abstractmethod
     def reset_gains(self) -> None:
-        """Compute anew what `flip` keeps up to date, for zero amplitudes."""
+        """Recompute the quantities that `flip` updates, for zero amplitudes."""
 
     @abstractmethod
     def gains(self) -> Float:

@@ -159,7 +159,8 @@ class NewtonSolver(SolverSettings):
     def _solve(self, steps: list[StepInput], search: SupportSearch) -> list[ComponentPosterior]:
         """Alternate Newton steps and changes of the support until neither gains.
 
-        The support search fills, estimates variances, merges, removes, adds and finishes, in that order.
+        The support search fills, estimates ν and τ, merges, removes, adds and finishes, in that
+        order.
         """
         state = initial_state(
             steps, search.response, self, len(search.grid.theta), search.n_components
