@@ -58,5 +58,5 @@ TRACKERS: list[tuple[str, MakeTracker, Measurements]] = [
         ),
         with_gaps(SPEECH, 21),
     ),
-    ("ar_kalman_qrd_rls", lambda: ARKalmanQRDRLS(SNAPSHOT, interval=20), with_gaps(RAGGED, 150)),
+    ("ar_kalman_qrd_rls", lambda: ARKalmanQRDRLS(SNAPSHOT, interval=20), with_gaps(RAGGED, 70)),
 ]

@@ -39,7 +39,7 @@ TRACKERS: list[tuple[str, MakeTracker, Measurements]] = [
             lambda v=v: InterpolationEKF(TONE.measurement, variant=v, doa=0.9, acquisition=6),
             with_gaps(TONE),
         )
-        for v in ("B", "Bw", "C", "D", "E", "E2", "phasor")
+        for v in ("B", "C", "D", "E2", "phasor")
     ],
     *[
         (
@@ -49,7 +49,7 @@ TRACKERS: list[tuple[str, MakeTracker, Measurements]] = [
             ),
             with_gaps(BAND),
         )
-        for v in ("C", "D", "E", "E2")
+        for v in ("D", "E")
     ],
     ("mvdr", lambda: MVDR(SNAPSHOT), complex_snapshots(SNAPSHOT)),
     ("mvdr", lambda: MVDR(CIRCLE, max_sources=2), complex_snapshots(CIRCLE)),

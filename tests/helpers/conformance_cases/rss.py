@@ -36,18 +36,19 @@ X5 = np.insert(X4, 4, 0.01, axis=1)
 
 TRACKERS: list[tuple[str, MakeTracker, Measurements]] = [
     ("rss_vb", lambda: RSSVB(WALK, STILL, **START), readings(STILL)),
-    ("rss_vb", lambda: RSSVB(DRIVE, MOVING, X4, P4, correlation_time=4.0), readings(MOVING)),
+    (
+        "rss_vb",
+        lambda: RSSVB(
+            DRIVE, MOVING, X4, P4, correlation_time=4.0, solver=VariationalSolver(sweep="jacobi")
+        ),
+        readings(MOVING),
+    ),
     (
         "rss_vb",
         lambda: RSSVB(
             CoordinatedTurn(0.1, 0.001), MOVING, X5, np.diag([50.0, 2.0, 50.0, 2.0, 0.01])
         ),
         readings(MOVING),
-    ),
-    (
-        "rss_vb",
-        lambda: RSSVB(WALK, STILL, **START, solver=VariationalSolver(sweep="jacobi")),
-        readings(STILL),
     ),
     (
         "rss_vb",
@@ -59,7 +60,6 @@ TRACKERS: list[tuple[str, MakeTracker, Measurements]] = [
         ),
         readings(STILL),
     ),
-    ("rss_vb", lambda: RSSVB(DRIVE, MOVING, P0=P4, n_sources=2), readings(MOVING)),
     ("rss_vb", lambda: RSSVB(WALK, STILL, search=GridSearch(max_sources=4)), readings(STILL)),
     (
         "rss_vb",
@@ -69,12 +69,7 @@ TRACKERS: list[tuple[str, MakeTracker, Measurements]] = [
     ("rss_ml", lambda: RSSML(WALK, STILL, **START), readings(STILL)),
     (
         "rss_ml",
-        lambda: RSSML(WALK, STILL, **START, solver=MAPSolver(method="bfgs")),
-        readings(STILL),
-    ),
-    (
-        "rss_ml",
-        lambda: RSSML(DRIVE, MOVING, X4, P4, solver=MAPSolver(prior=False)),
+        lambda: RSSML(DRIVE, MOVING, X4, P4, solver=MAPSolver(method="bfgs", prior=False)),
         readings(MOVING),
     ),
     ("rss_ml", lambda: RSSML(WALK, STILL, n_sources=2), readings(STILL)),
