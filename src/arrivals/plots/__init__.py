@@ -1,1 +1,7 @@
 """Plots of tracks, arrays, maps and studies."""
+
+from arrivals.plots.bearing_time import plot_array, plot_bearing_time
+from arrivals.plots.maps import plot_map
+from arrivals.plots.study import plot_metric
+
+__all__ = ["plot_array", "plot_bearing_time", "plot_map", "plot_metric"]
