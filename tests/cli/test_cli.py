@@ -211,7 +211,7 @@ def test_track_without_frequency_and_band_is_refused(
 def test_reproduce_writes_table_page_and_pictures(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    command = ["reproduce", "interpolation-table1", "--runs", "2", "--jobs", "2", "--out", "found"]
+    command = ["reproduce", "interpolation-table1", "--runs", "2", "--jobs", "1", "--out", "found"]
     assert main(command) == 0
     assert Path("found/interpolation-table1.csv").exists()
     assert Path("found/interpolation-table1.md").exists()

@@ -61,6 +61,7 @@ def test_study_writes_table_claims_and_figures(number: int, tmp_path: Path) -> N
 
 
 @pytest.mark.usefixtures("short")
+@pytest.mark.usefixtures("short")
 def test_sweep_is_computed_once_for_three_figures(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

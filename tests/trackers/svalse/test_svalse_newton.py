@@ -1,7 +1,6 @@
 """SVALSE and VALSE with the Newton solver, the default."""
 
 import copy
-import time
 from typing import Any
 
 import numpy as np
@@ -136,18 +135,6 @@ def test_power_step_of_40_db_is_a_transient_of_some_steps() -> None:
         late.append(mean_gospa(truth[12:], np.rad2deg(run.doa[12:]), c=10.0).total)
     assert np.mean(late) < 4.5
     assert np.mean(late) < np.mean(early)
-
-
-def test_time_is_at_most_a_tenth_of_coordinate_ascent() -> None:
-    """Interleaved, in the paper's form; the benchmark has the times themselves."""
-    z = trials("svalse_fig4", range(1, 2), n_steps=4)[0].measurements
-    paper: dict[str, Any] = {"solver": CoordinateSolver(tolerance=1e-5), "reference": "first"}
-    took = dict.fromkeys(("fast", "slow"), 0.0)
-    for form, tracker in (("fast", SVALSE(LINE)), ("slow", SVALSE(LINE, **paper))) * 2:
-        started = time.process_time()
-        tracker.run(z[:3])
-        took[form] += time.process_time() - started
-    assert took["slow"] > 10 * took["fast"]
 
 
 # -- the bound ----------------------------------------------------------------------------------
