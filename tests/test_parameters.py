@@ -218,7 +218,7 @@ def test_old_parameter_name_is_refused_with_the_new_one(kind: type[Drift]) -> No
         kind().replace(speed=2.0)
     with pytest.raises(ValueError, match=message):
         Drift.from_dict(kind().to_dict() | {"speed": 2.0})
-    with pytest.raises(TypeError, match="now called 'upper', a parameter of 'limits'"):
+    with pytest.raises(TypeError, match="it is now 'upper' of 'limits'"):
         kind(bound=2.0)  # type: ignore[call-arg]  # on purpose
     assert kind(3.0).q == 3.0
 

@@ -71,6 +71,11 @@ class ArraySamples(FrozenModel):
     kappa: float = field(init=False, repr=False, compare=False)
     grid_index: Int = field(init=False, repr=False, compare=False)
 
+    @property
+    def places(self) -> Int:
+        """The same as `grid_index`."""
+        return self.grid_index
+
     def __post_init__(self) -> None:
         instance("array", self.array, SensorArray)
         instance("correlation", self.correlation, SourceCorrelation)  # type: ignore[type-abstract]  # any

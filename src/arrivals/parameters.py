@@ -60,8 +60,8 @@ class Configurable:
         if name not in cls.renamed:
             return None
         part, nested, new = cls.renamed[name].rpartition("__")
-        owner = f", a parameter of {part!r}" if nested else ""
-        return f"{cls.__name__} has no parameter {name!r}: it is now called {new!r}{owner}"
+        place = f"it is now {new!r} of {part!r}" if nested else f"it is now called {new!r}"
+        return f"{cls.__name__} has no parameter {name!r}: {place}"
 
     @classmethod
     def param_names(cls) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +16,7 @@ from arrivals.motion_models.bessel import bessel_ratio, bessel_ratios
 from arrivals.trackers.direction_tracker import padded
 from arrivals.trackers.registry import register
 from arrivals.trackers.svalse.components import ComponentPosterior, ComponentPrior, Solver
+from arrivals.trackers.svalse.coordinate.solver import PosteriorName
 from arrivals.trackers.svalse.valse import (
     DEFAULT_SOLVER,
     VALSE,
@@ -54,6 +55,8 @@ class SVALSE(VALSE):
     engine : {"newton", "fast", "coordinate"}, optional
         Shorthand for a solver of that kind ("fast" is "newton") with those settings of `solver`
         that both kinds have; the attribute is None afterwards.
+    posterior : {"quadrature", "mixture"}, optional
+        Shorthand for that setting of a `CoordinateSolver`; the attribute is None afterwards.
     reference : {"middle", "first"}
         Sensor at which the amplitudes' phases are counted; "first" is the paper's.
     memory : {"von_mises", "posterior"}
@@ -111,6 +114,8 @@ class SVALSE(VALSE):
     moments: Complex
     nuisance: Float
 
+    renamed: ClassVar[dict[str, str]] = {"carry": "memory", "snr_db": "solver__snr_db"}
+
     def __init__(
         self,
         measurement: DirectionMeasurement,
@@ -118,12 +123,15 @@ class SVALSE(VALSE):
         *,
         solver: Solver = DEFAULT_SOLVER,
         engine: Engine | None = None,
+        posterior: PosteriorName | None = None,
         reference: Reference = "middle",
         memory: Memory = "von_mises",
     ) -> None:
         self.motion = instance("motion", motion, BernoulliVonMises)
         self.memory = one_of("memory", memory, ("von_mises", "posterior"))
-        super().__init__(measurement, solver=solver, engine=engine, reference=reference)
+        super().__init__(
+            measurement, solver=solver, engine=engine, posterior=posterior, reference=reference
+        )
 
     def reset(self) -> None:
         """Forget all components, labels and noise estimates."""

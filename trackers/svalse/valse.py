@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from typing import Any, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,7 +20,7 @@ from arrivals.trackers.svalse.components import (
     Solver,
     SolverSettings,
 )
-from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver
+from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver, PosteriorName
 from arrivals.trackers.svalse.newton.solver import NewtonSolver
 from arrivals.typing import Bool, Float, Int
 from arrivals.validation import instance, not_negative, one_of
@@ -47,6 +47,8 @@ class VALSE(BatchDirectionTracker):
     engine : {"newton", "fast", "coordinate"}, optional
         Shorthand for a solver of that kind ("fast" is "newton") with those settings of `solver`
         that both kinds have; the attribute is None afterwards.
+    posterior : {"quadrature", "mixture"}, optional
+        Shorthand for that setting of a `CoordinateSolver`; the attribute is None afterwards.
     reference : {"middle", "first"}
         Sensor at which the amplitudes' phases are counted. "first" is the paper's; with the
         middle one phase and angle are uncorrelated, which saves most of the iterations.
@@ -84,17 +86,24 @@ class VALSE(BatchDirectionTracker):
     array([-0.2,  0.5])
     """
 
+    renamed: ClassVar[dict[str, str]] = {
+        name: f"solver__{name}"
+        for name in ("tolerance", "max_iterations", "max_components", "power_floor", "max_snr_db")
+    } | {"kl": "solver__kl_weight", "temper": "solver__tempering", "merge": "solver__merge"}
+
     def __init__(
         self,
         measurement: DirectionMeasurement,
         *,
         solver: Solver = DEFAULT_SOLVER,
         engine: Engine | None = None,
+        posterior: PosteriorName | None = None,
         reference: Reference = "middle",
     ) -> None:
         protocol: type[Any] = DirectionMeasurement
         self.measurement: DirectionMeasurement = instance("measurement", measurement, protocol)
-        self.solver, self.engine = selected_solver(solver, engine), None
+        self.solver = selected_solver(solver, engine, posterior)
+        self.engine, self.posterior = None, None
         self.reference = one_of("reference", reference, ("middle", "first"))
         manifold = measurement.manifold(self.reference)
         self.solver.check(manifold, getattr(measurement, "n_snapshots", 1), self.n_moments)
@@ -190,8 +199,10 @@ class VALSE(BatchDirectionTracker):
         )
 
 
-def selected_solver(solver: Solver, engine: Engine | None) -> Solver:
-    """Return the solver, converted to the kind that `engine` names.
+def selected_solver(
+    solver: Solver, engine: Engine | None = None, posterior: PosteriorName | None = None
+) -> Solver:
+    """Return the solver, converted to the kind that `engine` names, with that posterior.
 
     Examples
     --------
@@ -200,13 +211,21 @@ def selected_solver(solver: Solver, engine: Engine | None) -> Solver:
     """
     if not hasattr(solver, "solve_batch"):
         raise TypeError(f"solver must be a NewtonSolver or a CoordinateSolver; got {solver!r}")
-    if engine is None:
+    if engine is not None:
+        one_of("engine", engine, ("newton", "fast", "coordinate"))
+        settings = instance("solver", solver, SolverSettings)
+        coordinate = engine == "coordinate"
+        solver = (
+            settings.converted(CoordinateSolver) if coordinate else settings.converted(NewtonSolver)
+        )
+    if posterior is None:
         return solver
-    one_of("engine", engine, ("newton", "fast", "coordinate"))
-    settings = instance("solver", solver, SolverSettings)
-    if engine == "coordinate":
-        return settings.converted(CoordinateSolver)
-    return settings.converted(NewtonSolver)
+    if not isinstance(solver, CoordinateSolver):
+        raise ValueError(
+            f"posterior must be None without coordinate ascent; got {posterior!r}: "
+            'pass engine="coordinate"'
+        )
+    return solver.replace(posterior=posterior)
 
 
 def warn_of_ambiguity(measurement: DirectionMeasurement) -> None:

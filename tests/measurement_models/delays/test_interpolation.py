@@ -270,3 +270,10 @@ def test_measurements_of_wrong_shape_are_refused() -> None:
 def test_array_without_common_neighbour_delay_is_refused(array: SensorArray, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         ArraySamples(array, 1.0, BAND)
+
+
+def test_places_of_sensors_are_their_grid_points() -> None:
+    samples = ArraySamples(
+        SensorArray.ula(4, spacing=0.5, speed=1000.0), 4000.0, correlation=Tones(0.25), snr_db=20.0
+    )
+    assert samples.places.tolist() == samples.grid_index.tolist() == [3, 2, 1, 0]

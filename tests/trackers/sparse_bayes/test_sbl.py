@@ -183,7 +183,7 @@ def test_solver_refuses_invalid_settings(params: dict[str, float], message: str)
 
 
 def test_old_settings_of_the_iteration_are_refused_with_the_new_names() -> None:
-    with pytest.raises(TypeError, match="now called 'max_iterations', a parameter of 'solver'"):
+    with pytest.raises(TypeError, match="it is now 'max_iterations' of 'solver'"):
         SSBL(LINE, max_iterations=3)  # type: ignore[call-arg]  # on purpose
     with pytest.raises(TypeError, match="'reach': it is now called 'n_neighbours'"):
         SSBL(LINE, reach=3)  # type: ignore[call-arg]  # on purpose

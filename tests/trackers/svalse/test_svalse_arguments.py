@@ -72,6 +72,28 @@ def test_engine_selects_a_solver_with_the_shared_settings() -> None:
     assert tracker.set_params(engine="fast").solver == NewtonSolver(tolerance=1e-3)
 
 
+def test_posterior_selects_that_of_coordinate_ascent() -> None:
+    tracker = SVALSE(LINE, engine="coordinate", posterior="mixture")
+    assert tracker.solver == CoordinateSolver(posterior="mixture")
+    assert tracker.posterior is None
+    with pytest.raises(ValueError, match="posterior must be None without coordinate ascent"):
+        SVALSE(LINE, posterior="mixture")
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("kl", "'kl_weight' of 'solver'"),
+        ("tolerance", "'tolerance' of 'solver'"),
+        ("carry", "called 'memory'"),
+    ],
+)
+def test_old_argument_is_refused_with_its_new_name(old: str, new: str) -> None:
+    arguments: dict[str, Any] = {old: 1.0}
+    with pytest.raises(TypeError, match=f"SVALSE has no parameter '{old}': it is now {new}"):
+        SVALSE(LINE, **arguments)
+
+
 def test_snapshots_of_the_wrong_shape_or_kind_leave_the_belief_unchanged() -> None:
     tracker = SVALSE(LINE)
     tracker.run(tone([[0.3]] * 2, 1e-3))
