@@ -13,6 +13,7 @@ from scipy.io import wavfile
 from arrivals.__main__ import main
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.scenarios.demos.swellex96 import demo
+from arrivals.scenarios.reproduce.interpolation import table_1
 from arrivals.trackers import available
 
 
@@ -209,8 +210,9 @@ def test_track_without_frequency_and_band_is_refused(
 
 
 def test_reproduce_writes_table_page_and_pictures(
-    here: Path, capsys: pytest.CaptureFixture[str]
+    here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(table_1, "ANGLES", (15.0, 30.0))
     command = ["reproduce", "interpolation-table1", "--runs", "2", "--jobs", "1", "--out", "found"]
     assert main(command) == 0
     assert Path("found/interpolation-table1.csv").exists()
