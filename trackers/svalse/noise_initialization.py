@@ -60,9 +60,6 @@ def initial_noise(y: Complex, grid_index: Int, snr_db: float | None) -> float:
     return max(float(smallest.mean()), NOISE_FLOOR * power / M)
 
 
-first_noise = initial_noise
-
-
 def noise_from_eigenvalues(Y: Complex) -> Float:
     """Return the noise of each bin, (n_bins,), by the smaller half of its covariance's eigenvalues.
 

@@ -228,14 +228,17 @@ def test_components_without_power_at_0_db_remain_and_the_step_is_reported() -> N
     Tracked components without a source share a variance τ that converges to zero, and with it the
     evidence against them: their prior odds of 3 to 1 keep them active at decreasing power.
     """
-    trial = create("svalse_scenario2", snr_db=0.0, n_steps=12).sample(np.random.default_rng(4))
+    trial = create("svalse_scenario2", snr_db=0.0, n_steps=20).sample(np.random.default_rng(4))
     tracker = trial.tracker("svalse", motion=BernoulliVonMises(), **COORDINATE)
-    run = tracker.set_params(solver__merge=0.0).run(trial.measurements)
-    starved = ~run.converged
-    assert starved.any()
-    assert run.iterations[starved].min() == 500
-    power = np.nansum(np.abs(run.amplitude[starved]) ** 2, axis=1) * 15
-    assert (power < 0.1 * run.noise[starved]).all()
+    runs = [
+        tracker.set_params(solver__merge=m).run_batch([trial.measurements])[0] for m in (0.0, 0.026)
+    ]
+    for run in runs:
+        starved = ~run.converged
+        assert starved.sum() >= 3
+        assert run.iterations[starved].min() == 500
+        power = np.nansum(np.abs(run.amplitude[starved]) ** 2, axis=1) * 15
+        assert (power < 0.1 * run.noise[starved]).all()
 
 
 # -- golden figures, small versions of benchmarks/svalse_figures.py ---------------------------
