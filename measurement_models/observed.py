@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.manifolds.manifold import Manifold
+from arrivals.measurements import LARGEST, SMALLEST
 from arrivals.typing import Bool, Complex, Float
-
-LARGEST, SMALLEST = 1e140, 1e-140  # magnitudes whose squares are finite and not zero
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,8 +1,9 @@
 """Trackers, their estimates, and the registry of trackers."""
 
+from arrivals.measurements import is_missing
 from arrivals.trackers.autoregressive.ar_kalman_qrd_rls import ARKalmanQRDRLS
 from arrivals.trackers.autoregressive.qrd_rls import QRDRLS
-from arrivals.trackers.base import Tracker, is_missing
+from arrivals.trackers.base import Tracker
 from arrivals.trackers.beamforming.cbf import CBF
 from arrivals.trackers.beamforming.mvdr import MVDR
 from arrivals.trackers.beamforming.spectrum import find_peaks, refine_peaks

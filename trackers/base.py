@@ -8,9 +8,9 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from typing import Any, Self
 
-import numpy as np
 from numpy.typing import ArrayLike
 
+from arrivals.measurements import rows
 from arrivals.parameters import Configurable
 from arrivals.trackers.estimates import Estimate
 from arrivals.trackers.run import Run, RunRecorder
@@ -100,7 +100,7 @@ class Tracker(Configurable, ABC):
         positive("dt", dt)
         recorder = RunRecorder(type(self.estimate))
         started = time.perf_counter()
-        for z in measurements:
+        for z in rows("measurements", measurements):
             self.predict(dt=dt)
             self.update(z)
             recorder.add(self.estimate, self.x)
@@ -125,7 +125,9 @@ class Tracker(Configurable, ABC):
         list of Run
             One per sequence.
         """
-        return [copy.deepcopy(self).run(sequence, dt) for sequence in measurements]
+        return [
+            copy.deepcopy(self).run(sequence, dt) for sequence in rows("measurements", measurements)
+        ]
 
     def set_params(self, **params: Any) -> Self:
         """Change parameters by name and keep the belief.
@@ -150,27 +152,3 @@ class Tracker(Configurable, ABC):
         for name in changed:
             setattr(self, name, getattr(checked, name))
         return self
-
-
-def is_missing(z: ArrayLike | None) -> bool:
-    """Return True if a measurement is missing: None, or all NaN.
-
-    Parameters
-    ----------
-    z : array_like or None
-        Measurement.
-
-    Returns
-    -------
-    bool
-        True if it is missing.
-
-    Examples
-    --------
-    >>> is_missing(None), is_missing(np.nan), is_missing([np.nan, 1.0])
-    (True, True, False)
-    """
-    if z is None:
-        return True
-    array = np.asarray(z)
-    return array.dtype.kind in "fc" and array.size > 0 and bool(np.isnan(array).all())

@@ -12,6 +12,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from arrivals.measurements import rows
 from arrivals.trackers.base import Tracker
 from arrivals.trackers.estimates import DirectionEstimate
 from arrivals.trackers.run import Run, RunRecorder
@@ -190,7 +191,7 @@ class BatchDirectionTracker(DirectionTracker):
             One per sequence.
         """
         positive("dt", dt)
-        sequences = [list(sequence) for sequence in measurements]
+        sequences = [list(rows("a sequence", each)) for each in rows("measurements", measurements)]
         trackers = [copy.deepcopy(self) for _ in sequences]
         recorders = [RunRecorder(type(self.estimate)) for _ in sequences]
         started = time.perf_counter()

@@ -25,6 +25,8 @@ def number(name: str, value: Any) -> float:
         raise TypeError(f"{name} must be a number; got {value!r}")
     try:
         return float(value)  # type: ignore[arg-type]  # any scalar with __float__
+    except OverflowError:
+        raise ValueError(f"{name} must be at most 1.8e308; got a larger whole number") from None
     except (TypeError, ValueError):
         raise TypeError(f"{name} must be a number; got {value!r}") from None
 
@@ -55,6 +57,35 @@ def not_negative(name: str, value: Any) -> float:
     if not 0 <= number(name, value) < np.inf:
         raise ValueError(f"{name} must be finite and not negative; got {value}")
     return float(value)
+
+
+def time_step(dt: Any) -> float:
+    """Return the length of a step, a finite number that is zero or positive.
+
+    Examples
+    --------
+    >>> time_step(float("nan"))
+    Traceback (most recent call last):
+    ValueError: dt must be finite and not negative; got nan
+    """
+    if type(dt) is float and 0.0 <= dt < np.inf:
+        return dt  # the usual case
+    return not_negative("dt", dt)
+
+
+def no_control(u: ArrayLike | None) -> None:
+    """Refuse a control input that is not zero, for methods without one.
+
+    Examples
+    --------
+    >>> no_control(None), no_control(0)
+    (None, None)
+    >>> no_control(0.5)
+    Traceback (most recent call last):
+    ValueError: u must be None or 0 for a method without a control input; got 0.5
+    """
+    if u is not None and np.any(real("u", u)):
+        raise ValueError(f"u must be None or 0 for a method without a control input; got {u}")
 
 
 def probability(name: str, value: Any) -> float:

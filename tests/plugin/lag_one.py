@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models import ArraySnapshot
+from arrivals.measurements import is_missing
 from arrivals.trackers import DirectionEstimate, Tracker
-from arrivals.trackers.base import is_missing
 from arrivals.validation import instance, positive
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.manifolds.symmetric_line import ArrayManifold
-from arrivals.measurement_models.observed import LARGEST
+from arrivals.measurements import LARGEST
 from arrivals.typing import Bool, Complex, Float
 
 MISSING = complex(np.nan, np.nan)

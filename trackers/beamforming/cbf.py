@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
-from arrivals.trackers.base import is_missing
+from arrivals.measurements import is_missing
 from arrivals.trackers.beamforming.spectrum import (
     bartlett_power,
     find_peaks,

@@ -11,7 +11,8 @@ from typing import Any, Protocol, Self, cast, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.trackers.base import Tracker, is_missing
+from arrivals.measurements import is_missing
+from arrivals.trackers.base import Tracker
 from arrivals.trackers.estimates import StateEstimate
 from arrivals.trackers.gaussian.base import GaussianFilter
 from arrivals.trackers.gaussian.circular import Angles, mixture

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.base import MeasurementModel
+from arrivals.measurements import is_missing
 from arrivals.motion_models.base import MotionModel, gaussian
-from arrivals.trackers.base import Tracker, is_missing
+from arrivals.trackers.base import Tracker
 from arrivals.trackers.estimates import StateEstimate
 from arrivals.trackers.gaussian.arguments import measurement_vector
 from arrivals.trackers.gaussian.circular import (

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from arrivals.trackers.base import is_missing
+from arrivals.measurements import is_missing
 from arrivals.typing import Float
 
 

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
+from arrivals.measurements import is_missing
 from arrivals.motion_models.base import MotionModel
 from arrivals.motion_models.linear import ConstantVelocity
 from arrivals.motion_models.von_mises import wrap
-from arrivals.trackers.base import Tracker, is_missing
+from arrivals.trackers.base import Tracker
 from arrivals.trackers.direction_tracker import DirectionTracker
 from arrivals.trackers.estimates import DirectionEstimate
 from arrivals.trackers.multi_target.track_bank import TrackBank, nearest

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.manifolds.uniform_line import UniformLineManifold
-from arrivals.trackers.base import is_missing
+from arrivals.measurements import is_missing
 from arrivals.trackers.direction_tracker import DirectionTracker
 from arrivals.trackers.subspace.source_number import number_of_sources
 from arrivals.typing import Bool, Complex, Float

@@ -8,9 +8,9 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from arrivals.measurements import is_missing
 from arrivals.recordings.narrowband import default_window, narrowband
 from arrivals.trackers import Tracker
-from arrivals.trackers.base import is_missing
 from arrivals.trackers.run import header, text
 from arrivals.typing import Complex
 from arrivals.validation import count, one_of, positive
