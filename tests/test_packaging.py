@@ -43,6 +43,14 @@ def test_every_folder_with_an_init_is_a_package() -> None:
     assert sorted(SETUPTOOLS["packages"]) == sorted(result)
 
 
+def test_oldest_versions_are_the_floors() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    floors = dict(requirement.split(">=") for requirement in project["dependencies"])
+    lines = (ROOT / "tests" / "oldest.txt").read_text().splitlines()
+    oldest = dict(line.split("==") for line in lines if "==" in line)
+    assert {name: oldest[name] for name in floors} == floors
+
+
 def test_every_module_lies_in_a_package() -> None:
     packages = {package.replace(".", "/") for package in SETUPTOOLS["packages"]}
     astray = [

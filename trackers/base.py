@@ -34,6 +34,7 @@ class Tracker(Configurable, ABC):
 
     Examples
     --------
+    >>> import numpy as np
     >>> from arrivals.trackers import StateEstimate
     >>> class Smoothing(Tracker):
     ...     def __init__(self, gain=0.5):
