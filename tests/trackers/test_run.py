@@ -257,7 +257,7 @@ def test_to_csv_to_a_folder_raises(tmp_path: Path) -> None:
         complex(np.nan, 0.0),
         np.inf,
         np.ma.masked_all(3),
-    ],  # fmt: skip
+    ],
 )
 def test_is_missing_of_none_and_all_nan_is_true(z: ArrayLike | None) -> None:
     assert is_missing(z)
