@@ -18,8 +18,8 @@ from arrivals.measurement_models.base import MeasurementModel
 from arrivals.measurement_models.manifolds.fourier import fourier_manifold
 from arrivals.measurement_models.manifolds.manifold import Manifold, Reference
 from arrivals.measurement_models.manifolds.uniform_line import grid_line
-from arrivals.measurement_models.observed import ObservedSnapshots, complex_snapshot
 from arrivals.measurement_models.single_source import SingleSourceSnapshot
+from arrivals.measurement_models.snapshot_gate import SnapshotGate
 from arrivals.measurement_models.snapshot_likelihood import (
     from_composite,
     log_known,
@@ -31,7 +31,7 @@ from arrivals.validation import count, instance, one_of, positive
 
 
 @dataclass(frozen=True)
-class ArraySnapshot(SingleSourceSnapshot):
+class ArraySnapshot(SnapshotGate, SingleSourceSnapshot):
     """Snapshots of plane waves on an array: z = Σ w a(β) + u, one or several in a step.
 
     Gridless methods use `observe` and `manifold`. A particle filter on directions uses
@@ -65,7 +65,9 @@ class ArraySnapshot(SingleSourceSnapshot):
     -----
     Shapes: `shape` is that of one measurement, (n_bins, n_snapshots, n_sensors), where axes of
     length one are left out; complex, any leading axes. Directions (..., n_sources), rad.
-    A bin or snapshot without valid data is left out, then every sensor with a NaN in the others.
+    What marks a missing number: `arrivals.measurements`. A channel of zeros alone, in all bins and
+    snapshots of a step, is missing, too, with one warning; a step of zeros alone is missing.
+    `observe` leaves out bins and snapshots without valid data, then sensors with gaps.
 
     Examples
     --------
@@ -147,42 +149,6 @@ class ArraySnapshot(SingleSourceSnapshot):
         if self.response is not None:
             a = a * np.moveaxis(self.response(doa), 0, -2)
         return a if self.n_bins > 1 else np.asarray(a[..., 0, :])
-
-    def snapshot(self, z: ArrayLike) -> Complex:
-        """Return a measurement as complex numbers of `shape`, NaN where it is missing."""
-        return complex_snapshot(z, self.shape)
-
-    def observe(
-        self, z: ArrayLike | None, reference: Reference = "middle"
-    ) -> ObservedSnapshots | None:
-        """Return the bins, sensors and snapshots of a measurement that have valid data.
-
-        Parameters
-        ----------
-        z : array_like, shape `shape`, or None
-            Complex; NaN where a sensor gave no number.
-        reference : {"middle", "first"}
-            As in `manifold`.
-
-        Returns
-        -------
-        ObservedSnapshots or None
-            Data without gaps and their manifold; None if the whole measurement is missing.
-
-        Raises
-        ------
-        ValueError
-            If the shape is wrong, or every sensor has a gap in some snapshot.
-        """
-        z = np.asarray(np.nan if z is None else z)
-        if z.dtype.kind in "fc" and z.size and np.isnan(z).all():
-            return None
-        return ObservedSnapshots.from_measurement(self.snapshots(z), self.manifold(reference))
-
-    def snapshots(self, z: ArrayLike) -> Complex:
-        """Return a measurement with the axes of a `Manifold`: (n_bins, n_sensors, n_snapshots)."""
-        rows = self.snapshot(z).reshape(self.n_bins, self.n_snapshots, self.shape[-1])
-        return np.swapaxes(rows, 1, 2)
 
     def manifold(self, reference: Reference = "middle") -> Manifold:
         """Return the response as a Fourier series of an angle.

@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.manifolds.manifold import Manifold
-from arrivals.measurements import LARGEST, SMALLEST
+from arrivals.measurements import SMALLEST, numbers
 from arrivals.typing import Bool, Complex, Float
+
+MISSING = complex(np.nan, np.nan)
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,32 +98,27 @@ class ObservedSnapshots:
         return b"".join(each.tobytes() for each in (self.bins, self.sensors, self.times))
 
 
-def complex_snapshot(z: ArrayLike, shape: tuple[int, ...]) -> Complex:
-    """Return a measurement as complex numbers of a shape, NaN where a sensor gave none.
+def complex_snapshot(z: ArrayLike | None, shape: tuple[int, ...]) -> Complex:
+    """Return a measurement as complex numbers of a shape, NaN where one is missing.
 
-    Numbers whose squares would overflow count as missing, those that would vanish as zero.
+    All are NaN where the whole measurement is missing. Numbers whose squares would vanish are
+    zero.
 
     Examples
     --------
     >>> complex_snapshot([1.0, np.inf, 1e-200], (3,))
     array([ 1. +0.j, nan+nanj,  0. +0.j])
     """
-    array = np.asarray(z)
-    if array.dtype.kind not in "biufc":
-        raise TypeError(
-            f"a snapshot must hold complex numbers, NaN for a missing one; got {array.dtype}"
-        )
+    array = numbers("z", np.nan if z is None else z)
     if array.shape != shape:
+        if array.size and np.isnan(array).all():
+            return np.full(shape, MISSING)
         axes = "" if len(shape) == 1 else " in every bin and snapshot"
-        raise ValueError(
-            f"a snapshot must have shape {shape}, one number a sensor{axes}; got {array.shape}"
-        )
+        raise ValueError(f"z must have shape {shape}, one number a sensor{axes}; got {array.shape}")
     array = array.astype(np.complex128)
     size = np.abs(array)
-    array[~(size < LARGEST)] = complex(np.nan, np.nan)
-    array[size < SMALLEST] = 0
-    if np.isnan(array).all():
-        raise ValueError("a snapshot must have a finite number; got none")
+    if not (size >= SMALLEST).all():
+        array[size < SMALLEST], array[np.isnan(size)] = 0, MISSING
     return array
 
 

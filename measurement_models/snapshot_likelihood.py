@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.base import MeasurementModel, SelectedEntries, locate
+from arrivals.measurements import numbers
 from arrivals.typing import Complex, Float
 
 
@@ -41,7 +42,7 @@ def from_composite(z: ArrayLike, shape: tuple[int, ...]) -> Complex | Float:
     >>> from_composite([1.0, 3.0, 2.0, -4.0], (2,))
     array([1.+2.j, 3.-4.j])
     """
-    z, n = np.asarray(z), int(np.prod(shape))
+    z, n = numbers("z", z), int(np.prod(shape))
     if z.shape == shape or z.shape != (2 * n,) or np.iscomplexobj(z):
         return z
     return np.asarray(z[:n] + 1j * z[n:]).reshape(shape)

@@ -19,6 +19,7 @@ from arrivals.trackers.run import Run, RunRecorder
 from arrivals.typing import Bool, Float, Int
 from arrivals.validation import positive
 
+NO_DIRECTION = DirectionEstimate.empty()
 ENDED: Any = object()  # in place of a measurement after the end of a shorter sequence
 
 
@@ -100,7 +101,13 @@ class DirectionTracker(Tracker):
 
     def reset(self) -> None:
         """Report no direction; a subclass with a belief also returns to its initial one."""
-        self.report([])
+        self.report_none()
+
+    def report_none(self) -> None:
+        """Report no direction, as between measurements."""
+        n = self.n_slots
+        self._estimate = NO_DIRECTION
+        self.x, self.P = np.full(n, np.nan), np.zeros((n, n))
 
     def report(
         self,

@@ -6,8 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from arrivals.measurements import is_missing, real_numbers
 from arrivals.motion_models import BernoulliVonMises
 from arrivals.trackers import DirectionEstimate, Run, Tracker
+from arrivals.validation import no_control, time_step
 
 
 class Smoother(Tracker):
@@ -21,15 +23,16 @@ class Smoother(Tracker):
         self.label = np.zeros(1, dtype=np.int64)
 
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
-        self.P = self.P + dt * np.eye(2)
+        no_control(u)
+        self.P = self.P + time_step(dt) * np.eye(2)
 
     def update(self, z: ArrayLike | None) -> None:
-        if z is None or np.isnan(np.asarray(z, dtype=float)).all():
+        if is_missing(z):
             return
-        z = np.asarray(z, dtype=float)
+        z = real_numbers("z", z)
         if z.shape != (2,):
             raise ValueError(f"z must have shape (2,); got {z.shape}")
-        self.correct(z)
+        self.correct(np.where(np.isnan(z), self.x, z) if np.isnan(z).any() else z)
 
     def correct(self, z: Any) -> None:
         self.x = self.x + self.gain * (z - self.x)

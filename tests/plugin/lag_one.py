@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike
 from arrivals.measurement_models import ArraySnapshot
 from arrivals.measurements import is_missing
 from arrivals.trackers import DirectionEstimate, Tracker
-from arrivals.validation import instance, positive
+from arrivals.validation import instance, no_control, positive, time_step
 
 
 class LagOne(Tracker):
@@ -27,14 +27,17 @@ class LagOne(Tracker):
         self.x, self.P = np.full(1, np.nan), np.zeros((1, 1))
 
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
-        """Apply forgetting."""
+        """Apply forgetting; add to the variance."""
+        dt = time_step(dt)
+        no_control(u)
+        self.P = self.P + 0.01 * dt
         self.lag, self.power = self.lag * self.memory**dt, self.power * self.memory**dt
 
     def update(self, z: ArrayLike | None) -> None:
         """Add the products of neighbouring sensors that both have valid data."""
         if is_missing(z):
             return
-        z = self.measurement.snapshot(np.asarray(z))
+        z = self.measurement.snapshot(z)
         products = z[1:] * z[:-1].conj()
         lag = self.lag + np.nansum(products)
         power = self.power + np.nansum(np.abs(products))

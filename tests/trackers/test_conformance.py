@@ -22,9 +22,30 @@ N_SOURCES = [2] * len(DIRECTIONS) + [1] * (len(TRACKERS) - len(DIRECTIONS))
 every_tracker = pytest.mark.parametrize(("name", "make", "measurements"), TRACKERS, ids=IDS)
 
 
+# checks that a family does not pass yet
+GAUSSIAN_NAMES = "kalman ekf ukf imm particle"
+NOT_YET = {
+    "masked_and_huge_numbers_are_missing": f"{GAUSSIAN_NAMES} interpolation_ekf rss_vb rss_ml "
+    "ar_kalman_qrd_rls",
+    "channel_of_zeros_is_missing": "interpolation_ekf ar_kalman_qrd_rls",
+    "missing_channel_equals_array_without_it": "interpolation_ekf mvdr peaks_gnn past cbf",
+    "estimate_widens_or_ends_in_a_gap": "interpolation_ekf",
+    "invalid_time_step_changes_nothing": f"{GAUSSIAN_NAMES} interpolation_ekf",
+    "invalid_control_changes_nothing": "kalman ar_kalman_qrd_rls",
+}
+
+
 @pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
 @every_tracker
-def test_conforms(name: str, make: MakeTracker, measurements: Measurements, check: Check) -> None:
+def test_conforms(
+    name: str,
+    make: MakeTracker,
+    measurements: Measurements,
+    check: Check,
+    request: pytest.FixtureRequest,
+) -> None:
+    if name in NOT_YET.get(check.__name__, "").split():
+        request.applymarker(pytest.mark.xfail)
     check(make, measurements)
 
 

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from faulty_steps import STEP_FAULTS
 from faulty_trackers import (
     FAULTS,
     NUMBERS,
@@ -19,13 +20,15 @@ from arrivals.parameters import FrozenModel
 from arrivals.trackers import Tracker
 from arrivals.trackers.conformance import CHECKS, check_tracker, difference
 
+ALL_FAULTS = FAULTS + STEP_FAULTS
+
 
 def test_faults_cover_all_checks() -> None:
-    assert {name for _, name, _ in FAULTS} == {check.__name__ for check in CHECKS}
+    assert {name for _, name, _ in ALL_FAULTS} == {check.__name__ for check in CHECKS}
 
 
 @pytest.mark.parametrize(
-    ("make", "name", "message"), FAULTS, ids=[fault[0].__name__ for fault in FAULTS]
+    ("make", "name", "message"), ALL_FAULTS, ids=[fault[0].__name__ for fault in ALL_FAULTS]
 )
 def test_check_fails_with_its_name(make: Callable[..., Tracker], name: str, message: str) -> None:
     check = next(check for check in CHECKS if check.__name__ == name)

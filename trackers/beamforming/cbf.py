@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
-from arrivals.measurements import is_missing
 from arrivals.trackers.beamforming.spectrum import (
     bartlett_power,
     find_peaks,
@@ -17,7 +16,7 @@ from arrivals.trackers.beamforming.spectrum import (
 from arrivals.trackers.direction_tracker import DirectionTracker
 from arrivals.trackers.registry import register
 from arrivals.typing import Complex, Float
-from arrivals.validation import count, instance, not_negative, positive
+from arrivals.validation import count, instance, no_control, positive, time_step
 
 
 @register("cbf")
@@ -89,15 +88,16 @@ class CBF(DirectionTracker):
 
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
         """Discard the spectrum: steps are independent."""
-        not_negative("dt", dt)
+        time_step(dt)
+        no_control(u)
         self.power = np.full(self.n_directions, np.nan)
-        self.report([])
+        self.report_none()
 
     def update(self, z: ArrayLike | None) -> None:
-        """Report the peaks of one measurement; sensors that are NaN or infinite are left out."""
-        if is_missing(z):
+        """Report the peaks of one measurement; missing sensors are left out."""
+        z = self.measurement.snapshot(z)
+        if np.isnan(z).all():
             return
-        z = self.measurement.snapshot(np.asarray(z))
         array = self.measurement.array
         self.doa_grid = scan_directions(array, self.n_directions)
         self.power = self._scan(z)

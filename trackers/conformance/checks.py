@@ -25,6 +25,12 @@ from arrivals.trackers.conformance.belief_checks import (
     estimate_is_a_frozen_record,
 )
 from arrivals.trackers.conformance.comparison import assert_near, assert_same, require
+from arrivals.trackers.conformance.missing_checks import (
+    channel_of_zeros_is_missing,
+    estimate_widens_or_ends_in_a_gap,
+    masked_and_huge_numbers_are_missing,
+    missing_channel_equals_array_without_it,
+)
 from arrivals.trackers.conformance.parameter_checks import (
     configuration_survives_json,
     constructor_accepts_its_parameters,
@@ -32,6 +38,10 @@ from arrivals.trackers.conformance.parameter_checks import (
     setting_own_parameters_changes_nothing,
     sklearn_clone_is_equal,
     unknown_parameter_is_refused,
+)
+from arrivals.trackers.conformance.step_checks import (
+    invalid_control_changes_nothing,
+    invalid_time_step_changes_nothing,
 )
 from arrivals.trackers.conformance.stepping import (
     Check,
@@ -223,6 +233,12 @@ CHECKS: tuple[Check, ...] = (
     invalid_measurement_changes_nothing,
     models_are_not_modified,
     filterpy_saver_works,
+    masked_and_huge_numbers_are_missing,
+    channel_of_zeros_is_missing,
+    missing_channel_equals_array_without_it,
+    estimate_widens_or_ends_in_a_gap,
+    invalid_time_step_changes_nothing,
+    invalid_control_changes_nothing,
 )
 
 

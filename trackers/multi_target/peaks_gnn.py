@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
-from arrivals.measurements import is_missing
+from arrivals.measurements import numbers
 from arrivals.motion_models.base import MotionModel
 from arrivals.motion_models.linear import ConstantVelocity
 from arrivals.motion_models.von_mises import wrap
@@ -20,7 +20,7 @@ from arrivals.trackers.estimates import DirectionEstimate
 from arrivals.trackers.multi_target.track_bank import TrackBank, nearest
 from arrivals.trackers.registry import find, register
 from arrivals.typing import Bool, Complex, Float
-from arrivals.validation import count, instance, not_negative, positive
+from arrivals.validation import count, instance, no_control, positive, time_step
 
 
 @register("peaks_gnn")
@@ -60,7 +60,9 @@ class PeaksGNN(DirectionTracker):
 
     Notes
     -----
-    `existence` is NaN. A track of a line that leaves ±90° ends.
+    `existence` is NaN. A track of a line that leaves ±90° ends, as does one after `patience` steps
+    without a detection, those without data included, and one whose standard deviation exceeds
+    that of a uniform direction.
 
     References
     ----------
@@ -115,17 +117,21 @@ class PeaksGNN(DirectionTracker):
         return self.max_sources or 2 * self.measurement.array.n_sensors
 
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
-        """Predict the tracks, and end those that leave a line's ±90°."""
-        not_negative("dt", dt)
+        """Predict the tracks; end those that leave ±90° of a line, or had no data for long."""
+        dt = time_step(dt)
+        no_control(u)
         self._apply_changed_parameters()
         self.active_detector.predict(dt=dt)
         bank = self.bank.predict(self.motion, dt)
-        self.bank = bank.remove(bank.used & self._is_outside(bank.mean[:, 0]))
+        unknown = bank.covariance[:, 0, 0] > self._max_variance
+        has_ended = self._is_outside(bank.mean[:, 0]) | unknown | (bank.misses > self.patience + 1)
+        self.bank = bank.remove(bank.used & has_ended)
         self._report_confirmed(self._no_amplitude())
 
     def update(self, z: ArrayLike | None) -> None:
         """Detect peaks, assign them to tracks, and initiate tracks from the others."""
-        if is_missing(z):
+        z = numbers("z", np.nan if z is None else z)
+        if not np.nan_to_num(z).any():
             return
         self._apply_changed_parameters()
         self.active_detector.update(z)
@@ -176,15 +182,21 @@ class PeaksGNN(DirectionTracker):
         line = self.measurement.array.dim == 1
         return np.asarray(line & (np.abs(doa) > np.pi / 2))
 
+    @property
+    def _max_variance(self) -> float:
+        """Variance of a uniform direction, rad²."""
+        span = np.pi if self.measurement.array.dim == 1 else 2 * np.pi
+        return span**2 / 12
+
     def _initial_covariance(self) -> Float:
         variances = np.full(self.motion.dim_x, self.speed_std**2)
         variances[0] = self.std**2
         return np.diag(variances)
 
     def _report_confirmed(self, amplitude: Complex) -> None:
-        """Report the confirmed tracks."""
+        """Report the confirmed tracks with a detection not too long ago."""
         bank = self.bank
-        confirmed = bank.used & (bank.hits >= self.confirm_steps)
+        confirmed = bank.used & (bank.hits >= self.confirm_steps) & (bank.misses <= self.patience)
         doa = bank.mean[confirmed, 0]
         self.report(
             wrap(doa) if self.measurement.array.dim > 1 else doa,

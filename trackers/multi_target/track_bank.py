@@ -51,17 +51,17 @@ class TrackBank:
         return np.asarray(self.label >= 0)
 
     def predict(self, motion: MotionModel, dt: float) -> TrackBank:
-        """Return the bank after a step of a linear motion."""
+        """Return the bank after a step of a linear motion, so far without a measurement."""
         F, used = motion.F(np.zeros(motion.dim_x), dt), self.used
         P = predict_gaussian(self.covariance[used], F, motion.Q(dt))
-        return self._replace_slots(used, mean=self.mean[used] @ F.T, covariance=P)
+        moved = self._replace_slots(used, mean=self.mean[used] @ F.T, covariance=P)
+        return replace(moved, misses=self.misses + used)
 
     def update(self, slots: Int, residual: Float, variance: float) -> TrackBank:
-        """Return the bank after a measurement of some tracks and a miss of all others."""
+        """Return the bank after a measurement of some tracks."""
         H, R = np.eye(1, self.mean.shape[1]), np.full((1, 1), variance)
         updated = update_gaussian(self.mean[slots], self.covariance[slots], residual[:, None], H, R)
-        missed = replace(self, misses=self.misses + self.used)
-        return missed._replace_slots(
+        return self._replace_slots(
             slots, mean=updated.x, covariance=updated.P, hits=self.hits[slots] + 1, misses=0
         )
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
-from arrivals.measurements import is_missing
+from arrivals.measurements import numbers
 from arrivals.trackers.beamforming.spectrum import scan_directions
 from arrivals.trackers.direction_tracker import BatchDirectionTracker
 from arrivals.trackers.registry import register
@@ -19,7 +19,7 @@ from arrivals.trackers.sparse_bayes.fixed_point import (
     highest_peaks,
 )
 from arrivals.typing import Bool, Complex, Float
-from arrivals.validation import count, instance, not_negative, positive, probability
+from arrivals.validation import count, instance, no_control, positive, probability, time_step
 
 
 class ValidSnapshots(NamedTuple):
@@ -133,9 +133,10 @@ class SBL(BatchDirectionTracker):
 
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
         """Set the initial powers; report no direction until the next measurement."""
-        not_negative("dt", dt)
+        time_step(dt)
+        no_control(u)
         self.start = self.next_start()
-        self.report([])
+        self.report_none()
 
     def next_start(self) -> Float:
         """Return the initial powers of the next update, (n_directions,)."""
@@ -167,13 +168,10 @@ class SBL(BatchDirectionTracker):
 
     def _valid_snapshots(self, z: ArrayLike | None) -> ValidSnapshots | None:
         """Return the snapshots of the sensors with valid data; None if missing or zero."""
-        if is_missing(z):
-            return None
-        array = np.asarray(z)
-        if array.ndim == 2 and array.dtype.kind in "fc":
-            array = array[~np.isnan(array).all(axis=1)]
-        rows = array if array.ndim == 2 else array[None]
-        Y = np.stack([self.measurement.snapshot(row) for row in rows], axis=1)
+        z = numbers("z", np.nan if z is None else z)
+        Y = self.measurement.snapshot(z, len(z) if z.ndim == 2 else None)
+        Y = Y.reshape(-1, Y.shape[-1]).T
+        Y = Y[:, ~np.isnan(Y).all(axis=0)]
         valid: Bool = np.asarray(~np.isnan(Y).any(axis=1))
         return ValidSnapshots(Y[valid], valid) if valid.sum() > 1 and Y[valid].any() else None
 

@@ -10,11 +10,10 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.manifolds.uniform_line import UniformLineManifold
-from arrivals.measurements import is_missing
 from arrivals.trackers.direction_tracker import DirectionTracker
 from arrivals.trackers.subspace.source_number import number_of_sources
 from arrivals.typing import Bool, Complex, Float
-from arrivals.validation import count, instance, not_negative, one_of, probability
+from arrivals.validation import count, instance, no_control, one_of, probability, time_step
 
 NumberOfSources: TypeAlias = int | Literal["aic", "mdl"] | None
 MIN_RELATIVE_WEIGHT = 1e-3  # sensors of less weight, relative to the largest, are left out
@@ -118,6 +117,8 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
         Sum of the weights of the snapshots, and of their squares.
     n_snapshots : int
         Number of snapshots with valid data.
+    n_missing : int
+        Number of steps since the last snapshot with valid data.
     """
 
     def __init__(
@@ -157,7 +158,8 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
     def reset(self) -> None:
         """Return to the state after construction: no snapshot, no direction."""
         self.total_weight, self.total_squared_weight, self.n_snapshots = 0.0, 0.0, 0
-        self.report([])
+        self._doa, self.n_missing = np.zeros(0), 0
+        self.report_none()
 
     @property
     def n_slots(self) -> int:
@@ -168,25 +170,31 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
         return min(self.max_sources or limit, limit)
 
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
-        """Apply forgetting to the weights; reported directions do not change."""
-        not_negative("dt", dt)
+        """Apply forgetting to the weights; report no direction until the next measurement."""
+        dt = time_step(dt)
+        no_control(u)
         factor = self.forgetting**dt
         self.total_weight = factor * self.total_weight
         self.total_squared_weight = factor**2 * self.total_squared_weight
+        self.n_missing = self.n_missing + 1
+        self.report_none()
 
     def update(self, z: ArrayLike | None) -> None:
         """Add one snapshot, (n_sensors,); compute directions at every `interval`-th one."""
-        if is_missing(z):
+        z = self.measurement.snapshot(z)
+        if np.isnan(z).all():
             return
-        z = self.measurement.snapshot(np.asarray(z))
         self.update_subspace(z)
         self.total_weight = self.total_weight + 1
         self.total_squared_weight = self.total_squared_weight + 1
         self.n_snapshots = self.n_snapshots + 1
+        follows_gap, self.n_missing = self.n_missing > 1, 0
         if self.n_snapshots % self.interval == 0:
-            doa = self._directions()
-            A = self.measurement.steering_vector(doa)
-            self.report(doa, amplitude=least_squares_amplitudes(A, z))
+            self._doa = self._directions()
+        elif follows_gap:
+            self._doa = np.zeros(0)
+        A = self.measurement.steering_vector(self._doa)
+        self.report(self._doa, amplitude=least_squares_amplitudes(A, z))
 
     @abstractmethod
     def update_subspace(self, z: Complex) -> None:

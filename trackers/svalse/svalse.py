@@ -25,7 +25,7 @@ from arrivals.trackers.svalse.valse import (
     detected,
 )
 from arrivals.typing import Bool, Complex, Float, Int
-from arrivals.validation import instance, one_of
+from arrivals.validation import instance, no_control, one_of, time_step
 
 DEFAULT_MOTION = BernoulliVonMises(sigma_doa=np.deg2rad(1.5))
 Memory = Literal["von_mises", "posterior"]
@@ -87,9 +87,8 @@ class SVALSE(VALSE):
     See `VALSE` for the limits of `existence` and `std` of an estimate. A label is
     assigned when a component is first reported and stays while the component is tracked; two
     sources nearer than the solver's `merge` become one, and sources that cross may exchange their
-    labels. Between measurements, and after a missing one, the components whose predicted existence
-    is at least one half are reported; a snapshot with valid data of no more sensors than there are
-    such components counts as missing.
+    labels. Between measurements, and after a missing one, components of predicted existence 0.5 and
+    more are reported; a snapshot of no more valid sensors than such components counts as missing.
 
     References
     ----------
@@ -159,6 +158,7 @@ class SVALSE(VALSE):
 
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
         """Predict the angles' densities, births and deaths, (62)-(65)."""
+        no_control(u)
         self.predict_batch([self], dt)
         self.report_prior()
 
@@ -173,7 +173,7 @@ class SVALSE(VALSE):
 
     def predict_batch(self, trackers: Sequence[Self], dt: float) -> None:
         """Predict the beliefs of copies of this tracker by `dt`."""
-        super().predict_batch(trackers, dt)
+        dt = time_step(dt)
         mu, kappa, existence = (
             np.stack([getattr(tracker, name) for tracker in trackers])
             for name in ("mu", "kappa", "existence")

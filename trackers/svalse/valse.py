@@ -23,7 +23,7 @@ from arrivals.trackers.svalse.components import (
 from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver, PosteriorName
 from arrivals.trackers.svalse.newton.solver import NewtonSolver
 from arrivals.typing import Bool, Float, Int
-from arrivals.validation import instance, not_negative, one_of
+from arrivals.validation import instance, no_control, one_of, time_step
 
 Engine = Literal["newton", "fast", "coordinate"]
 DEFAULT_SOLVER = NewtonSolver()
@@ -125,6 +125,7 @@ class VALSE(BatchDirectionTracker):
 
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
         """Report no direction: there is no prediction of the next step."""
+        no_control(u)
         self.predict_batch([self], dt)
         self.report_prior()
 
@@ -158,11 +159,11 @@ class VALSE(BatchDirectionTracker):
 
     def predict_batch(self, trackers: Sequence[Self], dt: float) -> None:
         """Predict the beliefs of copies of this tracker: there are none."""
-        not_negative("dt", dt)
+        time_step(dt)
 
     def report_prior(self) -> None:
         """Report the expected directions before a measurement: none."""
-        self.report([])
+        self.report_none()
 
     def observe(self, z: ArrayLike | None) -> ObservedSnapshots | None:
         """Return the valid data of a measurement; None if it is missing."""
