@@ -5,6 +5,7 @@ import dataclasses
 import json
 import pickle
 import sys
+import types
 from dataclasses import dataclass
 from typing import Any
 
@@ -257,3 +258,34 @@ def test_configuration_does_not_import_other_packages() -> None:
     with pytest.raises(ValueError, match="there is no class 'this:Thing': install and import its"):
         Configurable.from_dict({"type": "this:Thing"})
     assert "this" not in sys.modules
+
+
+@pytest.mark.parametrize("name", ["os:system", "os:path", "collections:abc.Mapping", "sys:modules"])
+def test_configuration_calls_nothing_but_configurable_classes(name: str) -> None:
+    for config in ({"type": name}, {"type": "svalse", "motion": {"type": name, "command": "no"}}):
+        with pytest.raises((TypeError, ValueError), match="is not a|there is no class"):
+            Configurable.from_dict(config)
+
+
+def test_configuration_runs_no_code_of_an_imported_module(monkeypatch: pytest.MonkeyPatch) -> None:
+    module = types.ModuleType("lazy")
+    module.__getattr__ = lambda name: pytest.fail(name)  # type: ignore[method-assign]  # PEP 562
+    monkeypatch.setitem(sys.modules, "lazy", module)
+    with pytest.raises(ValueError, match="there is no class 'lazy:Thing'"):
+        Configurable.from_dict({"type": "lazy:Thing"})
+
+
+def test_configuration_that_is_nested_deeply_is_refused() -> None:
+    parts: Any = {"type": "svalse"}
+    lists: Any = 1.0
+    for _ in range(5000):
+        parts, lists = {"type": "svalse", "motion": parts}, [lists]
+    for config in (parts, lists, {"type": "cbf", "measurement": lists}, {"type": {"a": lists}}):
+        with pytest.raises(ValueError, match="config must be nested at most 32 deep; got more"):
+            Configurable.from_dict(config)
+
+
+def test_configuration_with_a_long_name_is_refused() -> None:
+    for name in ("arrivals." + "a." * 10**5 + ":T", "a" * 10**6, "arrivals..:T", ":", "a:b:c"):
+        with pytest.raises(ValueError, match="there is no"):
+            Configurable.from_dict({"type": name})

@@ -3,6 +3,10 @@
 import os
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
+from typing import TextIO
+
+MAX_MESSAGE_LENGTH = 1000  # characters: an error may quote a whole file
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -17,7 +21,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     -------
     int
         0; 2 for invalid input, with one line on standard error; 130 after an interrupt. If the
-        reader of standard output closes it, the program ends with status 0.
+        reader of standard output closes it, the program ends with status 0. With ARRIVALS_DEBUG=1
+        in the environment, an error prints its traceback too.
 
     Examples
     --------
@@ -27,19 +32,29 @@ def main(argv: Sequence[str] | None = None) -> int:
     0
     """
     try:
-        from arrivals.cli.main import run
-
-        run(argv)
+        _prepare_streams()
+        status = _run(argv)
         sys.stdout.flush()
-    except BrokenPipeError:
-        _drop_output()
-    except KeyboardInterrupt:
-        _flush_output()
-        return 130
-    except (ValueError, TypeError, OSError, MemoryError) as error:
-        _flush_output()
-        print(f"arrivals: {message(error)}", file=sys.stderr)
+        return status
+    except BaseException as error:
+        _flush(sys.stdout)
+        if isinstance(error, BrokenPipeError) and error.filename is None:
+            return 0
+        if isinstance(error, KeyboardInterrupt):
+            return 130
+        if not isinstance(error, Exception):
+            raise
+        _report(error)
         return 2
+
+
+def _run(argv: Sequence[str] | None) -> int:
+    from arrivals.cli.main import run
+
+    try:
+        run(argv)
+    except SystemExit as end:  # of -h and --version
+        return end.code if isinstance(end.code, int) else 2 if end.code else 0
     return 0
 
 
@@ -50,25 +65,53 @@ def message(error: Exception) -> str:
     --------
     >>> message(FileNotFoundError(2, "No such file or directory", "a.wav"))
     'a.wav: No such file or directory'
+    >>> message(KeyError("x"))
+    "internal error: KeyError: 'x'; set ARRIVALS_DEBUG=1 for the traceback"
     """
-    text = str(error)
-    if isinstance(error, OSError) and error.strerror:
-        text = f"{error.filename}: {error.strerror}" if error.filename else error.strerror
-    return " ".join(text.split()) or type(error).__name__
+    text = " ".join(str(error).split()) or "not enough memory"
+    if isinstance(error, OSError) and (error.filename or error.strerror):
+        name = error.filename or "standard input or output"  # all other files have names
+        text = " ".join(f"{name}: {error.strerror or text}".split())
+    if len(text) > MAX_MESSAGE_LENGTH:
+        text = f"{text[:MAX_MESSAGE_LENGTH]} ..."
+    if isinstance(error, ValueError | TypeError | OSError | MemoryError | Warning):
+        return text
+    name = type(error).__name__
+    return f"internal error: {name}: {text}; set ARRIVALS_DEBUG=1 for the traceback"
 
 
-def _flush_output() -> None:
+def _report(error: Exception) -> None:
+    """Print the message of an error, if standard error can be written to."""
+    with suppress(OSError):
+        if os.environ.get("ARRIVALS_DEBUG") == "1":
+            import traceback
+
+            traceback.print_exception(error)
+        print(f"arrivals: {message(error)}", file=sys.stderr)
+    _flush(sys.stderr)
+
+
+def _prepare_streams() -> None:
+    """Replace standard streams that are closed, and characters that an output cannot show."""
+    if sys.stdin is None:
+        sys.stdin = open(os.devnull, encoding="utf-8")  # noqa: SIM115  (for the whole program)
+    if sys.stdout is None:  # writing to it is an error, as elsewhere
+        sys.stdout = open(os.open(os.devnull, os.O_RDONLY), "w", encoding="utf-8")  # noqa: SIM115
+    if sys.stderr is None:
+        sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+    if getattr(sys.stdout, "errors", None) == "strict" and hasattr(sys.stdout, "reconfigure"):
+        sys.stdout.reconfigure(errors="replace")
+
+
+def _flush(stream: TextIO) -> None:
+    """Flush a stream; if it is broken, redirect it so that the last flush raises no error."""
     try:
-        sys.stdout.flush()
-    except OSError:
-        _drop_output()
-
-
-def _drop_output() -> None:
-    """Redirect standard output to the null device, so that the last flush raises no error."""
-    null = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(null, sys.stdout.fileno())
-    os.close(null)
+        stream.flush()
+    except (OSError, ValueError):
+        with suppress(OSError, ValueError):
+            null = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(null, stream.fileno())
+            os.close(null)
 
 
 if __name__ == "__main__":

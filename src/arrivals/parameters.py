@@ -13,6 +13,7 @@ import numpy as np
 
 FINDERS: list[Callable[[str], type]] = []  # functions from registered names to classes
 NAMERS: list[Callable[[type], str | None]] = []  # functions from classes to registered names
+MAX_DEPTH = 32  # of parts and lists in a configuration, one in the other
 
 
 class Configurable:
@@ -163,7 +164,8 @@ class Configurable:
     def from_dict(cls, config: Mapping[str, Any]) -> Self:
         """Make the object that `to_dict` described.
 
-        Modules that are not part of `arrivals` must have been imported before.
+        Nothing is imported but modules of `arrivals` and registered entry points; other modules
+        must have been imported before.
 
         Parameters
         ----------
@@ -178,18 +180,23 @@ class Configurable:
         Raises
         ------
         ValueError, TypeError
-            If "type" is not the name of such a class, or the class does not have a parameter.
+            If "type" is not the name of such a class, or the class refuses a parameter.
         """
+        _check_depth(config)
         if not isinstance(config, Mapping) or "type" not in config:
             raise ValueError(f"config must be a dictionary with the key 'type'; got {config!r}")
-        kind = _find_type(str(config["type"]))
+        kind = _find_type(str(config["type"])[:500])
         if not (inspect.isclass(kind) and issubclass(kind, cls)):
             raise TypeError(f"{config['type']} is not a {cls.__name__}")
-        unknown = sorted(set(config) - {"type", *kind.param_names()})
+        unknown = sorted(set(config) - {"type", *kind.param_names()}, key=str)
         if unknown:
             name = unknown[0]
             raise ValueError(kind.renaming(name) or f"{config['type']} has no parameter {name!r}")
-        return kind(**{key: _built(value) for key, value in config.items() if key != "type"})
+        params = {key: _built(value) for key, value in config.items() if key != "type"}
+        try:
+            return kind(**params)
+        except (AttributeError, LookupError, ArithmeticError, RuntimeError, MemoryError) as error:
+            raise ValueError(f"{config['type']} must have valid parameters; got {error}") from error
 
 
 class FrozenModel(Configurable):
@@ -234,8 +241,8 @@ def _find_type(name: str) -> Any:
             raise ImportError
         value: Any = importlib.import_module(module)
         for part in qualname.split("."):
-            value = getattr(value, part)
-    except (ImportError, AttributeError, ValueError):
+            value = vars(value)[part]  # not getattr, which may import and call
+    except (ImportError, KeyError, TypeError, ValueError):
         public = _public_name(module, qualname)
         hint = f"it is now called {public!r}" if public else "install and import its package"
         raise ValueError(f"there is no class {name!r}: {hint}") from None
@@ -274,6 +281,14 @@ def to_plain(value: Any) -> Any:
     if isinstance(value, tuple | list):
         return [to_plain(item) for item in value]
     return value
+
+
+def _check_depth(value: Any, depth: int = 0) -> None:
+    if depth > MAX_DEPTH:
+        raise ValueError(f"config must be nested at most {MAX_DEPTH} deep; got more")
+    if isinstance(value, Mapping | list | tuple):
+        for item in value.values() if isinstance(value, Mapping) else value:
+            _check_depth(item, depth + 1)
 
 
 def _built(value: Any) -> Any:

@@ -233,7 +233,7 @@ def test_atomic_write_makes_the_file_when_complete(tmp_path: Path) -> None:
 
 
 def test_to_csv_with_missing_folder_raises_with_its_name(tmp_path: Path) -> None:
-    with pytest.raises(FileNotFoundError, match=r"folder .*nowhere does not exist"):
+    with pytest.raises(FileNotFoundError, match=r"the folder does not exist: .*nowhere"):
         tracks().to_csv(tmp_path / "nowhere" / "tracks.csv")
 
 

@@ -7,11 +7,12 @@ import sys
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from arrivals.cli.outputs import check_different
+from arrivals.files import check_output
 from arrivals.measurement_models import LogNormalRSS, db_to_neper
 from arrivals.motion_models import ConstantVelocity
 from arrivals.recordings.networks import Network, read_network
@@ -261,12 +262,10 @@ def _check_outputs(arguments: argparse.Namespace) -> None:
     """Raise an error before the computation if an output cannot be written."""
     from arrivals.plots.bearing_time import picture_format
 
-    files = [name for name in (arguments.file, arguments.sensors, arguments.out, arguments.plot)
-             if name]  # fmt: skip
-    if len({Path(name).resolve() for name in files}) < len(files):
-        raise ValueError("READINGS, --sensors, --out and --plot must be different files")
-    for name in filter(None, (arguments.out, arguments.plot)):
-        if not Path(name).parent.is_dir():
-            raise FileNotFoundError(2, "the folder does not exist", str(Path(name).parent))
+    outputs = arguments.out, arguments.plot
+    check_different("READINGS, --sensors, --out and --plot",
+                    arguments.file, arguments.sensors, *outputs)  # fmt: skip
+    for name in filter(None, outputs):
+        check_output(name)
     if arguments.plot:
         picture_format(arguments.plot)

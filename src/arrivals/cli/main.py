@@ -6,6 +6,7 @@ import argparse
 import ast
 import inspect
 import sys
+import warnings
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NoReturn
@@ -164,9 +165,13 @@ def _setting(argument: str) -> tuple[str, Any]:
     if not (name and equals):
         raise argparse.ArgumentTypeError(f"must be NAME=VALUE; got {argument!r}")
     try:
-        return name, ast.literal_eval(value)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # about escapes, as in a path of Windows
+            return name, ast.literal_eval(value)
     except (ValueError, SyntaxError):
         return name, value
+    except (RecursionError, MemoryError):
+        raise argparse.ArgumentTypeError(f"{name} must not be nested so deeply") from None
 
 
 def _bar(quiet: bool) -> Callable[..., Any]:

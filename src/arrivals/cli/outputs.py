@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from functools import cache
-from pathlib import Path
+from itertools import combinations
 from typing import Any, TypeAlias
 
 from arrivals.cli.separated_signals import check_suffix
+from arrivals.files import check_output, open_live, same_file
 from arrivals.trackers.run import Run, header, text
 
 Bar: TypeAlias = Callable[..., Any]
@@ -22,21 +22,21 @@ def check_outputs(arguments: argparse.Namespace) -> None:
     from arrivals.plots.bearing_time import picture_format
 
     outputs = arguments.out, arguments.plot, arguments.signals
-    files = [name for name in (arguments.array, arguments.file, *outputs) if name and name != "-"]
-    if len({Path(name).resolve() for name in files}) < len(files):
-        raise ValueError("FILE, --array, --out, --plot and --signals must be different files")
+    check_different("FILE, --array, --out, --plot and --signals",
+                    arguments.array, arguments.file, *outputs)  # fmt: skip
     for name in filter(None, outputs):
-        folder = Path(name).parent
-        if not folder.is_dir():
-            raise FileNotFoundError(2, "the folder does not exist", str(folder))
-        if Path(name).is_dir():
-            raise IsADirectoryError(21, "this is a folder", name)
-        if not os.access(folder, os.W_OK):
-            raise PermissionError(13, "the folder may not be written to", str(folder))
+        check_output(name)
     if arguments.plot:
         picture_format(arguments.plot)
     if arguments.signals:
         check_suffix(arguments.signals)
+
+
+def check_different(words: str, *names: str | None) -> None:
+    """Raise a ValueError if two of the names, but for None and `-`, are those of one file."""
+    files = [name for name in names if name and name != "-"]
+    if any(same_file(one, other) for one, other in combinations(files, 2)):
+        raise ValueError(f"{words} must be different files")
 
 
 def refuse(arguments: argparse.Namespace, names: Iterable[str], reason: str) -> None:
@@ -71,5 +71,5 @@ def live_output(path: str | None) -> Iterator[Callable[[str], object]]:
         yield lambda lines: (sys.stdout.write(lines), sys.stdout.flush())
         return
     with ExitStack() as stack:
-        opened = cache(lambda: stack.enter_context(open(path, "wb", buffering=0)))
-        yield lambda lines: opened().write(lines.encode())
+        opened = cache(lambda: stack.enter_context(open_live(path)))
+        yield lambda lines: (opened().write(lines.encode()), opened().flush())

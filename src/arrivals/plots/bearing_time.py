@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -272,8 +272,8 @@ def save(ax: Axes, path: str | PathLike[str], *, dpi: float = 150.0) -> None:
     ValueError: the suffix of a picture must be one of '.png', '.pdf', '.svg', '.jpg'; got '.sketch'
     """
     kind = picture_format(path)
-    with atomic_write(path) as file:
-        cast("Figure", ax.figure).savefig(cast(TextIO, file).buffer, format=kind, dpi=dpi)
+    with atomic_write(path, binary=True) as file:
+        cast("Figure", ax.figure).savefig(file, format=kind, dpi=dpi)
 
 
 def picture_format(path: str | PathLike[str]) -> str:
