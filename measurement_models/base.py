@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.abstract_fields import property_or_field
+from arrivals.entry_names import checked_names
 from arrivals.parameters import FrozenModel
 from arrivals.typing import Float
-from arrivals.validation import state
+from arrivals.validation import instance, real, state
 
 
 class MeasurementModel(FrozenModel, ABC):
@@ -89,6 +90,7 @@ class MeasurementModel(FrozenModel, ABC):
         Traceback (most recent call last):
         TypeError: measurement must read entries of the state: Phasor needs 'delay'; got 'x', 'y'
         """
+        names = checked_names(names)
         if not names or not self.needs:
             return self
         entries, everything = locate(self, names), tuple(range(len(names)))
@@ -111,11 +113,12 @@ class MeasurementModel(FrozenModel, ABC):
 
     def residual(self, z: ArrayLike, z_pred: ArrayLike) -> Float:
         """Return z - z_pred; models whose measurement is an angle wrap it."""
-        return np.subtract(z, z_pred, dtype=np.float64)
+        z, z_pred = paired(z, z_pred)
+        return z - z_pred
 
     def sample(self, x: ArrayLike, rng: np.random.Generator) -> Float:
         """Draw a measurement of each state: (..., dim_x) -> (..., dim_z)."""
-        expected = self.h(x)
+        expected, rng = self.h(x), instance("rng", rng, np.random.Generator)
         noise = rng.multivariate_normal(np.zeros(self.dim_z), self.R, expected.shape[:-1])
         return np.asarray(expected + noise)
 
@@ -168,7 +171,7 @@ class SelectedEntries(MeasurementModel):
 
     def for_state(self, names: Sequence[str]) -> MeasurementModel:
         """Return the model for states with these names."""
-        return self if tuple(names) == self.names else self.measurement.for_state(names)
+        return self if checked_names(names) == self.names else self.measurement.for_state(names)
 
     def h(self, x: ArrayLike) -> Float:
         """Return the measurements expected of states: (..., dim_x) -> (..., dim_z)."""
@@ -214,6 +217,25 @@ def locate(measurement: MeasurementModel, names: Sequence[str]) -> tuple[int, ..
             f"{missing[0]!r}; got {', '.join(map(repr, names))}"
         )
     return tuple(names.index(name) for name in measurement.needs)
+
+
+def paired(z: ArrayLike, z_pred: ArrayLike) -> tuple[Float, Float]:
+    """Return two measurements, or stacks of them, whose shapes fit.
+
+    Examples
+    --------
+    >>> paired([1.0, 2.0], [1.0, 2.0, 3.0])
+    Traceback (most recent call last):
+    ValueError: z and z_pred must have the same shape; got (2,) and (3,)
+    """
+    z, z_pred = real("z", z), real("z_pred", z_pred)
+    if z.shape != z_pred.shape:
+        try:
+            np.broadcast(z, z_pred)
+        except (ValueError, RuntimeError):
+            shapes = f"{z.shape} and {z_pred.shape}"
+            raise ValueError(f"z and z_pred must have the same shape; got {shapes}") from None
+    return z, z_pred
 
 
 def default_position(n: int) -> tuple[int, int]:

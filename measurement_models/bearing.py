@@ -9,9 +9,16 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.measurement_models.base import MeasurementModel, default_position, locate
+from arrivals.entry_names import checked_names
+from arrivals.measurement_models.base import (
+    MeasurementModel,
+    default_position,
+    locate,
+    paired,
+)
+from arrivals.messages import shown
 from arrivals.typing import Float
-from arrivals.validation import constant, count, covariance, positive, real
+from arrivals.validation import constant, count, covariance, items, positive, real
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -101,6 +108,7 @@ class Bearing(MeasurementModel):
         TypeError
             If the state has no x or no y.
         """
+        names = checked_names(names)
         if not names or self.position is not None:
             return self
         x, y = locate(self, names)
@@ -129,7 +137,8 @@ class Bearing(MeasurementModel):
 
     def residual(self, z: ArrayLike, z_pred: ArrayLike) -> Float:
         """Return z - z_pred, wrapped into [-π, π)."""
-        return np.asarray((np.subtract(z, z_pred) + np.pi) % (2 * np.pi) - np.pi)
+        z, z_pred = paired(z, z_pred)
+        return np.asarray((z - z_pred + np.pi) % (2 * np.pi) - np.pi)
 
     def _state(self, x: ArrayLike) -> tuple[Float, tuple[int, int]]:
         """Return states (..., n), and the entries that are x and y."""
@@ -163,13 +172,13 @@ class Bearing(MeasurementModel):
 def _two_entries(position: tuple[int, int] | None) -> tuple[int, int] | None:
     if position is None:
         return None
-    entries = tuple(count("position", entry, minimum=0) for entry in position)
+    entries = tuple(count("position", entry, minimum=0) for entry in items("position", position))
     if len(set(entries)) != 2 or len(entries) != 2:
-        raise ValueError(f"position must name two entries of the state; got {position}")
+        raise ValueError(f"position must name two entries of the state; got {shown(position)}")
     return entries[0], entries[1]
 
 
 def _bearing_noise(noise: ArrayLike, n: int) -> float | Float:
-    if np.ndim(noise) == 0:
+    if real("noise", noise).ndim == 0:
         return positive("noise", noise)
     return constant("noise", covariance("noise", noise, n))

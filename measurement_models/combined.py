@@ -5,14 +5,14 @@ from __future__ import annotations
 import inspect
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.measurement_models.base import MeasurementModel
+from arrivals.measurement_models.base import MeasurementModel, paired
+from arrivals.measurements import numbers, real_numbers
 from arrivals.typing import Float
-from arrivals.validation import instance, real
+from arrivals.validation import instance, shaped, state
 
 
 @dataclass(frozen=True, init=False)
@@ -115,12 +115,15 @@ class CombinedMeasurement(MeasurementModel):
 
     def residual(self, z: ArrayLike, z_pred: ArrayLike) -> Float:
         """Return the residuals of the parts."""
+        z, z_pred = paired(z, z_pred)
+        z, z_pred = state(z, self.dim_z), state(z_pred, self.dim_z)
         (z1, z2), (pred1, pred2) = self._split(z), self._split(z_pred)
         parts = [self.first.residual(z1, pred1), self.second.residual(z2, pred2)]
         return np.concatenate(parts, axis=-1)
 
     def sample(self, x: ArrayLike, rng: np.random.Generator) -> Float:
         """Draw a measurement of each state, each part by its own `sample`."""
+        self.h(x)  # refuses a state before anything is drawn
         return np.concatenate([self.first.sample(x, rng), self.second.sample(x, rng)], axis=-1)
 
     def log_likelihood(self, z: ArrayLike, x: ArrayLike) -> Float:
@@ -129,8 +132,8 @@ class CombinedMeasurement(MeasurementModel):
         The sum over the parts that are not missing: by the part's own `log_likelihood` where it
         has one, else that of Gaussian noise.
         """
-        total: Any = 0.0
-        for part, own in zip((self.first, self.second), self._split(real("z", z)), strict=True):
+        z, total = shaped("z", real_numbers("z", z), self.dim_z), np.zeros(())
+        for part, own in zip((self.first, self.second), self._split(z), strict=True):
             if not np.isnan(own).all():
                 exact = getattr(part, "log_likelihood", None)
                 total = total + (_gaussian(part, own, x) if exact is None else exact(own, x))
@@ -165,8 +168,8 @@ class CombinedMeasurement(MeasurementModel):
         same = first is self.first and second is self.second
         return self if same else CombinedMeasurement(first, second)
 
-    def _split(self, z: ArrayLike) -> tuple[Float, Float]:
-        z, n = np.asarray(z), self.first.dim_z
+    def _split(self, z: Float) -> tuple[Float, Float]:
+        n = self.first.dim_z
         return z[..., :n], z[..., n:]
 
 
@@ -174,20 +177,23 @@ def _row(part: MeasurementModel, z: ArrayLike | None) -> Float:
     n = part.dim_z
     if z is None:
         return np.full(n, np.nan)
-    row = np.ravel(np.asarray(z))
-    if np.iscomplexobj(row):
+    row = np.ravel(numbers("z", z))
+    if row.dtype.kind == "c":
         row = np.concatenate([row.real, row.imag])
     if len(row) != n:
         raise ValueError(f"a measurement of {type(part).__name__} must have {n} entries; "
                          f"got {len(row)}")  # fmt: skip
-    return real("z", row)
+    return row
 
 
 def _gaussian(part: MeasurementModel, z: Float, x: ArrayLike) -> Float:
     """Return ln N(z; h(x), R) over the entries that are not NaN."""
     there = ~np.isnan(z)
     y = part.residual(z, part.h(x))[..., there]
-    L = np.linalg.cholesky(part.R[np.ix_(there, there)])
+    try:
+        L = np.linalg.cholesky(part.R[np.ix_(there, there)])
+    except np.linalg.LinAlgError:
+        raise ValueError(f"R of {type(part).__name__} must be positive; got no factor") from None
     white = np.linalg.solve(L, y[..., None])[..., 0]
     log_det = np.log(2 * np.pi) * len(L) / 2 + np.log(L.diagonal()).sum()
     return np.asarray(-0.5 * (white * white).sum(axis=-1) - log_det)

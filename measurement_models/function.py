@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.differentiation import function, numerical_jacobian, over_leading_axes
+from arrivals.entry_names import entry_names
 from arrivals.measurement_models.base import MeasurementModel
 from arrivals.typing import Float
-from arrivals.validation import covariance, entry_names, real, shaped
+from arrivals.validation import covariance, items, one_of, real, shaped
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
@@ -78,14 +79,14 @@ class FunctionMeasurement(MeasurementModel):
         needs: Sequence[str] = (),
         vectorized: bool = False,
     ) -> None:
-        noise = np.array(R, dtype=np.float64, ndmin=2)
+        noise, needs = np.array(real("R", R), ndmin=2), items("needs", needs)
         own = {
             "_h": function("h", h),
             "_H": None if H is None else function("H", H),
             "_R": covariance("R", noise, len(noise)),
             "_residual": None if residual is None else function("residual", residual),
             "needs": entry_names("needs", needs, len(needs)),
-            "vectorized": bool(vectorized),
+            "vectorized": one_of("vectorized", vectorized, (False, True)),
         }
         for name, value in own.items():
             object.__setattr__(self, name, value)
@@ -125,4 +126,4 @@ class FunctionMeasurement(MeasurementModel):
         """Return the difference of measurements: (..., dim_z) -> (..., dim_z)."""
         if self._residual is None:
             return super().residual(z, z_pred)
-        return np.asarray(self._residual(z, z_pred), dtype=np.float64)
+        return real("residual(z, z_pred)", self._residual(z, z_pred))

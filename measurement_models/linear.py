@@ -50,11 +50,6 @@ class LinearMeasurement(MeasurementModel):
     noise: Float
 
     def __init__(self, matrix: ArrayLike, noise: ArrayLike) -> None:
-        if np.iscomplexobj(matrix):
-            raise TypeError(
-                "matrix must hold real numbers, as the state does; stack real and imaginary parts "
-                f"of the measurement, composite(z); got {np.asarray(matrix).dtype}"
-            )
         matrix = constant("matrix", matrix)
         noise = constant("noise", covariance("noise", noise, len(matrix)))
         object.__setattr__(self, "matrix", matrix)

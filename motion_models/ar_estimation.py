@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from arrivals.measurements import numbers
 from arrivals.typing import Complex, Float
 from arrivals.validation import count
 
@@ -156,12 +157,8 @@ def _levinson(c: Float) -> list[tuple[Float, Float]]:
 
 
 def _signal(signal: ArrayLike) -> Float | Complex:
-    x = np.asarray(signal)
-    if x.dtype.kind not in "biufc":
-        raise TypeError(f"signal must hold numbers; got {x.dtype}")
+    x = numbers("signal", signal)
     if x.ndim == 0 or not np.isfinite(x).all():
         what = "one number" if x.ndim == 0 else "some that are not"
         raise ValueError(f"signal must hold finite samples, (..., n_samples); got {what}")
-    if x.dtype.kind == "c":
-        return x.astype(np.complex128)
-    return x.astype(np.float64)
+    return x

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from arrivals.messages import shown
 from arrivals.motion_models.base import LinearMotionModel
 from arrivals.motion_models.combined import block_diagonal
 from arrivals.motion_models.companion_form import (
@@ -17,7 +18,7 @@ from arrivals.motion_models.companion_form import (
     solve_lyapunov,
 )
 from arrivals.typing import Complex, Float
-from arrivals.validation import positive, real, state
+from arrivals.validation import items, one_of, positive, real, state, time_step
 
 
 @dataclass(frozen=True)
@@ -69,29 +70,35 @@ class AutoregressiveSources(LinearMotionModel):
     def __post_init__(self) -> None:
         rows = tuple(
             tuple(real(f"coefficients of source {k}", row).ravel().tolist())
-            for k, row in enumerate(self.coefficients)
+            for k, row in enumerate(items("coefficients", self.coefficients))
         )
         if not rows or not all(rows):
             raise ValueError(
                 "coefficients must be one list of at least one number for each source; "
-                f"got {self.coefficients!r}"
+                f"got {shown(self.coefficients)}"
             )
         for k, row in enumerate(rows):
+            got = shown(list(row))
             if not np.isfinite(row).all():
-                raise ValueError(f"coefficients of source {k} must be finite; got {list(row)}")
+                raise ValueError(
+                    f"coefficients of source {k} must be finite; got {shown(list(row))}"
+                )
             largest = float(pole_radius(np.array(row)))
             if not largest < 1:
                 raise ValueError(
                     f"coefficients of source {k} must be stable, all poles inside the unit "
-                    f"circle; got {list(row)}, unstable with a pole at the radius {largest:.6g}"
+                    f"circle; got {got}, unstable with a pole at the radius {largest:.6g}"
                 )
-        given = self.noise
-        noise = [float(q) for q in given] if np.ndim(given) else [given] * len(rows)  # type: ignore[union-attr]
-        if len(noise) != len(rows):
-            raise ValueError(f"noise must be 1 or {len(rows)} numbers, one a source; got {given}")
+        noise = real("noise", self.noise)
+        if noise.shape not in ((), (len(rows),)):
+            got = shown(self.noise)
+            raise ValueError(f"noise must be 1 or {len(rows)} numbers, one a source; got {got}")
+        noise = np.broadcast_to(noise, len(rows))
         object.__setattr__(self, "coefficients", rows)
-        object.__setattr__(self, "noise", tuple(positive("noise", q) for q in noise))
-        object.__setattr__(self, "real_valued", bool(self.real_valued))
+        object.__setattr__(self, "noise", tuple(positive("noise", q) for q in noise.tolist()))
+        object.__setattr__(
+            self, "real_valued", bool(one_of("real_valued", self.real_valued, (False, True)))
+        )
 
     @property
     def orders(self) -> tuple[int, ...]:
@@ -184,7 +191,13 @@ class AutoregressiveSources(LinearMotionModel):
         >>> AutoregressiveSources([[0.6]]).scaled(2.0).power.round(12)
         array([2.])
         """
-        noise = np.array(self.noise) * (real("power", power) / self.power)
+        power = real("power", power)
+        if power.shape not in ((), (self.n_sources,)):
+            got = f"shape {power.shape}"
+            raise ValueError(
+                f"power must be 1 or {self.n_sources} numbers, one a source; got {got}"
+            )
+        noise = np.array(self.noise) * (power / self.power)
         return self.replace(noise=noise.tolist())
 
     def _each_part(self, matrix: Float) -> Float:
@@ -192,5 +205,5 @@ class AutoregressiveSources(LinearMotionModel):
 
 
 def _one_sample(dt: float) -> None:
-    if dt != 1:
+    if time_step(dt) != 1:
         raise ValueError(f"dt must be 1, one sample, for autoregressive sources; got {dt}")

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from arrivals.abstract_fields import property_or_field
 from arrivals.parameters import FrozenModel
 from arrivals.typing import Float
-from arrivals.validation import state
+from arrivals.validation import instance, state
 
 
 class MotionModel(FrozenModel, ABC):
@@ -124,6 +124,7 @@ def gaussian(covariance: Float, shape: tuple[int, ...], rng: np.random.Generator
     >>> gaussian(np.zeros((2, 2)), (3,), np.random.default_rng(0)).shape
     (3, 2)
     """
+    instance("rng", rng, np.random.Generator)
     variance, axes = np.linalg.eigh(covariance)
     scale = np.sqrt(np.maximum(variance, 0.0))
     return np.asarray((rng.standard_normal((*shape, len(variance))) * scale) @ axes.T)

@@ -6,10 +6,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
+from arrivals.messages import shown
 from arrivals.motion_models.base import MotionModel
 from arrivals.motion_models.von_mises import VonMisesWalk
 from arrivals.typing import Bool, Float
-from arrivals.validation import not_negative, probability, real
+from arrivals.validation import instance, probability, real, time_step
 
 PAPER_KAPPA = 148.0  # 1.5° at broadside of a half-wavelength line
 
@@ -129,7 +130,7 @@ class BernoulliVonMises(MotionModel):
         """
         existence = real("existence", existence)
         if not ((existence >= 0) & (existence <= 1)).all():
-            raise ValueError(f"existence must lie in [0, 1]; got {existence}")
+            raise ValueError(f"existence must lie in [0, 1]; got {shown(existence)}")
         p_activate, p_deactivate = self._switching(dt)
         return np.asarray((1 - p_deactivate) * existence + p_activate * (1 - existence))
 
@@ -160,13 +161,16 @@ class BernoulliVonMises(MotionModel):
         >>> sure.sample_active([True, False], np.random.default_rng(0))
         array([ True,  True])
         """
-        active = np.asarray(active, dtype=bool)
+        active = real("active", active)
+        if not ((active == 0) | (active == 1)).all():
+            raise ValueError(f"active must hold True or False; got {shown(active)}")
+        instance("rng", rng, np.random.Generator)
         p_activate, p_deactivate = self._switching(dt)
-        return rng.random(active.shape) < np.where(active, 1 - p_deactivate, p_activate)
+        return rng.random(active.shape) < np.where(active == 1, 1 - p_deactivate, p_activate)
 
     def _switching(self, dt: float) -> tuple[float, float]:
         """Return p_activate and p_deactivate over `dt`: the transition matrix to that power."""
-        dt = not_negative("dt", dt)
+        dt = time_step(dt)
         switching = self.p_activate + self.p_deactivate
         if dt == 1.0 or switching == 0.0:
             return self.p_activate, self.p_deactivate

@@ -6,6 +6,7 @@ A(κ) = I₁(κ)/I₀(κ) is the mean resultant length of a von Mises density. A
 import numpy as np
 from numpy.typing import ArrayLike
 
+from arrivals.messages import shown
 from arrivals.typing import Float
 from arrivals.validation import count, real
 
@@ -133,7 +134,7 @@ def inverse_bessel_ratio(ratio: ArrayLike) -> Float:
     """
     ratio = np.asarray(ratio, dtype=np.float64)
     if not ((ratio >= 0) & (ratio <= 1)).all():
-        raise ValueError(f"a mean resultant length must lie in [0, 1]; got {ratio}")
+        raise ValueError(f"a mean resultant length must lie in [0, 1]; got {shown(ratio)}")
     return _concentration(ratio, 1 - ratio)
 
 
@@ -184,7 +185,7 @@ def concentrations(kappa: ArrayLike) -> Float:
     """Return concentrations as floats; a negative one is refused."""
     kappa = real("kappa", kappa)
     if (kappa < 0).any():
-        raise ValueError(f"kappa must not be negative; got {kappa}")
+        raise ValueError(f"kappa must not be negative; got {shown(kappa)}")
     return kappa
 
 

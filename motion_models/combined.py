@@ -9,9 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from arrivals.entry_names import entry_names
 from arrivals.motion_models.base import MotionModel
 from arrivals.typing import Float
-from arrivals.validation import entry_names, instance, state
+from arrivals.validation import instance, state
 
 
 @dataclass(frozen=True, init=False)
@@ -129,6 +130,7 @@ class CombinedMotion(MotionModel):
     def sample(self, x: ArrayLike, rng: np.random.Generator, dt: float = 1.0) -> Float:
         """Draw states after `dt`, each part by its own `sample`."""
         one, other = self._parts(x)
+        self.Q(dt)  # refuses a step before anything is drawn
         parts = [self.first.sample(one, rng, dt), self.second.sample(other, rng, dt)]
         return np.concatenate(parts, axis=-1)
 

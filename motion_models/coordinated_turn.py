@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from arrivals.motion_models.base import MotionModel
 from arrivals.motion_models.linear import ConstantVelocity
 from arrivals.typing import Float
-from arrivals.validation import not_negative, state
+from arrivals.validation import not_negative, state, time_step
 
 
 @dataclass(frozen=True)
@@ -65,6 +65,7 @@ class CoordinatedTurn(MotionModel):
     def f(self, x: ArrayLike, dt: float = 1.0) -> Float:
         """Return the states after `dt` on their circles: (..., 5) -> (..., 5)."""
         px, vx, py, vy, omega = np.moveaxis(state(x, 5), -1, 0)
+        dt = time_step(dt)
         c, s = np.cos(omega * dt), np.sin(omega * dt)
         along, across = _chord(omega, dt)
         return np.stack(
@@ -80,7 +81,7 @@ class CoordinatedTurn(MotionModel):
 
     def F(self, x: ArrayLike, dt: float = 1.0) -> Float:
         """Return the Jacobian of `f` at one state, (5, 5)."""
-        x = state(x, 5)
+        x, dt = state(x, 5), time_step(dt)
         if x.ndim != 1:
             raise ValueError(f"x must have shape (5,); got {x.shape}")
         _, vx, _, vy, omega = x
@@ -100,7 +101,7 @@ class CoordinatedTurn(MotionModel):
 
     def Q(self, dt: float = 1.0) -> Float:
         """Return the noise of `ConstantVelocity`, and q_turn dt on the turn rate."""
-        Q = np.zeros((5, 5))
+        Q, dt = np.zeros((5, 5)), time_step(dt)
         Q[:4, :4] = ConstantVelocity(self.q).Q(dt)
         Q[4, 4] = self.q_turn * dt
         return Q

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from arrivals.motion_models.base import MotionModel
 from arrivals.motion_models.von_mises import VonMisesWalk
 from arrivals.typing import Float
-from arrivals.validation import instance, not_negative, state
+from arrivals.validation import instance, not_negative, state, time_step
 
 
 @dataclass(frozen=True)
@@ -80,16 +80,17 @@ class DirectionAmplitudeWalk(MotionModel):
 
     def F(self, x: ArrayLike, dt: float = 1.0) -> Float:
         """Return the identity, (3, 3)."""
+        time_step(dt)
         return np.eye(3)
 
     def Q(self, dt: float = 1.0) -> Float:
         """Return the variances of the step of the direction and of each part of the amplitude."""
-        part = self.amplitude_noise / 2 * dt
+        part = self.amplitude_noise / 2 * time_step(dt)
         return np.diag([self.direction.Q(dt)[0, 0], part, part])
 
     def sample(self, x: ArrayLike, rng: np.random.Generator, dt: float = 1.0) -> Float:
         """Draw states after `dt`; directions take von Mises steps."""
         x = state(x, 3)
+        scale = np.sqrt(abs(self.amplitude_noise) / 2 * time_step(dt))
         doa = self.direction.sample(x[..., :1], rng, dt)
-        scale = np.sqrt(self.amplitude_noise / 2 * not_negative("dt", dt))
         return np.concatenate([doa, rng.normal(x[..., 1:], scale)], axis=-1)

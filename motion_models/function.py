@@ -10,10 +10,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.differentiation import function, numerical_jacobian, over_leading_axes
+from arrivals.entry_names import entry_names
 from arrivals.motion_models.base import MotionModel
 from arrivals.motion_models.von_mises import wrap
 from arrivals.typing import Float
-from arrivals.validation import count, covariance, entry_names, shaped, state
+from arrivals.validation import (
+    count,
+    covariance,
+    items,
+    one_of,
+    real,
+    shaped,
+    state,
+    time_step,
+)
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
@@ -79,9 +89,9 @@ class FunctionMotion(MotionModel):
         angles: Sequence[int] = (),
         vectorized: bool = False,
     ) -> None:
-        one_step = np.array(Q(1.0) if callable(Q) else Q, dtype=np.float64, ndmin=2)
+        one_step = np.array(real("Q", Q(1.0) if callable(Q) else Q), ndmin=2)
         n = len(covariance("Q", one_step, len(one_step)))
-        entries = tuple(count("angles", entry, minimum=0) for entry in angles)
+        entries = tuple(count("angles", entry, minimum=0) for entry in items("angles", angles))
         if any(entry >= n for entry in entries):
             raise ValueError(f"angles must be entries below {n}; got {entries}")
         own = {
@@ -91,7 +101,7 @@ class FunctionMotion(MotionModel):
             "dim_x": n,
             "names": entry_names("names", names, n),
             "angles": entries,
-            "vectorized": bool(vectorized),
+            "vectorized": one_of("vectorized", vectorized, (False, True)),
         }
         for name, value in own.items():
             object.__setattr__(self, name, value)
@@ -108,20 +118,21 @@ class FunctionMotion(MotionModel):
 
     def f(self, x: ArrayLike, dt: float = 1.0) -> Float:
         """Return the states after `dt`, without noise: (..., n) -> (..., n)."""
-        x = state(x, self.dim_x)
+        x, dt = state(x, self.dim_x), time_step(dt)
         if self.vectorized:
             return shaped("f(x, dt)", self._f(x, dt), *x.shape)
         return over_leading_axes("f(x, dt)", lambda each: self._f(each, dt), x, self.dim_x)
 
     def F(self, x: ArrayLike, dt: float = 1.0) -> Float:
         """Return the Jacobian of `f` at one state, (n, n)."""
-        x = shaped("x", x, self.dim_x)
+        x, dt = shaped("x", x, self.dim_x), time_step(dt)
         if self._F is not None:
             return shaped("F(x, dt)", self._F(x, dt), self.dim_x, self.dim_x)
         return numerical_jacobian(lambda states: self.f(states, dt), x, self._difference)
 
     def Q(self, dt: float = 1.0) -> Float:
         """Return the covariance of the noise of a step of `dt`, (n, n)."""
+        dt = time_step(dt)
         if callable(self._Q):
             return shaped("Q(dt)", self._Q(dt), self.dim_x, self.dim_x)
         if dt != 1:

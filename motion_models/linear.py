@@ -7,9 +7,19 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
+from arrivals.entry_names import entry_names
 from arrivals.motion_models.base import LinearMotionModel, coordinates
 from arrivals.typing import Float
-from arrivals.validation import constant, count, covariance, entry_names, not_negative, shaped
+from arrivals.validation import (
+    constant,
+    count,
+    covariance,
+    not_negative,
+    shaped,
+    time_step,
+)
+
+MOST_DIMS = 1000  # of a matrix that is no error
 
 
 @dataclass(frozen=True)
@@ -44,7 +54,7 @@ class RandomWalk(LinearMotionModel):
 
     def __post_init__(self) -> None:
         not_negative("q", self.q)
-        count("n_dims", self.n_dims)
+        count("n_dims", self.n_dims, maximum=MOST_DIMS)
 
     @property
     def dim_x(self) -> int:
@@ -58,11 +68,12 @@ class RandomWalk(LinearMotionModel):
 
     def F(self, x: ArrayLike | None = None, dt: float = 1.0) -> Float:
         """Return the identity, (dim_x, dim_x)."""
+        time_step(dt)
         return np.eye(self.n_dims)
 
     def Q(self, dt: float = 1.0) -> Float:
         """Return q dt on the diagonal."""
-        return self.q * not_negative("dt", dt) * np.eye(self.n_dims)
+        return self.q * time_step(dt) * np.eye(self.n_dims)
 
 
 @dataclass(frozen=True)
@@ -105,7 +116,7 @@ class ConstantVelocity(LinearMotionModel):
 
     def __post_init__(self) -> None:
         not_negative("q", self.q)
-        count("n_dims", self.n_dims)
+        count("n_dims", self.n_dims, maximum=MOST_DIMS)
 
     @property
     def dim_x(self) -> int:
@@ -119,11 +130,11 @@ class ConstantVelocity(LinearMotionModel):
 
     def F(self, x: ArrayLike | None = None, dt: float = 1.0) -> Float:
         """Return the transition matrix: each position gains its velocity times `dt`."""
-        return _drift(self.n_dims, dt).copy()
+        return _drift(self.n_dims, time_step(dt)).copy()
 
     def Q(self, dt: float = 1.0) -> Float:
         """Return the covariance of white acceleration over `dt`."""
-        return self.q * _unit_noise(self.n_dims, dt)
+        return self.q * _unit_noise(self.n_dims, time_step(dt))
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -224,7 +235,6 @@ def _drift(n: int, dt: float) -> Float:
 
 @lru_cache(maxsize=64)
 def _unit_noise(n: int, dt: float) -> Float:
-    dt = not_negative("dt", dt)
     return _on_diagonal([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]], n)
 
 
@@ -238,5 +248,5 @@ def _on_diagonal(block: ArrayLike, n: int) -> Float:
 
 
 def _one_step(dt: float) -> None:
-    if dt != 1:
+    if time_step(dt) != 1:
         raise ValueError(f"dt must be 1 for the matrices of LinearMotion; got {dt}")

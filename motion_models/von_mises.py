@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from arrivals.motion_models.base import MotionModel
 from arrivals.motion_models.bessel import concentrations, from_log_ratio, log_bessel_ratio
 from arrivals.typing import Complex, Float
-from arrivals.validation import count, not_negative, positive, state
+from arrivals.validation import count, instance, positive, real, state, time_step
 
 
 def wrap(angle: ArrayLike) -> Float:
@@ -33,7 +33,7 @@ def wrap(angle: ArrayLike) -> Float:
     array([-2.2832, -1.    , -3.1416])
     """
     with np.errstate(invalid="ignore"):
-        rest = np.fmod(angle, 2 * np.pi)
+        rest = np.fmod(real("angle", angle), 2 * np.pi)
     return np.asarray(rest - 2 * np.pi * ((rest >= np.pi) * 1.0 - (rest < -np.pi)))
 
 
@@ -68,7 +68,7 @@ def log_density(theta: ArrayLike, mu: ArrayLike, kappa: ArrayLike) -> Float:
     from scipy.special import i0e
 
     kappa = concentrations(kappa)
-    half = np.sin(0.5 * np.subtract(theta, mu))
+    half = np.sin(0.5 * (real("theta", theta) - real("mu", mu)))
     # cos δ - 1 = -2 sin²(δ/2), so that nothing of the size of κ cancels.
     return np.asarray(-2 * kappa * half * half - np.log(2 * np.pi * i0e(kappa)))
 
@@ -100,8 +100,8 @@ def product(
     >>> product([0.0, 0.0], 3.0, [0.0, np.pi / 2], 4.0)
     (array([0.        , 0.92729522]), array([7., 5.]))
     """
-    one, other = (np.exp(1j * np.asarray(mu, dtype=np.float64)) for mu in (mu1, mu2))
-    eta = np.multiply(kappa1, one) + np.multiply(kappa2, other)
+    one, other = (np.exp(1j * real("mu", mu)) for mu in (mu1, mu2))
+    eta = real("kappa1", kappa1) * one + real("kappa2", kappa2) * other
     return wrap(np.angle(eta)), np.asarray(np.abs(eta))
 
 
@@ -136,10 +136,8 @@ def mfold_concentration(kappa: ArrayLike, m: ArrayLike) -> Float:
     >>> mfold_concentration([0.0, 2.0, 1e6], 3).round(2)
     array([0.000000e+00, 1.302000e+01, 8.999996e+06])
     """
-    modes = np.asarray(m)
-    if modes.ndim == 0:
-        count("m", m)
-    elif (modes < 1).any():
+    modes = real("m", count("m", m) if np.isscalar(m) else m)
+    if (modes < 1).any():
         raise ValueError(f"m must be at least 1; got {modes.min()}")
     return from_log_ratio(log_bessel_ratio(kappa) / modes**2)
 
@@ -169,8 +167,8 @@ def mfold_modes(eta: ArrayLike, m: int) -> Complex:
     >>> np.angle(mfold_modes(5.0, 2)).round(4)
     array([0.    , 3.1416])
     """
-    eta = np.asarray(eta)[..., None]
-    phase = (np.angle(eta) + 2 * np.pi * np.arange(count("m", m))) / m
+    eta, turns = np.asarray(eta)[..., None], 2 * np.pi * np.arange(count("m", m))
+    phase = (np.angle(eta) + turns) / m
     return np.asarray(mfold_concentration(np.abs(eta), m) * np.exp(1j * phase))
 
 
@@ -231,7 +229,7 @@ class VonMisesWalk(MotionModel):
             |dθ/dβ| of an angle θ whose direction is β; not used where `kappa` is given.
         """
         if self.sigma_doa is not None:
-            return np.asarray(self.sigma_doa * np.asarray(slope, dtype=np.float64)) ** -2
+            return np.asarray(self.sigma_doa * real("slope", slope)) ** -2
         return np.asarray(self.kappa, dtype=np.float64)
 
     @property
@@ -251,6 +249,7 @@ class VonMisesWalk(MotionModel):
 
     def f(self, x: ArrayLike, dt: float = 1.0) -> Float:
         """Return the angles, wrapped and unchanged."""
+        time_step(dt)
         return wrap(state(x, 1))
 
     def F(self, x: ArrayLike, dt: float = 1.0) -> Float:
@@ -260,7 +259,7 @@ class VonMisesWalk(MotionModel):
     def Q(self, dt: float = 1.0) -> Float:
         """Return the variance of the wrapped normal step of the same A, -2 ln A(κ) dt, in rad²."""
         log_ratio = log_bessel_ratio(self.step_concentration())
-        return np.full((1, 1), -2 * log_ratio * not_negative("dt", dt))
+        return np.full((1, 1), -2 * log_ratio * time_step(dt))
 
     def blur(self, kappa: ArrayLike, dt: float = 1.0, slope: ArrayLike = 1.0) -> Float:
         """Return the concentration after a step of densities that had concentration `kappa`.
@@ -291,10 +290,10 @@ class VonMisesWalk(MotionModel):
         >>> VonMisesWalk(kappa=100.0).blur([0.0, 100.0, np.inf]).round(2)
         array([  0.  ,  50.25, 100.  ])
         """
-        log_ratio = not_negative("dt", dt) * log_bessel_ratio(self.step_concentration(slope))
+        log_ratio = time_step(dt) * log_bessel_ratio(self.step_concentration(slope))
         return from_log_ratio(log_bessel_ratio(kappa) + log_ratio)
 
     def sample(self, x: ArrayLike, rng: np.random.Generator, dt: float = 1.0) -> Float:
         """Draw angles after one von Mises step, of concentration A⁻¹(A(κ)^dt)."""
-        mean = self.f(x, dt)
+        mean, rng = self.f(x, dt), instance("rng", rng, np.random.Generator)
         return wrap(mean + rng.vonmises(0.0, self.blur(np.inf, dt), mean.shape))

@@ -42,7 +42,7 @@ def tone_bound(measurement: ArraySamples, doa: float, n_steps: int) -> float:
     >>> round(float(np.rad2deg(tone_bound(model, np.deg2rad(60.0), 100))), 5)
     0.22583
     """
-    source = instance("correlation", measurement.correlation, Tones)
+    source = instance("correlation", _samples(measurement).correlation, Tones)
     slope = (source.shares * source.omega**2).sum()
     J = count("n_steps", n_steps) * _aperture(measurement) * slope / measurement.noise_ratio
     return _angle_std(measurement, doa, float(J))
@@ -106,6 +106,7 @@ def exact_bound(measurement: ArraySamples, doa: float, n_steps: int) -> float:
     >>> round(float(np.rad2deg(exact_bound(model, np.deg2rad(60.0), 25))), 3)
     0.71
     """
+    _samples(measurement)
     k, j = np.divmod(np.arange(count("n_steps", n_steps) * len(measurement.grid_index)),
                      len(measurement.grid_index))  # fmt: skip
     apart = np.subtract.outer(measurement.grid_index[j], measurement.grid_index[j])
@@ -114,6 +115,10 @@ def exact_bound(measurement: ArraySamples, doa: float, n_steps: int) -> float:
     slope = -apart * measurement.correlation.drho(lag)
     solved = np.linalg.solve(C, slope)
     return _angle_std(measurement, doa, float((solved * solved.T).sum() / 2))
+
+
+def _samples(measurement: ArraySamples) -> ArraySamples:
+    return instance("measurement", measurement, ArraySamples)
 
 
 def _aperture(measurement: ArraySamples) -> float:

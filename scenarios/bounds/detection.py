@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from arrivals.messages import shown
 from arrivals.typing import Float
+from arrivals.validation import LARGEST, real
 
 
 def exact_detection(false_alarm: ArrayLike, n_snapshots: ArrayLike, snr: ArrayLike) -> Float:
@@ -39,9 +41,8 @@ def exact_detection(false_alarm: ArrayLike, n_snapshots: ArrayLike, snr: ArrayLi
     """
     from scipy.special import gammaincc, gammainccinv
 
-    return np.asarray(
-        gammaincc(n_snapshots, gammainccinv(n_snapshots, false_alarm) / (1 + np.asarray(snr)))
-    )
+    false_alarm, n_snapshots, snr = _arguments(false_alarm, n_snapshots, snr)
+    return np.asarray(gammaincc(n_snapshots, gammainccinv(n_snapshots, false_alarm) / (1 + snr)))
 
 
 def log_gaussian_detection(false_alarm: ArrayLike, n_snapshots: ArrayLike, snr: ArrayLike) -> Float:
@@ -56,6 +57,7 @@ def log_gaussian_detection(false_alarm: ArrayLike, n_snapshots: ArrayLike, snr: 
     """
     from scipy.special import ndtr, ndtri
 
+    false_alarm, n_snapshots, snr = _arguments(false_alarm, n_snapshots, snr)
     shift = np.sqrt(n_snapshots) * np.log1p(snr)
     return np.asarray(ndtr(shift + ndtri(false_alarm)))
 
@@ -74,9 +76,10 @@ def amplitude_gaussian_detection(
     """
     from scipy.special import ndtr, ndtri
 
+    false_alarm, n_snapshots, snr = _arguments(false_alarm, n_snapshots, snr)
     root = 2 * np.sqrt(n_snapshots)
     threshold = 1 - ndtri(false_alarm) / root
-    return np.asarray(ndtr(-root * (threshold / np.sqrt(1 + np.asarray(snr)) - 1)))
+    return np.asarray(ndtr(-root * (threshold / np.sqrt(1 + snr) - 1)))
 
 
 def true_false_alarm(false_alarm: ArrayLike, n_snapshots: ArrayLike) -> tuple[Float, Float]:
@@ -94,7 +97,7 @@ def true_false_alarm(false_alarm: ArrayLike, n_snapshots: ArrayLike) -> tuple[Fl
     """
     from scipy.special import gammaincc, ndtri
 
-    N = np.asarray(n_snapshots, dtype=np.float64)
+    false_alarm, N, _ = _arguments(false_alarm, n_snapshots, 0.0)
     margin = -ndtri(false_alarm) / (2 * np.sqrt(N))
     log = gammaincc(N, N * np.exp(2 * margin))
     return np.asarray(log), np.asarray(gammaincc(N, N * (1 + margin) ** 2))
@@ -126,5 +129,33 @@ def network_detection(false_alarm: ArrayLike, weights: ArrayLike, snr: ArrayLike
     """
     from scipy.special import ndtr, ndtri
 
-    delta = np.sqrt((np.asarray(weights) * (0.5 * np.log1p(snr)) ** 2).sum(axis=-1))
+    weights, snr = np.atleast_1d(real("weights", weights)), real("snr", snr)
+    _, weights, snr = _arguments(0.5, weights, snr, "weights", 0.0)
+    false_alarm, _, _ = _arguments(false_alarm, 1.0, 0.0)
+    delta = np.sqrt((weights * (0.5 * np.log1p(snr)) ** 2).sum(axis=-1))
     return np.asarray(ndtr(delta + ndtri(false_alarm)))
+
+
+def _arguments(
+    false_alarm: ArrayLike,
+    n: ArrayLike,
+    snr: ArrayLike,
+    name: str = "n_snapshots",
+    least: float = 1.0,
+) -> tuple[Float, Float, Float]:
+    """Return the arguments as arrays, checked."""
+    arrays = real("false_alarm", false_alarm), real(name, n), real("snr", snr)
+    alarm, numbers, ratio = arrays
+    if not ((alarm > 0) & (alarm < 1)).all():
+        raise ValueError(f"false_alarm must lie in (0, 1); got {shown(alarm)}")
+    if not ((numbers >= least) & (numbers < LARGEST)).all():
+        raise ValueError(f"{name} must be finite and at least {least:g}; got {shown(numbers)}")
+    if not ((ratio >= 0) & (ratio < LARGEST)).all():
+        raise ValueError(f"snr must be finite and not negative; got {shown(ratio)}")
+    try:
+        np.broadcast(*arrays)
+    except (ValueError, RuntimeError):
+        shapes = f"{alarm.shape}, {numbers.shape} and {ratio.shape}"
+        names = f"false_alarm, {name}, snr"
+        raise ValueError(f"{names} must have shapes that fit; got {shapes}") from None
+    return arrays

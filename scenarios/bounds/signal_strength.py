@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models import LogNormalRSS
+from arrivals.messages import shown
 from arrivals.trackers.rss.inference.joint_posterior import JointPosterior, Prior, marginals
 from arrivals.typing import Float
-from arrivals.validation import real
+from arrivals.validation import LARGEST, SMALLEST, instance, real
 
 
 class Bound(NamedTuple):
@@ -84,11 +85,19 @@ def rss_bound(
     >>> rss_bound(model, [9.2], [[30.0, 30.0]]).position.round(2)
     array([3.])
     """
-    u, theta = real("u", u), real("theta", theta)
+    instance("measurement", measurement, LogNormalRSS)
+    u, theta = _numbers("u", u), _numbers("theta", theta)
+    if u.ndim == 0 or theta.shape != (*u.shape, 2):
+        shapes = f"{u.shape} and {theta.shape}"
+        raise ValueError(f"u and theta must have shapes (..., K) and (..., K, 2); got {shapes}")
     K = u.shape[-1]
-    w = np.zeros(u.shape) if v0 is None else np.broadcast_to(1 / np.asarray(v0), u.shape)
-    P = np.zeros((2, 2)) if P0 is None else np.linalg.inv(real("P0", P0))
-    prior = Prior(u, w, theta, np.broadcast_to(P, (*u.shape, 2, 2)))
+    w = (
+        np.zeros(u.shape)
+        if v0 is None
+        else np.broadcast_to(1 / _numbers("v0", v0, u.shape, SMALLEST), u.shape)
+    )
+    P = np.zeros((2, 2)) if P0 is None else _inverse(_numbers("P0", P0, (*u.shape, 2, 2)))
+    prior = Prior(u, np.broadcast_to(w, u.shape), theta, np.broadcast_to(P, (*u.shape, 2, 2)))
     W = np.broadcast_to(1 / measurement.variance, (*u.shape[:-1], measurement.dim_z))
     problem = JointPosterior(measurement.propagation, W, W, prior)
     J = problem.information(measurement.levels(u, theta))
@@ -99,3 +108,23 @@ def rss_bound(
             f"sensors must determine the {3 * K} unknowns of {K} sources; got "
             f"{measurement.dim_z} readings"
         ) from None
+
+
+def _numbers(
+    name: str, value: ArrayLike, shape: tuple[int, ...] | None = None, least: float = -LARGEST
+) -> Float:
+    """Return finite numbers that may be broadcast to a shape, each at least `least`."""
+    array = real(name, value)
+    if not ((array >= least) & (array < LARGEST)).all():
+        raise ValueError(f"{name} must be finite{', positive' * (least > 0)}; got {shown(array)}")
+    fits = zip(reversed(array.shape), reversed(shape or array.shape), strict=False)
+    if shape is not None and (array.ndim > len(shape) or any(n not in (1, m) for n, m in fits)):
+        raise ValueError(f"{name} must have a shape that fits {shape}; got {array.shape}")
+    return array
+
+
+def _inverse(P0: Float) -> Float:
+    try:
+        return np.asarray(np.linalg.inv(P0))
+    except np.linalg.LinAlgError:
+        raise ValueError(f"P0 must be positive definite; got {shown(P0)}") from None

@@ -9,8 +9,10 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models import ArraySnapshot
 from arrivals.measurement_models.arrays.sensor_array import direction
+from arrivals.measurements import numbers
+from arrivals.messages import shown
 from arrivals.typing import Complex, Float
-from arrivals.validation import instance, positive
+from arrivals.validation import LARGEST, instance, positive, real
 
 
 def snapshot_bound(
@@ -53,8 +55,17 @@ def snapshot_bound(
     >>> bool(np.isclose(std[0] ** 2, 6 * 0.01 / (15 * (15**2 - 1) * np.pi**2)))
     True
     """
-    array, w = instance("measurement", measurement, ArraySnapshot).array, np.asarray(amplitude)
-    beta, wavelength = np.asarray(doa, np.float64), measurement.plain_wavelength("the bound")
+    array = instance("measurement", measurement, ArraySnapshot).array
+    w = numbers("amplitude", amplitude)
+    beta, wavelength = real("doa", doa), measurement.plain_wavelength("the bound")
+    noise = real("noise", noise)
+    if beta.ndim == 0 or w.shape[-1:] != beta.shape[-1:] or not beta.size:
+        shapes = f"{beta.shape} and {w.shape}"
+        raise ValueError(f"doa and amplitude must have shape (..., n_sources); got {shapes}")
+    if not (np.isfinite(w).all() and (np.abs(beta) < LARGEST).all()):
+        raise ValueError("doa and amplitude must be finite; got NaN, or an infinite number")
+    if not ((noise >= 0) & (noise < LARGEST)).all():
+        raise ValueError(f"noise must be finite and not negative; got {shown(noise)}")
     A = np.swapaxes(array.steering_vector(beta, wavelength), -1, -2)
     rotated = direction(beta + np.pi / 2, max(array.dim, 2))  # du/dβ in the plane
     slope = rotated[..., 1:2] if array.dim == 1 else rotated
@@ -65,7 +76,7 @@ def snapshot_bound(
     # J = Re[(DᴴP⊥D) ∘ (w wᴴ)ᵀ],  C = σ²/2 J⁻¹   (2.11)
     J = ((np.swapaxes(D.conj(), -1, -2) @ residual) * _outer(w)).real
     variance = np.diagonal(np.linalg.pinv(J, hermitian=True), axis1=-2, axis2=-1)
-    return np.asarray(np.sqrt(np.asarray(noise)[..., None] / 2 * variance))
+    return np.asarray(np.sqrt(noise[..., None] / 2 * variance))
 
 
 def _outer(w: ArrayLike) -> Float:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arrivals.typing import Float
+from arrivals.validation import LARGEST, SMALLEST, number, real
 
 
 class Difference(NamedTuple):
@@ -44,7 +45,7 @@ def paired_difference(first: Mapping[int, float], second: Mapping[int, float]) -
 def bootstrap_interval(values: Float, level: float = 0.95) -> tuple[float, float]:
     """Return the bias-corrected and accelerated bootstrap interval of the mean.
 
-    2000 resamples with a fixed seed; NaN for fewer than two values.
+    2000 resamples with a fixed seed; NaN for fewer than two values, or one that is not finite.
 
     References
     ----------
@@ -57,9 +58,12 @@ def bootstrap_interval(values: Float, level: float = 0.95) -> tuple[float, float
     """
     from scipy.stats import bootstrap
 
-    if values.size < 2:
+    values = real("values", values).ravel()
+    if not 0 < number("level", level) < 1:
+        raise ValueError(f"level must lie in (0, 1); got {level}")
+    if values.size < 2 or not (np.abs(values) < LARGEST).all():
         return np.nan, np.nan
-    if np.ptp(values) == 0:
+    if np.ptp(values) < SMALLEST:
         return float(values[0]), float(values[0])
     interval = bootstrap(
         (values,), np.mean, n_resamples=2000, confidence_level=level,

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.typing import Float, Int
-from arrivals.validation import positive, real
+from arrivals.validation import LARGEST, positive, real
 
 
 class Matches(NamedTuple):
@@ -65,6 +65,10 @@ def matches(
         raise ValueError(
             "truth and estimate must have shapes (n_steps, n_sources) and (n_steps, n_slots), or "
             f"(..., dim) of positions; got {t.shape} and {f.shape}"
+        )
+    if np.any(np.abs(t) >= LARGEST) or np.any(np.abs(f) >= LARGEST):
+        raise ValueError(
+            "truth and estimate must be finite, or NaN for absent points; got infinity"
         )
     error = f[:, None] - t[:, :, None]
     if period is not None:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.typing import Float
-from arrivals.validation import real
+from arrivals.validation import LARGEST, number, real
 
 
 def circular_nees(error: ArrayLike, std: ArrayLike) -> float:
@@ -151,13 +151,14 @@ def _mahalanobis(error: ArrayLike, covariance: ArrayLike) -> tuple[Float, int]:
             "error and covariance must have shapes (n, dim) and (n, dim, dim); "
             f"got {e.shape} and {P.shape}"
         )
-    if not (np.isfinite(P).all() and (np.linalg.eigvalsh(P) > 0).all()):
+    if not (np.abs(P) < LARGEST).all() or not (np.linalg.eigvalsh(P) > 1 / LARGEST).all():
         raise ValueError("covariance must be positive definite for every error")
+    _finite(e)
     return np.einsum("ni,ni->n", e, np.linalg.solve(P, e[..., None])[..., 0]), e.shape[1]
 
 
 def _level(level: float) -> float:
-    if not 0 < level < 1:
+    if not 0 < number("level", level) < 1:
         raise ValueError(f"level must lie in (0, 1); got {level}")
     return level
 
@@ -166,6 +167,12 @@ def _stated(error: ArrayLike, std: ArrayLike) -> tuple[Float, Float]:
     e, s = real("error", error), real("std", std)
     if e.shape != s.shape:
         raise ValueError(f"error and std must have the same shape; got {e.shape} and {s.shape}")
-    if not (s > 0).all():
+    if not (s > 1 / LARGEST).all():
         raise ValueError("std must be positive for every error")
-    return e, s
+    _finite(e)
+    return e, np.minimum(s, 1e3)  # as good as uniform
+
+
+def _finite(error: Float) -> None:
+    if not (np.abs(error) < LARGEST).all():
+        raise ValueError("error must be finite; got NaN, or an infinite one: leave it out")

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.typing import Float
-from arrivals.validation import number, positive, real
+from arrivals.validation import LARGEST, items, number, positive, real
 
 
 @dataclass(frozen=True)
@@ -86,8 +86,8 @@ def gospa(
     >>> gospa([-179], [178], c=10, period=360).distance
     3.0
     """
-    c, p = positive("c", c), _exponent(p)
-    if not 0 < number("alpha", alpha) <= 2:
+    p = _exponent(p, c := positive("c", c))
+    if not positive("alpha", alpha) <= 2:
         raise ValueError(f"alpha must lie in (0, 2]; got {alpha}")
     d = _distances(truth, estimate, period)
     pairs = _assigned(d, c, p)
@@ -134,7 +134,7 @@ def ospa(
     >>> ospa([10, 20], [12], c=10)
     6.0
     """
-    c, p, d = positive("c", c), _exponent(p), _distances(truth, estimate, period)
+    d, p = _distances(truth, estimate, period), _exponent(p, c := positive("c", c))
     size, surplus = max(d.shape), abs(d.shape[0] - d.shape[1])
     powers = np.sum(np.minimum(_assigned(d, c, p), c) ** p) + c**p * surplus
     return float((powers / size) ** (1 / p)) if size else 0.0  # (3)
@@ -249,20 +249,21 @@ def mean_rmse(
     return float(np.mean([rmse(t, f, c, period) for t, f in _steps(truth, estimate)]))
 
 
-def _exponent(p: float) -> float:
-    if not 1 <= number("p", p) < np.inf:
-        raise ValueError(f"p must be finite and at least 1; got {p}")
+def _exponent(p: float, c: float) -> float:
+    """Return an exponent for which c^p is finite and not zero."""
+    if not (1 <= number("p", p) < np.inf and abs(p * np.log10(c)) < 150):
+        cure = "c^p must be from 1e-150 to 1e150"
+        raise ValueError(f"p must be finite and at least 1; got {p}: {cure}")
     return float(p)
 
 
 def _steps(
     truth: Sequence[ArrayLike] | Float, estimate: Sequence[ArrayLike] | Float
 ) -> list[tuple[ArrayLike, ArrayLike]]:
+    truth, estimate = items("truth", truth), items("estimate", estimate)
     if len(truth) != len(estimate) or len(truth) == 0:
-        raise ValueError(
-            f"truth and estimate must have the same number of steps, at least one; "
-            f"got {len(truth)} and {len(estimate)}"
-        )
+        got = f"{len(truth)} and {len(estimate)}"
+        raise ValueError(f"truth and estimate must have the same number of steps; got {got}")
     return list(zip(truth, estimate, strict=True))
 
 
@@ -271,7 +272,7 @@ def _points(name: str, value: ArrayLike) -> Float:
     points = real(name, value)
     if points.ndim not in (1, 2):
         raise ValueError(f"{name} must have shape (n,) or (n, dim); got {points.shape}")
-    if np.any(np.isinf(points)):
+    if np.any(np.abs(points) >= LARGEST):
         raise ValueError(f"{name} must be finite, or NaN for absent points; got an infinite value")
     points = points[:, None] if points.ndim == 1 else points
     return np.asarray(points[~np.any(np.isnan(points), axis=1)])

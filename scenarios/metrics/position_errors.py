@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models import neper_to_db
+from arrivals.messages import shown
 from arrivals.typing import Float, Int
-from arrivals.validation import one_of, positive, real
+from arrivals.validation import LARGEST, SMALLEST, one_of, positive, real, shaped
 
 HUBER = 1.345  # deviations: 95 % efficient for Gaussian errors
 LOST_DISTANCE = 20.0  # m: sources beyond it are counted as lost
@@ -68,11 +69,11 @@ def huber(errors: ArrayLike, k: float = HUBER) -> HuberEstimate:
     from scipy.optimize import least_squares
 
     e = real("errors", errors).ravel()
-    if e.size == 0 or not np.isfinite(e).all():
-        raise ValueError(f"errors must be finite, at least one; got {e.tolist()}")
+    if e.size == 0 or not (np.abs(e) < LARGEST).all():
+        raise ValueError(f"errors must be finite, at least one; got {shown(e)}")
     median = float(np.median(e))
     scale = float(np.median(np.abs(e - median))) / 0.6745
-    if scale == 0:
+    if scale < SMALLEST:
         return HuberEstimate(median, float(np.sqrt(np.mean(e**2))))
     limit = positive("k", k) * scale
     fit = least_squares(
@@ -127,7 +128,18 @@ def assign(theta: ArrayLike, truth: ArrayLike, how: Assignment = "nearest") -> I
 
 def distances(theta: ArrayLike, truth: ArrayLike) -> Float:
     """Return distances (n_estimates, n_sources), m, at most `MAX_DISTANCE`, also of NaN."""
-    distance = np.linalg.norm(real("theta", theta)[:, None] - real("truth", truth), axis=-1)
+    theta, truth = real("theta", theta), real("truth", truth)
+    if (
+        not theta.ndim == truth.ndim == 2
+        or not theta.shape[1] == truth.shape[1] == 2
+        or not len(theta)
+    ):
+        raise ValueError(
+            "theta and truth must have shapes (n_estimates, 2) and (n_sources, 2), one or more; "
+            f"got {theta.shape} and {truth.shape}"
+        )
+    with np.errstate(over="ignore", invalid="ignore"):
+        distance = np.linalg.norm(theta[:, None] - truth, axis=-1)
     return np.where(np.isfinite(distance), np.minimum(distance, MAX_DISTANCE), MAX_DISTANCE)
 
 
@@ -194,11 +206,17 @@ def scores(
     1.3
     """
     theta, truth = real("theta", theta), real("truth", truth)
+    if theta.ndim != 3 or truth.ndim != 3 or len(theta) != len(truth) or not truth.size:
+        raise ValueError(
+            "theta and truth must have shape (n_runs, n_sources, 2), not empty; "
+            f"got {theta.shape} and {truth.shape}"
+        )
+    u, true_u = shaped("u", u, *theta.shape[:2]), shaped("true_u", true_u, *truth.shape[:2])
     index = np.array([assign(t, s, how) for t, s in zip(theta, truth, strict=True)])
     error = _bounded(np.take_along_axis(theta, index[..., None], axis=1) - truth)
     distance = np.hypot(error[..., 0], error[..., 1])
     x, y = huber(error[..., 0]), huber(error[..., 1])
-    du = np.take_along_axis(real("u", u), index, axis=1) - real("true_u", true_u)
+    du = np.take_along_axis(u, index, axis=1) - true_u
     level = huber(_bounded(neper_to_db(du)))
     return Scores(
         location_rms=float(np.hypot(x.rms, y.rms)),

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from arrivals.measurements import SMALLEST, numbers
 from arrivals.typing import Complex, Float
+from arrivals.validation import one_of
 
 
 def nmse(truth: ArrayLike, estimate: ArrayLike, *, db: bool = False) -> Float:
@@ -37,7 +39,7 @@ def nmse(truth: ArrayLike, estimate: ArrayLike, *, db: bool = False) -> Float:
     """
     s, s_hat = _signals(truth, estimate)
     ratio = _energy(s_hat - s) / _energy(s)
-    return _decibels(ratio) if db else ratio
+    return _decibels(ratio) if one_of("db", db, (False, True)) else ratio
 
 
 def sdr(truth: ArrayLike, estimate: ArrayLike) -> Float:
@@ -76,20 +78,18 @@ def sdr(truth: ArrayLike, estimate: ArrayLike) -> Float:
 
 
 def _signals(truth: ArrayLike, estimate: ArrayLike) -> tuple[Complex | Float, Complex | Float]:
-    s, s_hat = np.asarray(truth), np.asarray(estimate)
+    s, s_hat = numbers("truth", truth), numbers("estimate", estimate)
     if s.shape != s_hat.shape or s.ndim < 2:
         raise ValueError(
             "truth and estimate must have the same shape (..., n_steps, n_sources); "
             f"got {s.shape} and {s_hat.shape}"
         )
     for name, signals in (("truth", s), ("estimate", s_hat)):
-        if signals.dtype.kind not in "biufc":
-            raise TypeError(f"{name} must hold numbers; got {signals.dtype}")
         if not np.isfinite(signals).all():
             raise ValueError(f"{name} must be finite; got NaN or infinity: leave out empty steps")
-    if not _energy(s).all():
+    if not (_energy(s) > SMALLEST).all():
         raise ValueError("truth must be nonzero for every source; got a signal of zeros")
-    return s + 0.0, s_hat + 0.0
+    return s, s_hat
 
 
 def _energy(s: Complex | Float) -> Float:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.typing import Float
-from arrivals.validation import positive, real
+from arrivals.validation import LARGEST, positive, real
 
 
 def best_assignment_rmse(
@@ -55,7 +55,7 @@ def best_assignment_rmse(
             "truth and estimate must have shape (..., n_steps, n_sources), the same and not empty; "
             f"got {t.shape} and {f.shape}"
         )
-    if not (np.isfinite(t).all() and np.isfinite(f).all()):
+    if not ((np.abs(t) < LARGEST).all() and (np.abs(f) < LARGEST).all()):
         raise ValueError("truth and estimate must be finite; got NaN: use rmse for missed sources")
     if period is None:
         return np.asarray(np.sqrt(((np.sort(f) - np.sort(t)) ** 2).mean(axis=(-2, -1))))

@@ -7,9 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from arrivals.messages import shown
 from arrivals.motion_models.companion_form import pole_radius, solve_lyapunov
 from arrivals.typing import Complex, Float
-from arrivals.validation import count, real
+from arrivals.validation import LARGEST, count, instance, items, one_of, real
 
 
 def ar_signals(
@@ -55,14 +56,17 @@ def ar_signals(
     >>> s.shape, (abs(s) ** 2).mean(axis=0).round(1)
     ((5000, 2), array([1., 1.]))
     """
-    orders = [np.atleast_1d(real("coefficients", a)) for a in coefficients]
+    orders = [np.atleast_1d(real("coefficients", a)) for a in items("coefficients", coefficients)]
     variances = real("noise", noise)
     count("n", n)
-    if variances.shape != (len(orders),) or not (np.isfinite(variances) & (variances >= 0)).all():
+    if variances.shape != (len(orders),) or not ((variances >= 0) & (variances < LARGEST)).all():
         raise ValueError(
             f"noise must have one variance, not negative, for each of {len(orders)} sources; "
-            f"got {noise!r}"
+            f"got {shown(noise)}"
         )
+    instance("rng", rng, np.random.Generator)
+    batch = tuple(count("batch", n, minimum=0) for n in items("batch", batch))
+    one_of("complex_valued", complex_valued, (True, False))
     parts = (2, *batch) if complex_valued else batch
     n_parts = 2 if complex_valued else 1
     signals = [
@@ -92,12 +96,12 @@ def stationary_covariance(a: ArrayLike, q: float) -> Float:
     a = np.atleast_1d(real("coefficients", a))
     p = len(a)
     if a.ndim != 1 or p == 0 or not np.isfinite(a).all():
-        raise ValueError(f"coefficients must be finite numbers a_1 ... a_p; got {a.tolist()}")
+        raise ValueError(f"coefficients must be finite numbers a_1 ... a_p; got {shown(a)}")
     largest = float(pole_radius(a))
     if largest >= 1:
         raise ValueError(
             "roots of coefficients must be inside the unit circle; got modulus "
-            f"{largest:.6g} of {a.tolist()}"
+            f"{largest:.6g} of {shown(a)}"
         )
     F, Q = np.eye(p, k=-1), np.zeros((p, p))
     F[0], Q[0, 0] = a, q

@@ -1,11 +1,13 @@
 """Functions of a vector: numerical derivatives, values over leading axes."""
 
+import math
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from arrivals.typing import Float
+from arrivals.validation import real
 
 RELATIVE_STEP = np.finfo(np.float64).eps ** (1 / 3)  # least error of central differences
 
@@ -66,10 +68,12 @@ def over_leading_axes(name: str, f: Callable[[Float], Any], x: Float, m: int) ->
     array([[ 2.],
            [12.]])
     """
-    states = x.reshape(-1, x.shape[-1])
+    if x.ndim == 0:
+        raise ValueError("x must have shape (..., n); got a number")
+    states = x.reshape(math.prod(x.shape[:-1]), x.shape[-1])
     values = np.empty((len(states), m))
     for row, each in zip(values, states, strict=True):
-        value = np.ravel(np.asarray(f(each), dtype=np.float64))
+        value = np.ravel(real(name, f(each)))
         if value.shape != (m,):
             raise ValueError(f"{name} must have shape ({m},); got {value.shape}")
         row[:] = value

@@ -12,9 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from arrivals.messages import shown
 from arrivals.typing import Float
+from arrivals.validation import LARGEST as LARGEST
+from arrivals.validation import SMALLEST as SMALLEST
 
-LARGEST, SMALLEST = 1e140, 1e-140  # magnitudes whose squares are finite and not zero
 MAX_AXES = 8
 KINDS_OF_NUMBERS = "biufc"
 
@@ -58,7 +60,8 @@ def numbers(name: str, value: Any) -> NDArray[Any]:
         array = value  # the usual case
     else:
         array = _converted(name, value, 0)
-    size = np.abs(array)
+    with np.errstate(over="ignore"):  # of complex numbers at the end of the range
+        size = np.abs(array)
     valid = size < LARGEST
     if valid.all():
         return array
@@ -122,7 +125,7 @@ def rows(name: str, measurements: Any) -> Iterable[Any]:
     values = measurements.to_numpy() if hasattr(measurements, "to_numpy") else measurements
     is_text = isinstance(values, str | bytes | dict)
     if is_text or not isinstance(values, Iterable) or getattr(values, "ndim", 1) == 0:
-        raise TypeError(f"{name} must be a sequence, one entry a step; got {measurements!r}")
+        raise TypeError(f"{name} must be a sequence, one entry a step; got {shown(measurements)}")
     return values
 
 
@@ -177,10 +180,11 @@ def _item(name: str, item: Any) -> float | complex:
     if np.ma.isMaskedArray(item):
         item = np.nan if np.ma.getmaskarray(item).all() else item.item()
     if isinstance(item, str | bytes | list | tuple | np.ndarray):
-        raise TypeError(f"{name} must hold numbers, NaN for a missing one; got {item!r}")
+        raise TypeError(f"{name} must hold numbers, NaN for a missing one; got {shown(item)}")
     try:
         return complex(item) if np.iscomplexobj(item) else float(item)
     except OverflowError:
         return np.nan
     except (TypeError, ValueError):
-        raise TypeError(f"{name} must hold numbers, NaN for a missing one; got {item!r}") from None
+        wanted = "numbers, NaN for a missing one"
+        raise TypeError(f"{name} must hold {wanted}; got {shown(item)}") from None

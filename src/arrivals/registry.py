@@ -7,7 +7,7 @@ from collections.abc import Callable
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Generic, TypeVar
 
-from arrivals.validation import with_article
+from arrivals.messages import with_article
 
 Base = TypeVar("Base")
 Kind = TypeVar("Kind", bound=type)

@@ -1,15 +1,19 @@
 """Argument checks with uniform messages: "<argument> must be <wanted>; got <value>"."""
 
 import operator
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
+from arrivals.messages import shown, with_article
 from arrivals.typing import Float
 
 T = TypeVar("T")
+LARGEST, SMALLEST = 1e140, 1e-140  # magnitudes whose squares are finite and not zero
+LONGEST_STEP = 1e30  # its cube times any parameter is finite
+MOST = 10**9  # of anything that is counted
 
 
 def number(name: str, value: Any) -> float:
@@ -21,14 +25,13 @@ def number(name: str, value: Any) -> float:
     Traceback (most recent call last):
     TypeError: kappa must be a number; got 'many'
     """
-    if isinstance(value, bool | str | bytes) or not np.isscalar(value) or not np.isrealobj(value):
-        raise TypeError(f"{name} must be a number; got {value!r}")
-    try:
-        return float(value)  # type: ignore[arg-type]  # any scalar with __float__
-    except OverflowError:
-        raise ValueError(f"{name} must be at most 1.8e308; got a larger whole number") from None
-    except (TypeError, ValueError):
-        raise TypeError(f"{name} must be a number; got {value!r}") from None
+    of_numpy = isinstance(value, np.generic) and value.dtype.kind in "iuf"
+    if of_numpy or (isinstance(value, float | int) and not isinstance(value, bool)):
+        try:
+            return float(value)
+        except OverflowError:
+            raise ValueError(f"{name} must be at most {LARGEST}; got a larger number") from None
+    raise TypeError(f"{name} must be a number; got {shown(value)}")
 
 
 def positive(name: str, value: Any) -> float:
@@ -40,9 +43,12 @@ def positive(name: str, value: Any) -> float:
     Traceback (most recent call last):
     ValueError: kappa must be finite and positive; got -1
     """
-    if not 0 < number(name, value) < np.inf:
+    size = number(name, value)
+    if not 0 < size < np.inf:
         raise ValueError(f"{name} must be finite and positive; got {value}")
-    return float(value)
+    if not SMALLEST < size < LARGEST:
+        raise ValueError(f"{name} must be from {SMALLEST} to {LARGEST}; got {value}")
+    return size
 
 
 def not_negative(name: str, value: Any) -> float:
@@ -54,9 +60,12 @@ def not_negative(name: str, value: Any) -> float:
     Traceback (most recent call last):
     ValueError: q must be finite and not negative; got -0.5
     """
-    if not 0 <= number(name, value) < np.inf:
+    size = number(name, value)
+    if not 0 <= size < np.inf:
         raise ValueError(f"{name} must be finite and not negative; got {value}")
-    return float(value)
+    if not size < LARGEST:
+        raise ValueError(f"{name} must be at most {LARGEST}; got {value}")
+    return size
 
 
 def time_step(dt: Any) -> float:
@@ -68,9 +77,12 @@ def time_step(dt: Any) -> float:
     Traceback (most recent call last):
     ValueError: dt must be finite and not negative; got nan
     """
-    if type(dt) is float and 0.0 <= dt < np.inf:
+    if type(dt) is float and 0.0 <= dt < LONGEST_STEP:
         return dt  # the usual case
-    return not_negative("dt", dt)
+    step = not_negative("dt", dt)
+    if not step < LONGEST_STEP:
+        raise ValueError(f"dt must be at most {LONGEST_STEP}; got {dt}")
+    return step
 
 
 def no_control(u: ArrayLike | None) -> None:
@@ -85,7 +97,8 @@ def no_control(u: ArrayLike | None) -> None:
     ValueError: u must be None or 0 for a method without a control input; got 0.5
     """
     if u is not None and np.any(real("u", u)):
-        raise ValueError(f"u must be None or 0 for a method without a control input; got {u}")
+        wanted = "None or 0 for a method without a control input"
+        raise ValueError(f"u must be {wanted}; got {shown(u)}")
 
 
 def probability(name: str, value: Any) -> float:
@@ -102,8 +115,8 @@ def probability(name: str, value: Any) -> float:
     return float(value)
 
 
-def count(name: str, value: Any, minimum: int = 1) -> int:
-    """Return a whole number that is at least `minimum`.
+def count(name: str, value: Any, minimum: int = 1, maximum: int = MOST) -> int:
+    """Return a whole number from `minimum` to `maximum`.
 
     Examples
     --------
@@ -114,11 +127,13 @@ def count(name: str, value: Any, minimum: int = 1) -> int:
     try:
         whole = operator.index(value)
     except TypeError:
-        raise TypeError(f"{name} must be a whole number; got {value!r}") from None
+        raise TypeError(f"{name} must be a whole number; got {shown(value)}") from None
     if isinstance(value, bool):
-        raise TypeError(f"{name} must be a whole number; got {value!r}")
+        raise TypeError(f"{name} must be a whole number; got {shown(value)}")
     if whole < minimum:
-        raise ValueError(f"{name} must be at least {minimum}; got {value}")
+        raise ValueError(f"{name} must be at least {minimum}; got {shown(value)}")
+    if whole > maximum:
+        raise ValueError(f"{name} must be at most {maximum}; got {shown(value)}")
     return whole
 
 
@@ -131,8 +146,10 @@ def one_of(name: str, value: T, choices: tuple[T, ...]) -> T:
     Traceback (most recent call last):
     ValueError: reference must be one of 'first', 'middle'; got 'last'
     """
-    if value not in choices:
-        raise ValueError(f"{name} must be one of {', '.join(map(repr, choices))}; got {value!r}")
+    plain = value is None or isinstance(value, str | int | float | np.bool_)
+    if not plain or value not in choices:
+        listed = ", ".join(map(repr, choices))
+        raise ValueError(f"{name} must be one of {listed}; got {shown(value)}")
     return value
 
 
@@ -147,19 +164,8 @@ def instance(name: str, value: Any, kind: type[T]) -> T:
     """
     if not isinstance(value, kind):
         expected, given = with_article(kind.__name__), with_article(type(value).__name__)
-        raise TypeError(f"{name} must be {expected}; got {value!r}, {given}")
+        raise TypeError(f"{name} must be {expected}; got {shown(value)}, {given}")
     return value
-
-
-def with_article(noun: str) -> str:
-    """Return a noun with its indefinite article.
-
-    Examples
-    --------
-    >>> with_article("animal"), with_article("tracker")
-    ('an animal', 'a tracker')
-    """
-    return f"an {noun}" if noun[0].lower() in "aeiou" else f"a {noun}"
 
 
 def shaped(name: str, value: ArrayLike, *shape: int) -> Float:
@@ -186,13 +192,26 @@ def real(name: str, value: ArrayLike) -> Float:
     Traceback (most recent call last):
     TypeError: x must hold real numbers; got complex128: stack real and imaginary parts, [Re; Im]
     """
-    array = np.asarray(value)
+    if type(value) is np.ndarray and value.dtype == np.float64:
+        return value  # the usual case
+    array = _array(name, value)
     if array.dtype.kind == "c":
         cure = "stack real and imaginary parts, [Re; Im]"
         raise TypeError(f"{name} must hold real numbers; got {array.dtype}: {cure}")
     if array.dtype.kind not in "biuf":
         raise TypeError(f"{name} must hold real numbers; got {array.dtype}")
-    return array.astype(np.float64, copy=False)
+    with np.errstate(over="ignore"):
+        return array.astype(np.float64, copy=False)
+
+
+def _array(name: str, value: Any) -> NDArray[Any]:
+    """Return a value as an array, if it is rectangular and nothing in it is masked."""
+    if np.ma.is_masked(value):
+        raise ValueError(f"{name} must not be masked; got {shown(value)}")
+    try:
+        return np.asarray(value)
+    except Exception:  # of numpy, or of the value's own __array__
+        raise ValueError(f"{name} must have rows of one length; got {shown(value)}") from None
 
 
 def state(x: ArrayLike, dim_x: int) -> Float:
@@ -212,20 +231,21 @@ def state(x: ArrayLike, dim_x: int) -> Float:
     return array
 
 
-def entry_names(name: str, value: Sequence[str], n: int) -> tuple[str, ...]:
-    """Return the names of n entries, all different, or ().
+def items(name: str, value: Any) -> tuple[Any, ...]:
+    """Return the items of a sequence.
 
     Examples
     --------
-    >>> entry_names("names", ["x", "vx"], 3)
+    >>> items("angles", [0, 2])
+    (0, 2)
+    >>> items("angles", 2)
     Traceback (most recent call last):
-    ValueError: names must be 3 different strings, one of each entry; got ['x', 'vx']
+    TypeError: angles must be a sequence; got 2
     """
-    names = tuple(value)
-    strings = not isinstance(value, str) and all(isinstance(each, str) for each in names)
-    if names and not (strings and len(set(names)) == len(names) == n):
-        raise ValueError(f"{name} must be {n} different strings, one of each entry; got {value!r}")
-    return names
+    is_sequence = isinstance(value, Iterable) and not isinstance(value, str | bytes | Mapping)
+    if not is_sequence or getattr(value, "ndim", 1) == 0:
+        raise TypeError(f"{name} must be a sequence; got {shown(value)}")
+    return tuple(value)
 
 
 def constant(name: str, value: ArrayLike) -> Float:
@@ -240,8 +260,8 @@ def constant(name: str, value: ArrayLike) -> Float:
     matrix = np.array(real(name, value))
     if matrix.ndim != 2 or matrix.size == 0:
         raise ValueError(f"{name} must be a matrix; got shape {matrix.shape}")
-    if not np.isfinite(matrix).all():
-        raise ValueError(f"{name} must be finite; got {matrix.tolist()}")
+    if not (np.abs(matrix) < LARGEST).all():
+        raise ValueError(f"{name} must be finite and at most {LARGEST}; got {shown(matrix)}")
     matrix.setflags(write=False)
     return matrix
 
@@ -256,15 +276,20 @@ def covariance(name: str, value: ArrayLike, n: int) -> Float:
     ValueError: P must have no negative eigenvalue; got [[1.0, 2.0], [2.0, 1.0]]
     """
     matrix = shaped(name, value, n, n)
-    if (matrix == matrix.T).all() and _has_factor(matrix):
+    if (
+        matrix.size
+        and (matrix == matrix.T).all()
+        and matrix.diagonal().max() < LARGEST
+        and _has_factor(matrix)
+    ):
         return matrix  # the usual case, three times faster than the general one
-    size = np.abs(matrix).max()
-    if not size < np.inf:
-        raise ValueError(f"{name} must be finite; got {matrix.tolist()}")
-    if np.abs(matrix - matrix.T).max() > 1e-9 * size:
-        raise ValueError(f"{name} must be symmetric; got {matrix.tolist()}")
-    if np.linalg.eigvalsh(matrix)[0] < -1e-9 * size:
-        raise ValueError(f"{name} must have no negative eigenvalue; got {matrix.tolist()}")
+    size = np.abs(matrix).max(initial=0.0)
+    if not size < LARGEST:
+        raise ValueError(f"{name} must be finite and at most {LARGEST}; got {shown(matrix)}")
+    if np.abs(matrix - matrix.T).max(initial=0.0) > 1e-9 * size:
+        raise ValueError(f"{name} must be symmetric; got {shown(matrix)}")
+    if np.linalg.eigvalsh(matrix).min(initial=0.0) < -1e-9 * size:
+        raise ValueError(f"{name} must have no negative eigenvalue; got {shown(matrix)}")
     return matrix
 
 

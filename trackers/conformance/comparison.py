@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from arrivals.messages import shown
+
 
 def difference(a: Any, b: Any, where: str = "value") -> str | None:
     """Return a description of the first difference of two values, or None.
@@ -38,25 +40,28 @@ def _difference(a: Any, b: Any, where: str, seen: set[tuple[int, int]]) -> str |
     if a is b or (id(a), id(b)) in seen:
         return None
     seen.add((id(a), id(b)))
-    changed = f"{where}: {a!r} became {b!r}"
     if type(a) is not type(b):
-        return changed
+        return _changed(where, a, b)
     if isinstance(a, np.ndarray) and a.dtype != object:
         same = a.dtype == b.dtype and np.array_equal(a, b, equal_nan=a.dtype.kind in "fc")
         return None if same else f"{where}: {a} became {b}"
     if isinstance(a, float | complex | np.number):
-        return None if a == b or (a != a and b != b) else changed
+        return None if a == b or (a != a and b != b) else _changed(where, a, b)
     if isinstance(a, np.random.Generator):
         a, b = a.bit_generator.state, b.bit_generator.state
     parts_a, parts_b = _parts(a), _parts(b)
     if parts_a is None or parts_b is None:
-        return None if a == b else changed
+        return None if a == b else _changed(where, a, b)
     if parts_a.keys() != parts_b.keys():
         return f"{where}: {sorted(map(str, parts_a))} became {sorted(map(str, parts_b))}"
     differences = (
         _difference(parts_a[key], parts_b[key], f"{where}.{key}", seen) for key in parts_a
     )
     return next(filter(None, differences), None)
+
+
+def _changed(where: str, a: Any, b: Any) -> str:
+    return f"{where}: {shown(a)} became {shown(b)}"
 
 
 def _parts(value: Any) -> dict[Any, Any] | None:

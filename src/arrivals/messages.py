@@ -1,0 +1,40 @@
+"""Values in messages."""
+
+import reprlib
+from typing import Any
+
+import numpy as np
+
+LONGEST = 200  # characters
+REPR = reprlib.Repr()
+REPR.maxlist = REPR.maxtuple = 12
+REPR.maxstring = REPR.maxother = REPR.maxlong = LONGEST
+
+
+def shown(value: Any) -> str:
+    """Return a value as one line of a message, shortened.
+
+    Examples
+    --------
+    >>> shown(np.eye(2)), shown([1, [2, [3]]])
+    ('[[1.0, 0.0], [0.0, 1.0]]', '[1, [2, [3]]]')
+    >>> shown(10**5000)
+    'an int'
+    """
+    try:
+        is_small = isinstance(value, np.ndarray) and value.size <= 100
+        text = " ".join(REPR.repr(value.tolist() if is_small else value).split())
+    except Exception:  # of the value's own repr
+        return with_article(type(value).__name__)
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."
+
+
+def with_article(noun: str) -> str:
+    """Return a noun with its indefinite article.
+
+    Examples
+    --------
+    >>> with_article("animal"), with_article("tracker")
+    ('an animal', 'a tracker')
+    """
+    return f"an {noun}" if noun[0].lower() in "aeiou" else f"a {noun}"
