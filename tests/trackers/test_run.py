@@ -256,7 +256,7 @@ def test_to_csv_to_a_folder_raises(tmp_path: Path) -> None:
         np.full((2, 3), np.nan),
         complex(np.nan, 0.0),
         np.inf,
-        np.ma.masked_all(3),
+        np.ma.masked_array(np.ones(3), mask=True),
     ],
 )
 def test_is_missing_of_none_and_all_nan_is_true(z: ArrayLike | None) -> None:
