@@ -117,9 +117,13 @@ class CBF(DirectionTracker):
         model = self.measurement
         if model.is_single and model.response is None:
             return self.amplitudes(model.steering_vector(doa), z)
-        A = model.waves.steering(doa)
-        norm = (A.real**2 + A.imag**2).sum(axis=2).mean(axis=(0, 1))
-        return np.asarray(np.sqrt(mean_beam_power(A, model.snapshots(z)) / norm) + 0j)
+        A, Y = model.waves.steering(doa), model.snapshots(z)
+        valid = ~np.isnan(Y)
+        n_valid, bins = valid.any(axis=1).sum(axis=1), valid.any(axis=(1, 2))
+        share = valid[bins].sum(axis=2) / n_valid[bins, None]  # of the snapshots with data
+        power = (A.real**2 + A.imag**2)[:, bins] * share[..., None]
+        norm = power.sum(axis=2).mean(axis=(0, 1))
+        return np.asarray(np.sqrt(mean_beam_power(A, Y) / norm) + 0j)
 
     def spectrum(self, A: Complex, z: Complex) -> Float:
         """Return the power of one snapshot from directions with steering vectors A.

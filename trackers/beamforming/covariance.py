@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from arrivals.typing import Complex, Float
+from arrivals.trackers.beamforming.incomplete import PatternSums
+from arrivals.typing import Bool, Complex, Float
 from arrivals.validation import count
+
+MIN_RELATIVE_WEIGHT = 0.3  # of the data of a sensor, relative to that with most data
 
 
 def diagonal_loading(R: Complex | Float, loading: float) -> Complex | Float:
@@ -87,51 +90,61 @@ def spatial_smoothing(R: Complex, length: int, *, backward: bool = False) -> Com
 class RunningCovariance:
     """Mixin of trackers with an exponentially weighted covariance of the snapshots.
 
-    Each pair of sensors is averaged over the snapshots in which both have valid data.
-
     Attributes
     ----------
     forgetting : float
         Weight of the past after one unit of time.
-    covariance : ndarray, shape (n_sensors, n_sensors)
-        Weighted sum of the snapshots' outer products.
-    weight : ndarray, shape (n_sensors, n_sensors)
-        Sum of the weights, for each pair of sensors.
+    sums : PatternSums
+        Weighted sums of the snapshots' outer products, for each set of sensors with data.
 
     Examples
     --------
     >>> running = RunningCovariance()
     >>> running.forgetting = 0.5
     >>> running.reset_covariance(2)
-    >>> for z in ([1.0, 1j], [3.0, np.nan]):
+    >>> for z in ([1.0, 1j], [3.0, 3j]):
     ...     running.apply_forgetting(1.0)
     ...     running.add_snapshot(np.array(z))
-    >>> running.mean_covariance().real.round(3)
+    >>> running.mean_covariance(running.sensors_with_data()).real.round(3)
     array([[6.333, 0.   ],
-           [0.   , 1.   ]])
+           [0.   , 6.333]])
     """
 
     forgetting: float
-    covariance: Complex
-    weight: Float
+    sums: PatternSums
+
+    @property
+    def covariance(self) -> Complex:
+        """Weighted sum of the snapshots' outer products, (n_sensors, n_sensors)."""
+        return np.asarray(self.sums.products.sum(axis=0))
 
     def reset_covariance(self, n_sensors: int) -> None:
         """Set sums and weights to zero."""
-        shape = (n_sensors, n_sensors)
-        self.covariance, self.weight = np.zeros(shape, dtype=np.complex128), np.zeros(shape)
+        self.sums = PatternSums.empty(n_sensors)
 
     def apply_forgetting(self, dt: float) -> None:
         """Multiply sums and weights by forgetting^dt."""
-        factor = self.forgetting**dt
-        self.covariance, self.weight = factor * self.covariance, factor * self.weight
+        self.sums = self.sums.forget(self.forgetting**dt)
 
     def add_snapshot(self, z: Complex) -> None:
         """Add the outer product of a snapshot, NaN where a sensor has no valid data."""
-        valid = ~np.isnan(z)
-        y = np.where(valid, z, 0)
-        self.covariance = self.covariance + np.multiply.outer(y, y.conj())
-        self.weight = self.weight + np.multiply.outer(valid, valid)
+        self.sums = self.sums.add(z)
 
-    def mean_covariance(self) -> Complex:
-        """Return the weighted mean, (n_sensors, n_sensors); 0 for pairs without data."""
-        return np.asarray(self.covariance / np.where(self.weight > 0, self.weight, 1.0))
+    def sensors_with_data(self) -> Bool:
+        """Return the sensors with enough data, relative to the others, (n_sensors,)."""
+        return has_enough_data(self.sums.sensor_weights)
+
+    def mean_covariance(self, sensors: Bool) -> Complex:
+        """Return the mean covariance of some sensors with data, positive semidefinite: (n, n)."""
+        return self.sums.mean_covariance(sensors)
+
+
+def has_enough_data(weights: Float) -> Bool:
+    """Return the sensors whose data have enough weight, at least 0.3 of the largest.
+
+    Examples
+    --------
+    >>> has_enough_data(np.array([20.0, 5.0, 7.0, 0.0]))
+    array([ True, False,  True, False])
+    """
+    return np.asarray((weights > 0) & (weights >= MIN_RELATIVE_WEIGHT * weights.max()))

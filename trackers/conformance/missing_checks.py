@@ -113,6 +113,8 @@ def without_first_sensor(tracker: Tracker) -> Tracker | None:
     params = tracker.get_params(deep=False)
     response = getattr(params["measurement"], "response", None)
     less = {} if response is None else {"response": response.without([0])}
+    parts = {name: each for name, each in params.items() if isinstance(each, Tracker)}
+    params |= {name: without_first_sensor(each) for name, each in parts.items()}
     try:
         params["measurement"] = params["measurement"].replace(array=array.without([0]), **less)
         return type(tracker)(**params)

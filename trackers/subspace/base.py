@@ -10,13 +10,13 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.manifolds.uniform_line import UniformLineManifold
+from arrivals.trackers.beamforming.covariance import has_enough_data
+from arrivals.trackers.beamforming.source_number import number_of_sources
 from arrivals.trackers.direction_tracker import DirectionTracker
-from arrivals.trackers.subspace.source_number import number_of_sources
 from arrivals.typing import Bool, Complex, Float
 from arrivals.validation import count, instance, no_control, one_of, probability, time_step
 
 NumberOfSources: TypeAlias = int | Literal["aic", "mdl"] | None
-MIN_RELATIVE_WEIGHT = 1e-3  # sensors of less weight, relative to the largest, are left out
 
 
 class Subspaces(NamedTuple):
@@ -117,6 +117,8 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
         Sum of the weights of the snapshots, and of their squares.
     n_snapshots : int
         Number of snapshots with valid data.
+    last_report : DirectionEstimate
+        Directions that were computed last.
     n_missing : int
         Number of steps since the last snapshot with valid data.
     """
@@ -158,8 +160,9 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
     def reset(self) -> None:
         """Return to the state after construction: no snapshot, no direction."""
         self.total_weight, self.total_squared_weight, self.n_snapshots = 0.0, 0.0, 0
-        self._doa, self.n_missing = np.zeros(0), 0
+        self.n_missing = 0
         self.report_none()
+        self.last_report = self.estimate
 
     @property
     def n_slots(self) -> int:
@@ -190,11 +193,14 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
         self.n_snapshots = self.n_snapshots + 1
         follows_gap, self.n_missing = self.n_missing > 1, 0
         if self.n_snapshots % self.interval == 0:
-            self._doa = self._directions()
+            doa = self._directions()
+            A = self.measurement.steering_vector(doa)
+            self.report(doa, amplitude=least_squares_amplitudes(A, z))
+            self.last_report = self.estimate
         elif follows_gap:
-            self._doa = np.zeros(0)
-        A = self.measurement.steering_vector(self._doa)
-        self.report(self._doa, amplitude=least_squares_amplitudes(A, z))
+            self.last_report = self.estimate  # none
+        else:
+            self.report(self.last_report.doa, amplitude=self.last_report.amplitude)
 
     @abstractmethod
     def update_subspace(self, z: Complex) -> None:
@@ -227,7 +233,7 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
         if self.total_squared_weight == 0:
             return None
         weights = self.sensor_weights()
-        valid_sensors = weights > MIN_RELATIVE_WEIGHT * weights.max()
+        valid_sensors = has_enough_data(weights)
         model = self.measurement
         if not valid_sensors.all():
             model = model.replace(array=model.array.without(np.flatnonzero(~valid_sensors)))
@@ -236,7 +242,9 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
         except ValueError:  # too few sensors are left for the method
             return None
         values, vectors = self.eigendecomposition(valid_sensors)
-        K = min(self._number_of_sources(values), finder.max_sources) if values[:1].any() else 0
+        share = float((weights[valid_sensors] / self.total_weight).mean())  # of complete data
+        n_sources = self._number_of_sources(values, share) if values[:1].any() else 0
+        K = min(n_sources, finder.max_sources)
         return (finder, Subspaces(vectors[:, :K], vectors[:, K:])) if K > 0 else None
 
     def _directions(self) -> Float:
@@ -247,11 +255,11 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
         finder, subspaces = current
         return np.sort(finder.directions(subspaces))
 
-    def _number_of_sources(self, eigenvalues: Float) -> int:
-        """Return the number of sources, given or estimated."""
+    def _number_of_sources(self, eigenvalues: Float, share: float) -> int:
+        """Return the number of sources, given or estimated, from a share of complete data."""
         if isinstance(self.n_sources, int):
             return self.n_sources
         # the number of snapshots of equal weight with the same variance of the mean
         n_effective = self.total_weight**2 / self.total_squared_weight
-        estimate = number_of_sources(eigenvalues, n_effective, self.n_sources or "mdl")
+        estimate = number_of_sources(eigenvalues, share * n_effective, self.n_sources or "mdl")
         return min(int(estimate), self.n_slots)

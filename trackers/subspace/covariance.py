@@ -62,7 +62,7 @@ class CovarianceSubspace(RunningCovariance, SubspaceTracker[F]):
 
     def sensor_weights(self) -> Float:
         """Return the sum of weights of the valid data of each sensor, (n_sensors,)."""
-        return self.weight.diagonal()
+        return self.sums.sensor_weights
 
     @property
     def _is_smoothed(self) -> bool:
@@ -73,9 +73,7 @@ class CovarianceSubspace(RunningCovariance, SubspaceTracker[F]):
 
     def eigendecomposition(self, valid_sensors: Bool) -> tuple[Float, Complex]:
         """Return eigenvalues, falling, and eigenvectors of the (smoothed) mean covariance."""
-        R = self.mean_covariance()
-        if not valid_sensors.all():
-            R = R[np.ix_(valid_sensors, valid_sensors)]
+        R = self.mean_covariance(valid_sensors)
         if self._is_smoothed:
             order = np.argsort(self.measurement.array.positions[valid_sensors, 0])
             length = self._subarray_length(len(R))

@@ -107,6 +107,8 @@ class PAST(SubspaceTracker[DirectionFinder]):
         P of the paper: the inverse of the weighted sum of z zᴴ, z = Wᴴy.
     energy : float
         Weighted sum of ‖y‖².
+    n_tracked : int
+        Dimension of the subspace: that of `W`, or less if sensors have had no data yet.
     weight : ndarray, shape (n_sensors,)
         Sum of the weights of the valid data of each sensor.
     age : float
@@ -120,8 +122,8 @@ class PAST(SubspaceTracker[DirectionFinder]):
     Notes
     -----
     Labels are -1, `std` and `existence` NaN. Directions are in ascending order. A sensor that is
-    missing is imputed from the subspace: W z, z fitted to the others. P starts at the inverse
-    power of the first snapshot, so that the unit of the samples does not matter.
+    missing is imputed: its expected value given the others, by W P⁻¹Wᴴ plus white noise. P starts
+    at the inverse power of the first snapshot, so that the unit of the samples does not matter.
 
     References
     ----------
@@ -160,24 +162,29 @@ class PAST(SubspaceTracker[DirectionFinder]):
 
     def reset(self) -> None:
         """Return to the state after construction: no snapshot, no direction."""
-        self.age, self.weight = 0.0, np.zeros(self.measurement.array.n_sensors)
         self._reset_subspace()
         super().reset()
 
     def _reset_subspace(self) -> None:
-        self.W = np.eye(self.measurement.array.n_sensors, self.n_slots, dtype=np.complex128)
-        self.inverse, self.energy = np.eye(self.n_slots, dtype=np.complex128), 0.0
+        n = self.measurement.array.n_sensors
+        self.age, self.weight, self.energy, self.n_tracked = 0.0, np.zeros(n), 0.0, 0
+        self.W = np.zeros((n, self.n_slots), dtype=np.complex128)
+        self.inverse = np.eye(self.n_slots, dtype=np.complex128)
 
     @property
     def n_slots(self) -> int:
         """Maximum number of reported sources: the dimension of the tracked subspace."""
+        return self._dimension(self.measurement.array.n_sensors)
+
+    def _dimension(self, n_sensors: int) -> int:
+        """Return the dimension of the subspace of so many sensors."""
         if isinstance(self.n_sources, int):
-            return self.n_sources
-        n = self.measurement.array.n_sensors
-        return min(self.max_sources or max(1, (n - 1) // 2), n - 1)
+            return min(self.n_sources, max(n_sensors - 1, 1))
+        limit = self.max_sources or max(1, (n_sensors - 1) // 2)
+        return min(limit, max(n_sensors - 1, 1))
 
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
-        """Apply forgetting to the weights; reported directions do not change."""
+        """Apply forgetting to the weights; report no direction until the next measurement."""
         super().predict(u, dt=dt)
         self.weight = self.forgetting**dt * self.weight
         self.age = self.age + dt
@@ -187,18 +194,42 @@ class PAST(SubspaceTracker[DirectionFinder]):
         if self.W.shape[1] != self.n_slots:  # the number of sources was changed
             self._reset_subspace()
         valid = ~np.isnan(z)
-        self.weight = self.weight + valid
-        y = z if valid.all() else impute_missing(self.W, z)
+        y, unexplained = (z, 0.0) if valid.all() else self._imputed(z)
         power = float(np.vdot(y, y).real)
-        if power == 0:
-            return
-        if self.energy == 0:
-            self.inverse = np.eye(len(self.inverse), dtype=np.complex128) * (len(y) / power)
-        beta = max(self.forgetting**self.age, MIN_FORGETTING)
-        self.W, P = past_step(self.W, self.inverse, y, beta)
-        self.energy, self.age = beta * self.energy + power, 0.0
+        self._track_new_sensors(valid, power)
+        self.weight = self.weight + valid
+        beta, L = max(self.forgetting**self.age, MIN_FORGETTING), self.n_tracked
+        W, P = past_step(self.W[:, :L], self.inverse[:L, :L], y, beta)
+        self.energy, self.age = beta * self.energy + power + unexplained, 0.0
         trace = self.energy * float(P.trace().real)
-        self.inverse = P if trace < MAX_RELATIVE_TRACE else P * (MAX_RELATIVE_TRACE / trace)
+        P = P if trace < MAX_RELATIVE_TRACE else P * (MAX_RELATIVE_TRACE / trace)
+        if self.n_slots > L:  # some sensors have had no data
+            rest = self.n_slots - L
+            W, P = np.pad(W, ((0, 0), (0, rest))), np.pad(P, (0, rest))
+        self.W, self.inverse = W, P
+
+    def _track_new_sensors(self, valid: Bool, power: float) -> None:
+        """Add dimensions for sensors with their first data."""
+        new = np.flatnonzero(valid & (self.weight == 0))
+        old, L = self.n_tracked, self._dimension(len(new) + int(np.count_nonzero(self.weight)))
+        if old < L:
+            added = np.arange(old, L)
+            self.W, self.inverse, self.n_tracked = self.W.copy(), self.inverse.copy(), L
+            self.W[new[: L - old], added] = 1.0
+            self.inverse[added, added] = np.count_nonzero(valid) / power
+
+    def _imputed(self, z: Complex) -> tuple[Complex, float]:
+        """Return a snapshot with expected values of missing sensors, and their variance's sum."""
+        known = ~np.isnan(z) | (self.weight > 0)
+        y = np.where(np.isnan(z), 0, z)
+        if self.energy == 0:
+            return y, 0.0
+        values, vectors = self.eigendecomposition(known)
+        # the noise of few snapshots is not known
+        values = np.maximum(values, self.energy / (len(values) * self.total_weight))
+        R = (vectors * values) @ vectors.conj().T
+        y[known], variance = conditional_mean(R, z[known])
+        return y, variance / self.total_weight
 
     def sensor_weights(self) -> Float:
         """Return the sum of weights of the valid data of each sensor, (n_sensors,)."""
@@ -207,11 +238,14 @@ class PAST(SubspaceTracker[DirectionFinder]):
     def eigendecomposition(self, valid_sensors: Bool) -> tuple[Float, Complex]:
         """Return eigenvalues, falling, and eigenvectors of W P⁻¹Wᴴ plus white noise."""
         n = int(valid_sensors.sum())
-        L = min(n, self.W.shape[1])
+        L = min(n, self.n_tracked)
         if self.energy == 0:
             return np.zeros(n), np.eye(n, dtype=np.complex128)
-        Q, R = np.linalg.qr(self.W[valid_sensors], mode="complete")
-        S = R[:L] @ np.linalg.solve(self.inverse, R[:L].conj().T)
+        W, inverse = self.W[valid_sensors], self.inverse
+        if self.n_tracked < self.n_slots:
+            W, inverse = W[:, : self.n_tracked], inverse[: self.n_tracked, : self.n_tracked]
+        Q, R = np.linalg.qr(W, mode="complete")
+        S = R[:L] @ np.linalg.solve(inverse, R[:L].conj().T)
         values, rotation = np.linalg.eigh((S + S.conj().T) / 2)
         noise = (self.energy - values.sum()) / max(n - L, 1)  # the power outside, spread evenly
         values = np.concatenate([values[::-1], np.full(n - L, max(noise, 0.0))])
@@ -226,26 +260,33 @@ class PAST(SubspaceTracker[DirectionFinder]):
         return PolynomialRooting(line) if self.method == "root_music" else ShiftInvariance(line)
 
 
-def impute_missing(W: Complex, y: Complex) -> Complex:
-    """Return a snapshot whose missing sensors are predicted by the subspace: W z.
+def conditional_mean(R: Complex, y: Complex) -> tuple[Complex, float]:
+    """Return a snapshot whose missing sensors have their expected values.
 
     Parameters
     ----------
-    W : ndarray, shape (n_sensors, n_sources)
-        Basis of the subspace.
+    R : ndarray, shape (n_sensors, n_sensors)
+        Covariance, positive definite.
     y : ndarray, shape (n_sensors,)
         Snapshot; NaN where a sensor has no valid data.
 
     Returns
     -------
-    ndarray, shape (n_sensors,)
-        y, and W z at the missing sensors, with z fitted to the others.
+    completed : ndarray, shape (n_sensors,)
+        y, and R_mo R_oo⁻¹ y_o at the missing sensors.
+    variance : float
+        Sum of the variances of the missing sensors, given the others.
 
     Examples
     --------
-    >>> impute_missing(np.array([[0.6], [0.8]]), np.array([3.0, np.nan])).round(6)
-    array([3., 4.])
+    >>> R = np.array([[1.0, 0.5], [0.5, 1.0]])
+    >>> conditional_mean(R, np.array([2.0, np.nan]))
+    (array([2., 1.]), 0.75)
     """
-    valid = ~np.isnan(y)
-    z = np.linalg.lstsq(W[valid], y[valid], rcond=None)[0]
-    return np.where(valid, y, W @ z)
+    missing = np.isnan(y)
+    R_oo, R_om = R[np.ix_(~missing, ~missing)], R[np.ix_(~missing, missing)]
+    K = np.linalg.solve(R_oo, R_om).conj().T
+    completed = y.copy()
+    completed[missing] = K @ y[~missing]
+    variance = float(R.diagonal()[missing].sum().real - np.trace(K @ R_om).real)
+    return completed, max(variance, 0.0)

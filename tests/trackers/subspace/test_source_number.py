@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from subspace_scenes import LINE, NAMES, incoherent
 
 from arrivals.trackers import MUSIC, create
-from arrivals.trackers.subspace.source_number import aic, mdl, number_of_sources
+from arrivals.trackers.subspace import aic, mdl, number_of_sources
 
 WAX_KAILATH = [21.2359, 2.1717, 1.4279, 1.0979, 1.0544, 0.9432, 0.7324]
 
