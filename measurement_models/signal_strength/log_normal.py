@@ -26,6 +26,7 @@ from arrivals.measurement_models.signal_strength.path_loss import (
     check_unit,
     slopes,
 )
+from arrivals.measurements import real_numbers
 from arrivals.typing import Float
 from arrivals.validation import constant, count, instance, number, positive, real
 
@@ -230,12 +231,12 @@ class LogNormalRSS(MeasurementModel):
         Parameters
         ----------
         z : array_like, shape (..., n_sensors)
-            Np; NaN where missing.
+            Np; NaN, None, masked or infinite where missing.
 
         Raises
         ------
         TypeError, ValueError
-            If the shape is wrong, or a value is infinite or in another unit by its size.
+            If the shape is wrong, or a value is in another unit by its size.
 
         Examples
         --------
@@ -243,7 +244,7 @@ class LogNormalRSS(MeasurementModel):
         Traceback (most recent call last):
         ValueError: readings are in neper, within ±40; got -71.5: convert dB and dBm by db_to_neper
         """
-        z = real("z", z)
+        z = real_numbers("z", z)
         if z.ndim == 0 or z.shape[-1] != self.dim_z:
             raise ValueError(f"readings must have shape (..., {self.dim_z}); got {z.shape}")
         xi = z - self.gains.offsets - self._bias

@@ -180,6 +180,15 @@ class PropagationModel(NamedTuple):
             log_noise=noise[rows] if noise.ndim > 1 else self.log_noise,
         )
 
+    def at_sensors(self, rows: Any) -> PropagationModel:
+        """Return the model of some of the sensors, without a batch axis."""
+        noise, gain = self.log_noise, self.log_gain
+        return self._replace(
+            sensors=self.sensors[rows],
+            log_noise=np.asarray(noise)[rows] if np.ndim(noise) else noise,
+            log_gain=np.asarray(gain)[..., rows] if np.ndim(gain) else gain,
+        )
+
 
 def slopes(predicted: Levels, alpha: float) -> Float:
     """Return the gradients of log σ_y: λ with respect to u, -½αλ d/R² to positions.

@@ -76,9 +76,15 @@ def initial_sources(
     return SourceBeliefs(x.copy(), _covariances(P0, K, n, position), u, v)
 
 
-def check_number(sources: SourceBeliefs, n_sources: int | None, limit: int | None) -> None:
-    """Raise a ValueError if the initial sources contradict `n_sources` or exceed a limit."""
+def check_number(
+    sources: SourceBeliefs, n_sources: int | None, n_sensors: int, limit: int | None
+) -> None:
+    """Raise a ValueError if `n_sources` contradicts the initial sources or exceeds a limit."""
     K = len(sources.u)
+    if not K and n_sources is not None and n_sources > n_sensors:
+        raise ValueError(
+            f"n_sources must be at most {n_sensors}, the number of sensors; got {n_sources}"
+        )
     if K and n_sources not in (None, K):
         raise ValueError(f"n_sources must be {K}, the sources of x0; got {n_sources}")
     if limit is not None and max(K, n_sources or 0) > limit:

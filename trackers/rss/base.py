@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.base import default_position
 from arrivals.measurement_models.signal_strength.log_normal import LogNormalRSS
+from arrivals.measurements import real_numbers, rows
 from arrivals.motion_models.base import MotionModel
 from arrivals.trackers.base import Tracker
 from arrivals.trackers.estimates import PositionEstimate
@@ -22,21 +23,13 @@ from arrivals.trackers.rss.arguments import (
 )
 from arrivals.trackers.rss.batch import BatchStart, run_in_chunks
 from arrivals.trackers.rss.belief import SourceBeliefs, keep_finite
-from arrivals.trackers.rss.detection import (
-    new_beliefs,
-    new_source_prior,
-    select_sources,
-    update_supported,
-)
 from arrivals.trackers.rss.inference.joint_posterior import JointPosterior
 from arrivals.trackers.rss.inference.solution import Diagnostics, Solution, WeightedReadings
-from arrivals.trackers.rss.model_order.birth_death import update_with_births
-from arrivals.trackers.rss.model_order.model_selection import Candidate
 from arrivals.trackers.rss.model_order.track_table import TrackTable
 from arrivals.trackers.rss.settings import AmplitudePrior, BirthDeath, GridSearch
 from arrivals.trackers.run import Run
 from arrivals.typing import Float
-from arrivals.validation import count, instance, not_negative, positive, real
+from arrivals.validation import count, instance, no_control, positive, real, time_step
 
 
 class RSSTracker(Tracker):
@@ -91,7 +84,8 @@ class RSSTracker(Tracker):
             positive("correlation_time", correlation_time)
         self.correlation_time = correlation_time
         sources = initial_sources(x0, P0, self.amplitude, motion.dim_x, self.position)
-        check_number(sources, self.n_sources, search.max_sources if self.births else None)
+        limit = search.max_sources if self.births else None
+        check_number(sources, self.n_sources, model.dim_z, limit)
         self.tracks = TrackTable.certain(len(sources.u))
         self.label, self.existence = self.tracks.padded(0)
         self.elapsed = np.inf
@@ -152,17 +146,25 @@ class RSSTracker(Tracker):
         dt : float
             Time since the last step.
         """
-        if u is not None and np.any(u):
-            raise ValueError("u must be None or 0: model a control input in the motion")
+        dt = time_step(dt)
+        no_control(u)
         sources = self.source_beliefs()
-        predicted = self.predict_sources(sources, not_negative("dt", dt))
+        predicted = self.predict_sources(sources, dt)
         self.set_belief(predicted, self.current_tracks(len(sources.u)))
         self.elapsed = self.elapsed + dt
 
     def predict_sources(self, sources: SourceBeliefs, dt: float) -> SourceBeliefs:
         """Return beliefs after `dt`."""
         # x = f(x), P = F P F' + Q, v = v + q_u dt
-        return sources.predicted(self.motion, dt, self.amplitude.drift)
+        try:
+            with np.errstate(over="ignore", invalid="ignore"):
+                predicted = sources.predicted(self.motion, dt, self.amplitude.drift)
+            finite = all(np.isfinite(part).all() for part in predicted)
+        except OverflowError:
+            finite = False
+        if not finite:
+            raise ValueError(f"dt must be small enough for finite covariances; got {dt:g}")
+        return predicted
 
     def observe(self, z: ArrayLike | None) -> WeightedReadings | None:
         """Return one set of readings with its weights, batch axis in front; None if missing."""
@@ -174,7 +176,7 @@ class RSSTracker(Tracker):
     def _vector(self, z: ArrayLike | None) -> Float:
         """Return a measurement as (n_sensors,); NaN everywhere if it is missing."""
         m = self.measurement.dim_z
-        array = real("z", np.nan if z is None else z)
+        array = real_numbers("z", np.nan if z is None else z)
         if array.shape == (m,):
             return array
         if array.size == 1 and np.isnan(array).all():
@@ -218,30 +220,6 @@ class RSSTracker(Tracker):
         self.elapsed = 0.0
         self.set_belief(sources, tracks or self.current_tracks(len(sources.u)))
 
-    def detect_sources(self, readings: WeightedReadings) -> None:
-        """Update the belief where the number of sources is unknown or changes."""
-        sources, W = self.source_beliefs(), readings.W[0]
-        new = new_source_prior(self.measurement.sensors[W > 0], self.amplitude, self.search)
-        problem = self.joint_posterior(sources, readings)._replace(xi=readings.xi[0], W=W)
-        predicted = Candidate(problem, sources.u, problem.prior.theta)
-        if self.births:
-            result = update_with_births(
-                predicted, self.current_tracks(len(sources.u)), new, self.solve,
-                self.births.confirm_steps, self.search.max_sources,
-            )  # fmt: skip
-            candidate, tracks = result.candidate, result.tracks
-            sources = update_supported(sources, result, self.position, self.motion)
-            n_known = len(result.supported)
-        else:
-            candidate = select_sources(predicted, new, self.n_sources, self.search.max_sources)
-            tracks, n_known = TrackTable.certain(len(candidate.u)), 0
-        detected = new_beliefs(candidate, self.P0, self.motion.dim_x, self.position)
-        sources = sources.joined(detected.select(slice(n_known, None)))
-        solution, active = candidate.solution, tracks.active
-        problem = candidate.problem.select(None)._replace(W=readings.precision)
-        sources, tracks = sources.select(active), tracks.select(active)
-        self.store(sources, solution, problem.diagnose(solution), tracks)
-
     @property
     def estimate(self) -> PositionEstimate:
         """The confirmed sources."""
@@ -279,7 +257,7 @@ class RSSTracker(Tracker):
             One for each sequence.
         """
         positive("dt", dt)
-        sequences = [list(sequence) for sequence in measurements]
+        sequences = [list(rows("measurements", one)) for one in rows("measurements", measurements)]
         sources = self.source_beliefs()
         equal = len({len(sequence) for sequence in sequences}) == 1 and len(sequences[0]) > 0
         if self.births or not equal or sources.u.size == 0:

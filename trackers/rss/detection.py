@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -12,8 +14,12 @@ from arrivals.trackers.rss.arguments import (
     without_position,
 )
 from arrivals.trackers.rss.belief import Entries, SourceBeliefs
-from arrivals.trackers.rss.inference.solution import Marginals
-from arrivals.trackers.rss.model_order.birth_death import BirthDeathUpdate
+from arrivals.trackers.rss.inference.solution import Marginals, WeightedReadings
+from arrivals.trackers.rss.model_order.birth_death import (
+    BirthDeathUpdate,
+    carried_sources,
+    update_with_births,
+)
 from arrivals.trackers.rss.model_order.grid_search import NewSourcePrior
 from arrivals.trackers.rss.model_order.model_selection import (
     Candidate,
@@ -21,10 +27,39 @@ from arrivals.trackers.rss.model_order.model_selection import (
     forward_selection,
     local_search,
 )
+from arrivals.trackers.rss.model_order.track_table import TrackTable
 from arrivals.trackers.rss.settings import AmplitudePrior, GridSearch
 from arrivals.typing import Float
 
+if TYPE_CHECKING:
+    from arrivals.trackers.rss.base import RSSTracker
+
 PATIENCE = 2  # sources added without a gain of evidence before the selection ends
+
+
+def detect_sources(tracker: RSSTracker, readings: WeightedReadings) -> None:
+    """Update the belief of a tracker where the number of sources is unknown or changes."""
+    sources, W = tracker.source_beliefs(), readings.W[0]
+    tracks, max_sources = tracker.current_tracks(len(sources.u)), tracker.search.max_sources
+    new = new_source_prior(tracker.measurement.sensors[W > 0], tracker.amplitude, tracker.search)
+    problem = tracker.joint_posterior(sources, readings)
+    problem = problem._replace(xi=readings.xi[0], W=W).at_valid_sensors()
+    predicted = Candidate(problem, sources.u, problem.prior.theta)
+    if tracker.births:
+        steps = tracker.births.confirm_steps
+        result = update_with_births(predicted, tracks, new, tracker.solve, steps, max_sources)
+        candidate, tracks = result.candidate, result.tracks
+        sources = update_supported(sources, result, tracker.position, tracker.motion)
+        n_known = len(result.supported)
+    else:
+        candidate = select_sources(predicted, new, tracker.n_sources, max_sources)
+        tracks, n_known = TrackTable.certain(len(candidate.u)), 0
+    detected = new_beliefs(candidate, tracker.P0, tracker.motion.dim_x, tracker.position)
+    sources = sources.joined(detected.select(slice(n_known, None)))
+    active = tracks.active
+    problem = candidate.problem._replace(W=readings.precision[0, W > 0]).select(None)
+    diagnostics = problem.diagnose(candidate.solution)
+    tracker.store(sources.select(active), candidate.solution, diagnostics, tracks.select(active))
 
 
 def new_source_prior(
@@ -52,16 +87,17 @@ def select_sources(
     Parameters
     ----------
     empty : Candidate
-        The candidate without a source.
+        The candidate without a source, at the sensors with valid readings.
     new : NewSourcePrior
     n_sources : int or None
         Number of sources; selected by the evidence if None.
     max_sources : int
-        Largest number where it is selected.
+        Largest number where it is selected; at most one for three readings.
     """
     if n_sources is None:
+        max_sources = min(max_sources, carried_sources(len(empty.problem.W)))
         return best_model(forward_selection(empty, new, max_sources, PATIENCE), new)
-    warn_few_readings(int((empty.problem.W > 0).sum()), n_sources)
+    warn_few_readings(len(empty.problem.W), n_sources)
     candidates = forward_selection(empty, new, n_sources)
     warn_unsupported_sources([one.log_evidence_of_set for one in candidates], n_sources)
     return local_search(candidates[n_sources], new, same_number=True)

@@ -9,6 +9,7 @@ from arrivals.measurement_models.signal_strength.log_normal import LogNormalRSS
 from arrivals.motion_models.base import MotionModel
 from arrivals.trackers.registry import register
 from arrivals.trackers.rss.base import RSSTracker
+from arrivals.trackers.rss.detection import detect_sources
 from arrivals.trackers.rss.inference.joint_posterior import JointPosterior, marginals
 from arrivals.trackers.rss.inference.map_search import maximize
 from arrivals.trackers.rss.inference.solution import Solution
@@ -115,7 +116,7 @@ class RSSML(RSSTracker):
             return
         sources = self.source_beliefs().select(None)
         if self.births or sources.u.size == 0:
-            self.detect_sources(readings)
+            detect_sources(self, readings)
             return
         # L(u, θ)   (7)
         problem = self.joint_posterior(sources, readings)

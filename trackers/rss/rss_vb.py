@@ -10,6 +10,7 @@ from arrivals.motion_models.base import MotionModel
 from arrivals.trackers.gaussian.linalg import inverse_2x2
 from arrivals.trackers.registry import register
 from arrivals.trackers.rss.base import RSSTracker
+from arrivals.trackers.rss.detection import detect_sources
 from arrivals.trackers.rss.inference.factors import update_amplitudes, update_positions
 from arrivals.trackers.rss.inference.joint_posterior import (
     ExpansionPoint,
@@ -129,7 +130,7 @@ class RSSVB(RSSTracker):
             return
         sources = self.source_beliefs().select(None)
         if self.births or sources.u.size == 0:
-            self.detect_sources(readings)
+            detect_sources(self, readings)
             return
         # L(u, θ)   (7)
         problem = self.joint_posterior(sources, readings)

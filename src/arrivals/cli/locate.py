@@ -36,7 +36,7 @@ class PathLossSettings:
     floor_db : float, optional
         Noise floor, dB; no noise if None.
     r_min : float, optional
-        Floor of the range, m; a hundredth of the extent of the sensors if None, at least 1 m.
+        Floor of the range, m; a hundredth of the extent of the sensors if None.
     correlation_time : float, optional
         As in `RSSVB`, s.
     """
@@ -49,7 +49,7 @@ class PathLossSettings:
 
     def model(self, network: Network) -> LogNormalRSS:
         """Return the model of the readings of a network."""
-        r_min = max(1.0, extent(network) / 100) if self.r_min is None else self.r_min
+        r_min = extent(network) / 100 if self.r_min is None else self.r_min
         return LogNormalRSS(
             np.zeros((len(network.name), 2)),
             float(db_to_neper(self.sigma_db)),
@@ -176,17 +176,17 @@ def _track(
 
 
 def extent(network: Network) -> float:
-    """Return the extent of the sensors, the larger of x and y, m."""
+    """Return the extent of the sensors, the larger of x and y, m; 1 m if they share a position."""
     positions = network.sensors.reshape(-1, 2)
     known = positions[np.isfinite(positions).all(axis=1)]
-    return float(np.nanmax(np.ptp(known, axis=0)))
+    return float(np.ptp(known, axis=0).max()) or 1.0
 
 
 def _source_level(network: Network, alpha: float) -> float:
     """Return the level at 1 m of a source at half the mean sensor spacing from the nearest one."""
     distance = extent(network) / (2 * np.sqrt(len(network.name)))
     largest = float(np.nanmedian(np.nanmax(network.readings, axis=1)))
-    return largest + 0.5 * alpha * float(np.log(max(distance, 1.0)))
+    return largest + 0.5 * alpha * float(np.log(distance))
 
 
 def add_locate(commands: Any, bar: Callable[[bool], Callable[..., Any]]) -> None:

@@ -152,10 +152,14 @@ def _regression(
     for _ in range(N_ITERATIONS):
         B = vstack([A / sigma, penalty / ridge]).tocsr()
         y = np.concatenate([xi / sigma, np.zeros(n_sensors)])
-        x = least_squares(
-            lambda x, B=B, y=y: B @ x - y, x, lambda x, B=B: B, loss="huber",
+        # a fresh copy: scipy weighs the Jacobian of a robust loss in place
+        fit = least_squares(
+            lambda x, B=B, y=y: B @ x - y, x, lambda x, B=B: B.copy(), loss="huber",
             f_scale=1.345, tr_solver="lsmr",
-        ).x  # fmt: skip
+        )  # fmt: skip
+        if not fit.success or not np.isfinite(fit.x).all():
+            raise ValueError(f"network must have readings that determine the fit: {fit.message}")
+        x = fit.x
         residual = xi - A @ x
         sigma = float(np.median(np.abs(residual - np.median(residual)))) / 0.6745
     return x, float(np.std(residual))

@@ -75,6 +75,15 @@ class JointPosterior(NamedTuple):
             self.propagation.select(rows), self.xi[rows], self.W[rows], self.prior.select(rows)
         )
 
+    def at_valid_sensors(self) -> JointPosterior:
+        """Return the problem without the sensors of weight 0, without a batch axis."""
+        valid = self.W > 0
+        if valid.all():
+            return self
+        return self._replace(
+            propagation=self.propagation.at_sensors(valid), xi=self.xi[valid], W=self.W[valid]
+        )
+
     def misfit(self, levels: Levels) -> Float:
         """Return q = Σ W (ξ - log σ_y)², (...,)."""
         r = self.xi - levels.log_sigma

@@ -9,7 +9,7 @@ import numpy as np
 from arrivals.measurement_models.signal_strength.path_loss import slopes
 from arrivals.trackers.rss.inference.joint_posterior import JointPosterior
 from arrivals.trackers.rss.settings import MAPSolver
-from arrivals.typing import Bool, Float
+from arrivals.typing import Float
 
 
 class MAPEstimate(NamedTuple):
@@ -47,25 +47,15 @@ def maximize(
     ----------
     Cevher, Sankaranarayanan, Chellappa, ICASSP 2008, (7) and section 4: the method called ML.
     """
-    valid = problem.W > 0
+    problem = problem.at_valid_sensors()
     n = 3 * len(u)
-    if not solver.prior and valid.sum() < n:
+    if not solver.prior and len(problem.W) < n:
         raise ValueError(
-            f"readings must be at least {n}, the number of unknowns; got {valid.sum()}: "
+            f"readings must be at least {n}, the number of unknowns; got {len(problem.W)}: "
             "use prior=True"
         )
-    propagation = problem.propagation._replace(
-        sensors=problem.propagation.sensors[valid],
-        log_noise=_select(problem.propagation.log_noise, valid),
-        log_gain=_select(problem.propagation.log_gain, valid),
-    )
-    problem = problem._replace(propagation=propagation, xi=problem.xi[valid], W=problem.W[valid])
     search = _levenberg_marquardt if solver.method == "lm" else _bfgs
     return search(problem, np.concatenate([u, theta.ravel()]), solver)
-
-
-def _select(values: float | Float, valid: Bool) -> float | Float:
-    return np.asarray(values)[..., valid] if np.ndim(values) else values
 
 
 def _levenberg_marquardt(problem: JointPosterior, x: Float, solver: MAPSolver) -> MAPEstimate:

@@ -47,7 +47,8 @@ def update_with_births(
 
     Sources supported by the readings are updated; the others keep their prediction. The support
     of a source is the difference of the Laplace evidence with it and without it. A source whose
-    addition increases the evidence by ln 99 is new. It is confirmed, and later deleted, by the
+    addition increases the evidence by ln 99 is new if the step has three readings or more for each
+    of its sources. It is confirmed, and later deleted, by the
     log odds in the track table.
 
     Parameters
@@ -68,9 +69,22 @@ def update_with_births(
     """
     candidate, supported, evidence = supported_sources(predicted, solve)
     tracks = tracks.updated(evidence, confirm_steps)
-    n_free = max_sources - len(predicted.u)
+    n_free = min(
+        max_sources - len(predicted.u), carried_sources(len(predicted.problem.W)) - len(supported)
+    )
     candidate, gains = add_new_sources(candidate, predicted.part(supported), new, n_free)
     return BirthDeathUpdate(candidate, supported, tracks.extended(gains, confirm_steps))
+
+
+def carried_sources(n_readings: int) -> int:
+    """Return the largest number of sources that readings determine: three unknowns each.
+
+    Examples
+    --------
+    >>> carried_sources(8)
+    2
+    """
+    return n_readings // 3
 
 
 def add_new_sources(

@@ -15,6 +15,9 @@ from arrivals.typing import Float, Int
 MAX_MINIMA = 3  # minima over the grid that are refined
 MAX_SENSORS = 2000  # in a grid search, taken at equal spacing from all
 CHUNK_SIZE = 2_000_000  # numbers in one array of the grid search
+AMPLITUDE_STEP = 0.35  # Np, 3 dB: largest step between the amplitudes that the search starts from
+MAX_AMPLITUDES = 201
+AMPLITUDE_STEPS = 3  # Gauss-Newton steps from there
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,8 +69,10 @@ class NewSourcePrior:
 
     @cached_property
     def log_amplitudes(self) -> Float:
-        """Log amplitudes of the grid, Np: seven, up to three standard deviations each way."""
-        return np.asarray(self.mu + np.sqrt(self.v) * np.arange(-3.0, 4.0))
+        """Log amplitudes of the grid, Np: up to three standard deviations each way."""
+        std = np.sqrt(self.v)
+        n = int(min(MAX_AMPLITUDES, 2 * np.ceil(max(3.0, 3.0 * std / AMPLITUDE_STEP)) + 1))
+        return np.asarray(self.mu + np.linspace(-3.0, 3.0, n) * std)
 
     def prior(self, n: int) -> Prior:
         """Return the prior of n such sources, without a batch axis."""
@@ -81,7 +86,7 @@ class NewSourcePrior:
 def grid_search(
     problem: JointPosterior, log_sigma: Float, new: NewSourcePrior
 ) -> list[tuple[float, Float]]:
-    """Return log amplitudes and positions of sources whose addition lowers Σ W r² most.
+    """Return log amplitudes and positions of sources whose addition raises L most.
 
     Parameters
     ----------
@@ -90,29 +95,89 @@ def grid_search(
     log_sigma : ndarray, shape (n_sensors,)
         Levels without the additional source, Np; -inf for none.
     new : NewSourcePrior
-        Grid of positions and log amplitudes.
+        Grid of positions, and prior.
 
     Returns
     -------
     list of (float, ndarray of shape (2,))
-        The lowest local minima over the grid in ascending order.
+        The best amplitudes at the lowest local minima over the grid, in ascending order.
     """
     valid = np.flatnonzero(problem.W > 0)
     valid = valid[:: max(1, len(valid) // MAX_SENSORS)]
-    xi, W, floor = problem.xi[valid], problem.W[valid], 2 * log_sigma[valid]
     propagation = problem.propagation
-    sensors = propagation.sensors[valid]
     gain = np.zeros(len(problem.W)) + np.atleast_2d(propagation.log_gain)[0]
-    powers = 2 * new.log_amplitudes[:, None] + 2 * gain[valid]
-    cost = np.empty((len(new.grid), len(powers)))
-    size = max(1, CHUNK_SIZE // powers.size)
-    for first in range(0, len(cost), size):
+    readings = problem.xi[valid], problem.W[valid], log_sigma[valid]
+    grid = new.grid
+    u, cost = np.empty(len(grid)), np.empty(len(grid))
+    size = max(1, CHUNK_SIZE // (len(valid) * len(new.log_amplitudes)))
+    for first in range(0, len(grid), size):
         points = slice(first, first + size)
-        loss = propagation.alpha * offsets(new.grid[points], sensors, propagation.r_min).log_range
-        r = xi - 0.5 * np.logaddexp(floor, powers - loss[:, None])
-        cost[points] = (r * r) @ W
-    lowest = local_minima(cost.min(axis=1))[:MAX_MINIMA]
-    return [(float(new.log_amplitudes[cost[k].argmin()]), new.grid[k]) for k in lowest]
+        geometry = offsets(grid[points], propagation.sensors[valid], propagation.r_min)
+        loss = 0.5 * propagation.alpha * geometry.log_range - gain[valid]
+        u[points], cost[points] = best_amplitudes(*readings, loss, new)
+    cost += np.square((grid - new.centre) / new.std).sum(axis=-1)
+    lowest = local_minima(cost)[:MAX_MINIMA]
+    return [(float(u[k]), grid[k]) for k in lowest]
+
+
+def best_amplitudes(
+    xi: Float, W: Float, floor: Float, loss: Float, new: NewSourcePrior
+) -> tuple[Float, Float]:
+    """Return the log amplitudes u that minimize Σ W r² + (u - μ)²/v, and the minima.
+
+    Parameters
+    ----------
+    xi, W, floor : ndarray, shape (n_sensors,)
+        Readings, Np, their weights, and the levels without the source, Np.
+    loss : ndarray, shape (n_points, n_sensors)
+        Log amplitude lost on the path, Np.
+    new : NewSourcePrior
+
+    Returns
+    -------
+    u, cost : ndarray, shape (n_points,)
+
+    Examples
+    --------
+    Without noise the minimum is a weighted mean:
+
+    >>> prior = NewSourcePrior(mu=0.0, v=1e9, centre=np.zeros(2), std=1.0, step=1.0)
+    >>> xi, none = np.array([1.0, 3.0]), np.full(2, -np.inf)
+    >>> u, cost = best_amplitudes(xi, np.ones(2), none, np.zeros((1, 2)), prior)
+    >>> u.round(6), cost.round(6)
+    (array([2.]), array([2.]))
+    """
+
+    def evaluate(u: Float) -> tuple[Float, Float, Float]:
+        level = u[..., None] - loss
+        log_sigma = 0.5 * np.logaddexp(2 * floor, 2 * level)
+        r = xi - log_sigma
+        cost = (r * r) @ W + (u - new.mu) ** 2 / new.v
+        return cost, r, np.exp(2 * (level - log_sigma))
+
+    if np.isneginf(floor).all():
+        # u = (Σ W (ξ + loss) + μ/v) / (Σ W + 1/v)
+        u = ((xi + loss) @ W + new.mu / new.v) / (W.sum() + 1 / new.v)
+        return u, evaluate(u)[0]
+    rows = np.arange(len(loss))
+    starts = np.broadcast_to(new.log_amplitudes[:, None], (len(new.log_amplitudes), len(loss)))
+    costs, residuals, parts = evaluate(starts)
+    best = costs.argmin(axis=0)
+    u, cost, r, lam = (
+        starts[best, rows],
+        costs[best, rows],
+        residuals[best, rows],
+        parts[best, rows],
+    )
+    for _ in range(AMPLITUDE_STEPS):
+        # Gauss-Newton: Δu = (Σ W λ r + (μ - u)/v) / (Σ W λ² + 1/v)
+        step = ((lam * r) @ W + (new.mu - u) / new.v) / ((lam * lam) @ W + 1 / new.v)
+        after, r_after, lam_after = evaluate(u + step)
+        lower = after < cost
+        u, cost = np.where(lower, u + step, u), np.where(lower, after, cost)
+        r = np.where(lower[:, None], r_after, r)
+        lam = np.where(lower[:, None], lam_after, lam)
+    return u, cost
 
 
 def local_minima(cost: Float) -> Int:
