@@ -144,6 +144,9 @@ def test_invalid_calls_leave_the_filter_unchanged(
     assert difference(before, vars(tracker)) is None
 
 
+TOO_LONG = "belief must stay finite|dt must be at most"
+
+
 @every_kind
 @pytest.mark.parametrize("dt", [1e110, 1e200, 1e308])
 def test_step_that_overflows_raises_and_leaves_the_filter_unchanged(
@@ -151,7 +154,7 @@ def test_step_that_overflows_raises_and_leaves_the_filter_unchanged(
 ) -> None:
     tracker = kind(WALK, POSITION, X, P)
     before = copy.deepcopy(vars(tracker))
-    with np.errstate(all="ignore"), pytest.raises(ValueError, match="belief must stay finite"):
+    with np.errstate(all="ignore"), pytest.raises(ValueError, match=TOO_LONG):
         tracker.predict(dt=dt)
     assert difference(before, vars(tracker)) is None
 
