@@ -235,7 +235,9 @@ def _drift(n: int, dt: float) -> Float:
 
 @lru_cache(maxsize=64)
 def _unit_noise(n: int, dt: float) -> Float:
-    return _on_diagonal([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]], n)
+    dt = np.float64(dt)
+    with np.errstate(over="ignore"):  # filters raise where the covariance overflows
+        return _on_diagonal([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]], n)
 
 
 def _on_diagonal(block: ArrayLike, n: int) -> Float:

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.base import MeasurementModel
+from arrivals.measurements import LARGEST, numbers, real_numbers
 from arrivals.motion_models.base import MotionModel
 from arrivals.typing import Bool, Float
-from arrivals.validation import covariance, instance, real
+from arrivals.validation import covariance, instance, real, shaped
 
 PerStep = Sequence[Any] | Float | None
 
@@ -67,30 +68,43 @@ def belief_arrays(x: ArrayLike, P: ArrayLike, n: int) -> tuple[Float, Float]:
         raise ValueError(f"x must have shape ({n},) or ({n}, 1); got {mean.shape}")
     if not np.isfinite(mean).all():
         raise ValueError(f"x must be finite; got {mean.ravel().tolist()}")
-    return mean.reshape(n), covariance("P", P, n)
+    return mean.reshape(n), covariance_matrix("P", P, n)
 
 
-def measurement_vector(z: ArrayLike, m: int) -> Float:
-    """Return a measurement as (m,), a copy; one NaN means that all entries are missing.
+def check_finite(x: Float, P: Float) -> None:
+    """Raise a ValueError if a belief is not finite, before it replaces the present one.
 
     Examples
     --------
-    >>> measurement_vector(np.nan, 2), measurement_vector([[1], [2]], 2)
-    (array([nan, nan]), array([1., 2.]))
+    >>> check_finite(np.zeros(1), np.array([[np.inf]]))
+    Traceback (most recent call last):
+    ValueError: belief must stay finite; got an overflow: x, P, F, Q, R or dt has grown too far
     """
-    array = np.array(z)
-    if array.shape == (m,) and array.dtype == np.float64:
-        return array  # the usual case
+    entries = P.ravel()
+    if entries.dot(entries) < np.inf:  # faster than isfinite; x does not overflow before P
+        return
+    if not (np.isfinite(P).all() and np.isfinite(x).all()):
+        cause = "x, P, F, Q, R or dt has grown too far"
+        raise ValueError(f"belief must stay finite; got an overflow: {cause}")
+
+
+def measurement_vector(z: ArrayLike | None, m: int) -> Float:
+    """Return a measurement as (m,), a copy; one missing number means that all are missing.
+
+    Examples
+    --------
+    >>> measurement_vector(None, 2), measurement_vector([[1], [None]], 2)
+    (array([nan, nan]), array([ 1., nan]))
+    """
+    array = numbers("z", z)
     if array.dtype.kind == "c":
-        raise TypeError(
-            f"z must hold real numbers; got {array.dtype}: stack the parts by composite(z)"
-        )
-    array = real("z", array)
+        cure = "stack the parts by composite(z)"
+        raise TypeError(f"z must hold real numbers; got {array.dtype}: {cure}")
     if array.ndim == 0 and np.isnan(array):
         return np.full(m, np.nan)
     if array.size != m or array.ndim > 2 or max(array.shape, default=1) != m:
         raise ValueError(f"z must have shape ({m},) or ({m}, 1); got {array.shape}")
-    return array.reshape(m)
+    return np.array(array.reshape(m))
 
 
 def missing_mask(z: Float) -> Bool | None:
@@ -101,10 +115,6 @@ def missing_mask(z: Float) -> Bool | None:
     >>> missing_mask(np.array([1.0, np.nan])), missing_mask(np.ones(2))
     (array([False,  True]), None)
     """
-    if np.vdot(z, z) < np.inf:  # false with NaN too; faster than isfinite
-        return None
-    if np.isinf(z).any():
-        raise ValueError(f"z must be finite, or NaN where missing; got {z.tolist()}")
     missing = np.isnan(z)
     return missing if missing.any() else None
 
@@ -117,8 +127,11 @@ def measurement_and_mask(z: ArrayLike | None, m: int) -> tuple[Float, Bool | Non
     >>> measurement_and_mask(None, 2)
     (array([nan, nan]), array([ True,  True]))
     """
-    z = measurement_vector(np.nan if z is None else z, m)
-    return z, missing_mask(z)
+    usual = type(z) is np.ndarray and z.shape == (m,) and z.dtype == np.float64
+    if usual and z.dot(z) < LARGEST**2:  # type: ignore[union-attr]  # an array
+        return z.copy(), None  # type: ignore[union-attr]
+    vector = measurement_vector(z, m)
+    return vector, missing_mask(vector)
 
 
 def covariance_matrix(name: str, value: ArrayLike, n: int) -> Float:
@@ -133,8 +146,23 @@ def covariance_matrix(name: str, value: ArrayLike, n: int) -> Float:
     return covariance(name, np.multiply(np.eye(n), value) if np.ndim(value) == 0 else value, n)
 
 
+def finite_matrix(name: str, value: ArrayLike, *shape: int) -> Float:
+    """Return a matrix of the given shape, with finite numbers.
+
+    Examples
+    --------
+    >>> finite_matrix("F", [[np.inf]], 1, 1)
+    Traceback (most recent call last):
+    ValueError: F must be finite; got [[inf]]
+    """
+    matrix = shaped(name, value, *shape)
+    if not np.isfinite(matrix).all():
+        raise ValueError(f"{name} must be finite; got {matrix.tolist()}")
+    return matrix
+
+
 def matrix_with_columns(name: str, value: ArrayLike, n: int) -> Float:
-    """Return a real matrix with n columns.
+    """Return a matrix with n columns and finite numbers.
 
     Examples
     --------
@@ -145,21 +173,58 @@ def matrix_with_columns(name: str, value: ArrayLike, n: int) -> Float:
     matrix = real(name, value)
     if matrix.ndim != 2 or matrix.shape[1] != n:
         raise ValueError(f"{name} must have shape (m, {n}); got {matrix.shape}")
-    return matrix
+    return finite_matrix(name, matrix, *matrix.shape)
 
 
-def control_effect(u: ArrayLike, B: ArrayLike | None) -> Float:
-    """Return B u of a control input that is not zero.
+def control_matrix(B: ArrayLike | None, n: int) -> Float | None:
+    """Return a control matrix (n, dim_u); None for none or 0, one column of a vector.
 
     Examples
     --------
-    >>> control_effect(2.0, [[0.5], [1.0]])
+    >>> control_matrix([0.5, 1.0], 2)
+    array([[0.5],
+           [1. ]])
+    """
+    if B is None or (np.ndim(B) == 0 and not np.any(B)):
+        return None
+    matrix = real("B", B)
+    if matrix.shape == (n,):
+        matrix = matrix[:, None]
+    if matrix.ndim != 2 or len(matrix) != n:
+        raise ValueError(f"B must have shape ({n}, dim_u); got {matrix.shape}")
+    return finite_matrix("B", matrix, *matrix.shape)
+
+
+def control_input(u: ArrayLike | None) -> Float | None:
+    """Return a control input as (dim_u,), or None if there is none or all of it is zero.
+
+    Examples
+    --------
+    >>> control_input(0), control_input([[2.0]])
+    (None, array([2.]))
+    >>> control_input(np.nan)
+    Traceback (most recent call last):
+    ValueError: u must be finite; got nan
+    """
+    if u is None:
+        return None
+    values = real_numbers("u", u).ravel()
+    if np.isnan(values).any():
+        raise ValueError(f"u must be finite; got {u}")
+    return values if values.any() else None
+
+
+def control_effect(u: Float, B: Float | None) -> Float:
+    """Return B u of a control input (dim_u,) that is not zero.
+
+    Examples
+    --------
+    >>> control_effect(np.array([2.0]), np.array([[0.5], [1.0]]))
     array([1., 2.])
     """
     if B is None:
         cure = "take LinearMotion(..., control=B)"
         raise ValueError(f"motion must have a control matrix where u is not zero; got none: {cure}")
-    B, u = np.asarray(B, dtype=np.float64), real("u", u).ravel()
     if u.shape != (B.shape[1],):
         raise ValueError(f"u must have shape ({B.shape[1]},); got {u.shape}")
     return np.asarray(B @ u)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,8 +15,11 @@ from arrivals.trackers.base import Tracker
 from arrivals.trackers.estimates import StateEstimate
 from arrivals.trackers.gaussian.arguments import (
     belief_arrays,
+    check_finite,
     check_models,
     control_effect,
+    control_input,
+    control_matrix,
     covariance_matrix,
     matrix_with_columns,
     measurement_and_mask,
@@ -23,14 +27,16 @@ from arrivals.trackers.gaussian.arguments import (
 )
 from arrivals.trackers.gaussian.circular import wrapped
 from arrivals.trackers.gaussian.equations import GaussianUpdate, likelihood
+from arrivals.trackers.gaussian.filterpy_names.attributes import DeclaredAttributes
+from arrivals.trackers.gaussian.filterpy_names.matrices import ModelMatrices
 from arrivals.trackers.gaussian.linalg import Inverse, inverse
 from arrivals.trackers.gaussian.linearization import Linearization, predict_belief, update_belief
 from arrivals.trackers.gaussian.smoothing import batch_filter, rts_smoother, run_batch
 from arrivals.typing import Bool, Float
-from arrivals.validation import real, shaped
+from arrivals.validation import real, shaped, time_step
 
 
-class GaussianFilter(Tracker):
+class GaussianFilter(ModelMatrices, DeclaredAttributes, Tracker):
     """Base class of filters with one mean and covariance, under filterpy's names.
 
     A subclass defines `linearize_motion` and `linearize_measurement`.
@@ -82,14 +88,12 @@ class GaussianFilter(Tracker):
 
     former_names = ("KalmanType",)
 
-    motion: MotionModel
-    measurement: MeasurementModel
-
     def __init__(
         self, motion: MotionModel, measurement: MeasurementModel, x: ArrayLike, P: ArrayLike
     ) -> None:
         self.motion, self.measurement = check_models(motion, measurement)
-        self.x, self.P = real("x", x), real("P", P)
+        self.x, self.P = real("x", x), P  # type: ignore[assignment]  # made an array if a number
+        self.P = real("P", self.P)
         mean, _ = belief_arrays(self.x, self.P, self.dim_x)
         n, m = self.dim_x, self.dim_z
         shaped("F of the motion", self.motion.F(mean), n, n)
@@ -105,6 +109,11 @@ class GaussianFilter(Tracker):
     @abstractmethod
     def linearize_measurement(self, x: Float, P: Float) -> Linearization:
         """Return the measurement, without R, linearized at beliefs x (..., n), P (..., n, n)."""
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name == "P" and np.ndim(value) == 0:  # a number: that variance in all directions
+            value = covariance_matrix("P", value, self.dim_x)
+        super().__setattr__(name, value)
 
     # Predict and update; the functions of other modules take the filter as their first argument
 
@@ -137,6 +146,7 @@ class GaussianFilter(Tracker):
             Replaces the motion model's `control` in this step.
         """
         x, P = self.belief()
+        dt = time_step(dt)
         x, P = self.predict_belief(x, P, dt, F, Q)
         self.record_prediction(self.add_control(x, u, B), P, dt)
 
@@ -165,48 +175,52 @@ class GaussianFilter(Tracker):
 
     def add_control(self, x: Float, u: ArrayLike | None, B: ArrayLike | None) -> Float:
         """Return x + B u, angles in [-π, π)."""
-        if u is None or not np.any(u):
+        if u is None:
+            return x  # the usual case
+        control = control_input(u)
+        if control is None:
             return x
-        return wrapped(x + control_effect(u, self.B if B is None else B), self.state_angles)
+        B = self.B if B is None else control_matrix(B, len(x))
+        return wrapped(x + control_effect(control, B), self.state_angles)
 
     def innovation(self, z: Float, z_pred: Float, missing: Bool | None, plain: bool) -> Float:
         """Return z - z_pred, 0 where missing: the model's residual, a difference if `plain`."""
         if missing is not None:
             z = np.where(missing, z_pred, z)
-        if plain or not overrides(type(self.measurement), MeasurementModel, "residual"):
+        if plain or not overrides(type(self.held_measurement), MeasurementModel, "residual"):
             return z - z_pred
-        return self.measurement.residual(z, z_pred)
+        return self.held_measurement.residual(z, z_pred)
 
     def belief(self) -> tuple[Float, Float]:
         """Return mean (n,) and covariance, checked if they were assigned since the last call."""
+        if self.handed:
+            self.take_back()
         if self.x is self._known_x and self.P is self._known_P:
             return self.x.reshape(-1), self.P
         return belief_arrays(self.x, self.P, self.dim_x)
 
     def set_belief(self, x: Float, P: Float) -> None:
         """Set a belief, shapes (n,) and (n, n), without the checks of an assigned one."""
-        self.x = self._known_x = x.reshape(np.shape(self.x))
-        self.P = self._known_P = P
+        if type(self.x) is not np.ndarray or self.x.ndim > 1:
+            x = x.reshape(np.shape(self.x))
+        vars(self).update(x=x, P=P, _known_x=x, _known_P=P)  # faster than assignments
 
     def check_measurement(
         self, z: ArrayLike | None, R: ArrayLike | None, H: Float | None
     ) -> tuple[Float, Bool | None, Float] | None:
         """Return a measurement (m,), its missing mask and its noise; None if all is missing."""
         m = self.dim_z if H is None else len(H)
-        values, missing = np.array(z), None
-        usual = values.shape == (m,) and values.dtype == np.float64
-        if not (usual and values.dot(values) < np.inf):
-            values, missing = measurement_and_mask(z, m)
-            if missing is not None and missing.all():
-                return None
-        R = self.measurement.R if R is None else covariance_matrix("R", R, m)
+        values, missing = measurement_and_mask(z, m)
+        if missing is not None and missing.all():
+            return None
+        R = self.held_measurement.R if R is None else covariance_matrix("R", R, m)
         return values, missing, R if H is None else shaped("R", R, m, m)
 
     def initialize_record(self) -> None:
         """Set the attributes of the last step as before the first one."""
         n, m = self.dim_x, self.dim_z
         self.x_prior, self.P_prior = self.x.copy(), self.P.copy()
-        self._known_x, self._known_P, self._dt = self.x, self.P, 1.0
+        self._known_x, self._known_P, self.last_dt = self.x, self.P, 1.0
         self.K, self.S, self.SI = np.zeros((n, m)), np.zeros((m, m)), np.zeros((m, m))
         self.inv: Inverse = inverse
         self.jitter_count = 0
@@ -214,80 +228,46 @@ class GaussianFilter(Tracker):
 
     def record_prediction(self, x: Float, P: Float, dt: float) -> None:
         """Set the belief and the attributes of the last prediction."""
-        self.set_belief(x, P)
-        self._dt = dt
-        self.x_prior, self.P_prior = self.x.copy(), P.copy()
+        check_finite(x, P)
+        if type(self.x) is not np.ndarray or self.x.ndim > 1:
+            x = x.reshape(np.shape(self.x))
+        # faster than assignments, which are checked
+        vars(self).update(x=x, P=P, _known_x=x, _known_P=P, x_prior=x.copy(), P_prior=P.copy())
+        if dt != self.last_dt:
+            self.read_again(dt)
 
     def record_update(self, z: Float, update: GaussianUpdate) -> None:
         """Set the belief and the attributes of the last measurement."""
         angles = self.state_angles
-        self.set_belief(wrapped(update.x, angles) if angles else update.x, update.P)
-        shape = (len(z),) if self.x.ndim == 1 else (len(z), 1)
-        self.z, self.y = z.reshape(shape), update.y.reshape(shape)
-        self.K, self.S, self.SI = update.K, update.S, update.SI
-        self.log_likelihood = float(update.log_likelihood)
-        self.mahalanobis = math.sqrt(max(float(update.square), 0.0))
-        self.jitter_count += update.jittered
-        self.x_post, self.P_post = self.x.copy(), self.P.copy()
+        log_likelihood = float(update.log_likelihood)
+        if not math.isfinite(log_likelihood):
+            check_finite(update.x, update.P)
+        x, P, column = wrapped(update.x, angles) if angles else update.x, update.P, False
+        if type(self.x) is not np.ndarray or self.x.ndim > 1:
+            x, column = x.reshape(np.shape(self.x)), np.ndim(self.x) > 1
+        vars(self).update(
+            x=x,
+            P=P,
+            _known_x=x,
+            _known_P=P,
+            z=z[:, None] if column else z,
+            y=update.y[:, None] if column else update.y,
+            K=update.K,
+            S=update.S,
+            SI=update.SI,
+            log_likelihood=log_likelihood,
+            mahalanobis=math.sqrt(max(float(update.square), 0.0)),
+            jitter_count=self.jitter_count + update.jittered,
+            x_post=x.copy(),
+            P_post=P.copy(),
+        )
 
     def record_missed(self) -> None:
         """Set the attributes of the last measurement to those of a missing one."""
         shape = (self.dim_z,) if np.ndim(self.x) == 1 else (self.dim_z, 1)
         self.z, self.y = np.full(shape, np.nan), np.zeros(shape)
         self.log_likelihood = self.mahalanobis = 0.0
-        self.x_post, self.P_post = self.x.copy(), self.P.copy()
-
-    @property
-    def state_motion(self) -> MotionModel:
-        """Motion of the whole state: `motion`, unless a method adds entries to the state."""
-        return self.motion
-
-    @property
-    def state_angles(self) -> tuple[int, ...]:
-        """Entries of the state that are angles."""
-        motion = self.state_motion
-        return motion.angles if overrides(type(motion), MotionModel, "angles") else ()
-
-    @property
-    def dim_x(self) -> int:
-        """Number of entries of the state."""
-        return self.state_motion.dim_x
-
-    @property
-    def dim_z(self) -> int:
-        """Number of entries of a measurement."""
-        return self.measurement.dim_z
-
-    @property
-    def dim_u(self) -> int:
-        """Number of control inputs."""
-        return 0 if self.B is None else int(self.B.shape[1])
-
-    @property
-    def F(self) -> Float:
-        """Jacobian of the motion at the present mean, for the length of the last step."""
-        return self.state_motion.F(np.ravel(self.x), self._dt)
-
-    @property
-    def Q(self) -> Float:
-        """Noise of the motion, for the length of the last step."""
-        return self.state_motion.Q(self._dt)
-
-    @property
-    def B(self) -> Float | None:
-        """Control matrix of the motion, None if it has none."""
-        control: Float | None = getattr(self.state_motion, "control", None)
-        return control
-
-    @property
-    def H(self) -> Float:
-        """Jacobian of the measurement at the present mean."""
-        return self.measurement.H(np.ravel(self.x))
-
-    @property
-    def R(self) -> Float:
-        """Noise of the measurement."""
-        return self.measurement.R
+        self.x_post, self.P_post = np.array(self.x), np.array(self.P)
 
     @property
     def likelihood(self) -> float:

@@ -45,8 +45,8 @@ class EKF(GaussianFilter):
 
     def linearize_motion(self, x: Float, P: Float, dt: float) -> Linearization:
         """Return f(x) and its Jacobian."""
-        return Linearization(self.motion.f(x, dt), at_each(self.motion.F, x, dt))
+        return Linearization(self.held_motion.f(x, dt), at_each(self.held_motion.F, x, dt))
 
     def linearize_measurement(self, x: Float, P: Float) -> Linearization:
         """Return h(x) and its Jacobian."""
-        return Linearization(self.measurement.h(x), at_each(self.measurement.H, x))
+        return Linearization(self.held_measurement.h(x), at_each(self.held_measurement.H, x))

@@ -14,12 +14,15 @@ from numpy.typing import ArrayLike
 from arrivals.measurements import is_missing
 from arrivals.trackers.base import Tracker
 from arrivals.trackers.estimates import StateEstimate
+from arrivals.trackers.gaussian.arguments import control_input
 from arrivals.trackers.gaussian.base import GaussianFilter
 from arrivals.trackers.gaussian.circular import Angles, mixture
 from arrivals.trackers.gaussian.equations import likelihood
+from arrivals.trackers.gaussian.filterpy_names.attributes import DeclaredAttributes
+from arrivals.trackers.gaussian.particle import Particle
 from arrivals.trackers.registry import register
 from arrivals.typing import Float
-from arrivals.validation import shaped
+from arrivals.validation import shaped, time_step
 
 TINY = sys.float_info.min
 
@@ -57,7 +60,7 @@ class Filter(Protocol):
 
 
 @register("imm")
-class IMM(Tracker):
+class IMM(DeclaredAttributes, Tracker):
     """Interacting-multiple-model filter, over any filters of the same state.
 
     Parameters
@@ -150,6 +153,8 @@ class IMM(Tracker):
         dt : float
             Length of the step, for the filters of this library; those of filterpy have their own.
         """
+        control_input(u)  # finite
+        dt = time_step(dt)
         # c_j = Σ_i M_ij mu_i   (11.6.6-8)
         cbar = self.mu.dot(self.M)
         # omega_ij = M_ij mu_i / c_j   (11.6.6-7)
@@ -254,6 +259,7 @@ def _probabilities(name: str, values: Float) -> Float:
 def _for_all(filters: Sequence[Filter], step: Callable[[int, Filter], object]) -> None:
     """Call a step of all filters; where one raises, all have their attributes of before."""
     before = [dict(vars(member)) for member in filters]
+    random = {id(each): each.generator_state for each in filters if isinstance(each, Particle)}
     try:
         for j, member in enumerate(filters):
             step(j, member)
@@ -261,6 +267,8 @@ def _for_all(filters: Sequence[Filter], step: Callable[[int, Filter], object]) -
         for member, attributes in zip(filters, before, strict=True):
             vars(member).clear()
             vars(member).update(attributes)
+            if isinstance(member, Particle):
+                member.generator_state = random[id(member)]
         raise
 
 

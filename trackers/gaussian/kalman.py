@@ -10,14 +10,18 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.base import MeasurementModel
 from arrivals.motion_models.base import MotionModel
-from arrivals.trackers.gaussian.arguments import covariance_matrix, matrix_with_columns
+from arrivals.trackers.gaussian.arguments import (
+    covariance_matrix,
+    finite_matrix,
+    matrix_with_columns,
+)
 from arrivals.trackers.gaussian.base import GaussianFilter
 from arrivals.trackers.gaussian.equations import predict_gaussian, update_gaussian
 from arrivals.trackers.gaussian.linalg import apply
 from arrivals.trackers.gaussian.linearization import Linearization
 from arrivals.trackers.registry import register
 from arrivals.typing import Float
-from arrivals.validation import shaped
+from arrivals.validation import time_step
 
 ArrayFunction = Callable[[Float], Float]
 
@@ -62,6 +66,8 @@ class Kalman(GaussianFilter):
     array([1.07, 2.1 , 2.93])
     """
 
+    linear_only = True
+
     def __init__(
         self, motion: MotionModel, measurement: MeasurementModel, x: ArrayLike, P: ArrayLike
     ) -> None:
@@ -79,9 +85,9 @@ class Kalman(GaussianFilter):
     ) -> None:
         """Predict mean and covariance; parameters as in `GaussianFilter.predict`."""
         x, P = self.belief()
-        n = len(x)
-        F = self.motion.F(x, dt) if F is None else shaped("F", F, n, n)
-        Q = self.motion.Q(dt) if Q is None else covariance_matrix("Q", Q, n)
+        n, dt = len(x), time_step(dt)
+        F = self.held_motion.F(x, dt) if F is None else finite_matrix("F", F, n, n)
+        Q = self.held_motion.Q(dt) if Q is None else covariance_matrix("Q", Q, n)
         # x = F x + B u   (4.20)
         x = self.add_control(F.dot(x), u, B)
         # P = F P F' + Q   (4.20)
@@ -99,7 +105,7 @@ class Kalman(GaussianFilter):
             self.record_missed()
             return
         z, missing, R = measured
-        H = self.measurement.H(x) if replaced is None else replaced
+        H = self.held_measurement.H(x) if replaced is None else replaced
         # y = z - H x   (4.21)
         y = self.innovation(z, H.dot(x), missing, plain=replaced is not None)
         # S = H P H' + R,  K = P H' S^-1,  x = x + K y   (4.21)
@@ -108,12 +114,12 @@ class Kalman(GaussianFilter):
 
     def linearize_motion(self, x: Float, P: Float, dt: float) -> Linearization:
         """Return F x and F."""
-        F = self.motion.F(_first(x), dt)
+        F = self.held_motion.F(_first(x), dt)
         return Linearization(apply(F, x), F)
 
     def linearize_measurement(self, x: Float, P: Float) -> Linearization:
         """Return H x and H."""
-        H = self.measurement.H(_first(x))
+        H = self.held_measurement.H(_first(x))
         return Linearization(apply(H, x), H)
 
 

@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.trackers.gaussian.arguments import covariance_matrix
+from arrivals.trackers.gaussian.arguments import covariance_matrix, finite_matrix
 from arrivals.trackers.gaussian.equations import GaussianUpdate, predict_gaussian, update_gaussian
 from arrivals.trackers.gaussian.linalg import apply
 from arrivals.typing import Bool, Float
-from arrivals.validation import shaped
 
 if TYPE_CHECKING:
     from arrivals.trackers.gaussian.base import GaussianFilter
@@ -57,7 +56,7 @@ def linear_step(
     if F is None:
         motion = tracker.linearize_motion(x, P, dt)
     else:
-        F = shaped("F", F, n, n)
+        F = finite_matrix("F", F, n, n)
         motion = Linearization(apply(F, x), F)
     Q = tracker.state_motion.Q(dt) if Q is None else covariance_matrix("Q", Q, n)
     return motion, motion.total_noise(Q)

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.base import MeasurementModel
-from arrivals.measurements import is_missing
+from arrivals.measurements import is_missing, numbers
 from arrivals.motion_models.base import MotionModel, gaussian
 from arrivals.trackers.base import Tracker
 from arrivals.trackers.estimates import StateEstimate
-from arrivals.trackers.gaussian.arguments import measurement_vector
+from arrivals.trackers.gaussian.arguments import (
+    check_finite,
+    covariance_matrix,
+    measurement_vector,
+)
 from arrivals.trackers.gaussian.circular import (
     circular_mean,
     difference,
@@ -18,10 +26,19 @@ from arrivals.trackers.gaussian.circular import (
     wrapped,
 )
 from arrivals.trackers.gaussian.equations import LOG_2PI, likelihood
+from arrivals.trackers.gaussian.filterpy_names.attributes import DeclaredAttributes
 from arrivals.trackers.gaussian.linalg import cholesky
 from arrivals.trackers.registry import register
 from arrivals.typing import Float, Int
-from arrivals.validation import count, covariance, instance, probability, real, shaped
+from arrivals.validation import (
+    count,
+    instance,
+    no_control,
+    probability,
+    real,
+    shaped,
+    time_step,
+)
 
 
 def systematic_resample(weights: ArrayLike, rng: np.random.Generator) -> Int:
@@ -55,7 +72,7 @@ def systematic_resample(weights: ArrayLike, rng: np.random.Generator) -> Int:
 
 
 @register("particle")
-class Particle(Tracker):
+class Particle(DeclaredAttributes, Tracker):
     """Bootstrap particle filter: states drawn by the motion, weighted by the measurement.
 
     Parameters
@@ -152,35 +169,50 @@ class Particle(Tracker):
 
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
         """Draw each particle from the motion model; `u` must be None or 0."""
-        if u is not None and np.any(u):
-            raise ValueError(f"u must be None or 0; got {u}: add the control to the motion model")
-        particles, weights = self._draw_if_assigned()
-        self._set_particles(self.motion.sample(particles, self._generator, dt), weights)
+        no_control(u)
+        dt = time_step(dt)
+        with self._generator_unchanged_on_error():
+            particles, weights = self._draw_if_assigned()
+            self._set_particles(self.motion.sample(particles, self._generator, dt), weights)
 
     def update(self, z: ArrayLike | None) -> None:
         """Weight the particles by a measurement, (m,) or a complex snapshot; NaN is left out."""
         if is_missing(z):
             self.log_likelihood = 0.0
             return
-        before = self._generator.bit_generator.state
-        try:
+        with self._generator_unchanged_on_error():
             particles, weights = self._draw_if_assigned()
             # log w_i = log w_i + log p(z | x_i), normalized
-            log_weights = _log(weights) + self._log_likelihood(np.asarray(z), particles)
+            log_weights = _log(weights) + self._log_likelihood(numbers("z", z), particles)
             top = log_weights.max()
             if not np.isfinite(top):
                 raise ValueError(
                     "z must have a positive likelihood; got 0 for all particles: increase "
                     "n_particles"
                 )
-        except (ValueError, TypeError):
-            self._generator.bit_generator.state = before
-            raise
-        weights = np.exp(log_weights - top)
-        total = weights.sum()
+            weights = np.exp(log_weights - top)
+            total = weights.sum()
+            self._set_particles(particles, weights / total)
         self.log_likelihood = float(top + np.log(total))
-        self._set_particles(particles, weights / total)
         self._resample()
+
+    @contextmanager
+    def _generator_unchanged_on_error(self) -> Iterator[None]:
+        before = self.generator_state
+        try:
+            yield
+        except Exception:
+            self.generator_state = before
+            raise
+
+    @property
+    def generator_state(self) -> Any:
+        """State of the random generator."""
+        return self._generator.bit_generator.state
+
+    @generator_state.setter
+    def generator_state(self, state: Any) -> None:
+        self._generator.bit_generator.state = state
 
     def _log_likelihood(self, z: ArrayLike, particles: Float) -> Float:
         exact = getattr(self.measurement, "log_likelihood", None)
@@ -214,13 +246,16 @@ class Particle(Tracker):
         mean = shaped("x", x, n)
         if not np.isfinite(mean).all():
             raise ValueError(f"x must be finite; got {mean.tolist()}")
-        return mean, covariance("P", P, n)
+        return mean, covariance_matrix("P", P, n)
 
     def _set_particles(self, particles: Float, weights: Float) -> None:
         angles = self.motion.angles
+        x = circular_mean(particles, weights, angles)
+        P = weighted_covariance(difference(particles, x, angles), weights)
+        check_finite(x, P)
         self.particles, self.weights = particles, weights
-        self.x = self._x = circular_mean(particles, weights, angles)
-        self.P = self._P = weighted_covariance(difference(particles, self.x, angles), weights)
+        self.x = self._x = x
+        self.P = self._P = P
 
     @property
     def likelihood(self) -> float:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
+from arrivals.measurements import real_numbers, rows
 from arrivals.trackers.base import Tracker
 from arrivals.trackers.estimates import StateEstimate
 from arrivals.trackers.gaussian.arguments import (
@@ -23,7 +24,7 @@ from arrivals.trackers.gaussian.linalg import Inverse, cholesky
 from arrivals.trackers.gaussian.linearization import linear_step
 from arrivals.trackers.run import Run
 from arrivals.typing import Float
-from arrivals.validation import positive, real
+from arrivals.validation import positive, real, time_step
 
 if TYPE_CHECKING:
     from arrivals.trackers.gaussian.base import GaussianFilter
@@ -75,22 +76,27 @@ def batch_filter(
         If the length of a sequence differs from that of `zs`.
     """
     saver, dts = _saver_and_dts(**options)
-    n_steps = len(zs)
+    zs = list(rows("zs", zs))
+    n_steps, before = len(zs), dict(vars(self))
     arguments = (per_step_values(name, values, n_steps) for name, values in zip(
         ("Fs", "Qs", "Hs", "Rs", "Bs", "us", "dts"), (Fs, Qs, Hs, Rs, Bs, us, dts), strict=True
     ))  # fmt: skip
     prior, post = [], []
-    for z, F, Q, H, R, B, u, dt in zip(zs, *arguments, strict=True):
-        if update_first:
-            self.update(z, R, H)
-            post.append((self.x, self.P))
-        self.predict(u, dt=1.0 if dt is None else dt, F=F, Q=Q, B=B)
-        prior.append((self.x, self.P))
-        if not update_first:
-            self.update(z, R, H)
-            post.append((self.x, self.P))
-        if saver is not None:
-            saver.save()
+    try:
+        for z, F, Q, H, R, B, u, dt in zip(zs, *arguments, strict=True):
+            if update_first:
+                self.update(z, R, H)
+                post.append((self.x, self.P))
+            self.predict(u, dt=1.0 if dt is None else dt, F=F, Q=Q, B=B)
+            prior.append((self.x, self.P))
+            if not update_first:
+                self.update(z, R, H)
+                post.append((self.x, self.P))
+            if saver is not None:
+                saver.save()
+    except Exception:
+        vars(self).update(before)  # arrays are never written into
+        raise
     return *_stack(post, self), *_stack(prior, self)
 
 
@@ -144,6 +150,7 @@ def rts_smoother(
     ----------
     Särkkä, *Bayesian Filtering and Smoothing*, 2013, (8.6), (9.6) and (9.17).
     """
+    self.take_back()
     means, P = real("Xs", Xs), np.array(real("Ps", Ps))
     n_steps, n = len(means), self.dim_x
     if P.shape != (n_steps, n, n):
@@ -152,7 +159,7 @@ def rts_smoother(
     Fs, Qs = per_step_values("Fs", Fs, n_steps), per_step_values("Qs", Qs, n_steps)
     us, dts = per_step_values("us", us, n_steps), per_step_values("dts", dts, n_steps)
     for k in range(n_steps - 2, -1, -1):
-        dt = 1.0 if dts[k + 1] is None else dts[k + 1]
+        dt = 1.0 if dts[k + 1] is None else time_step(dts[k + 1])
         motion, Q = linear_step(self, x[k], P[k], dt, Fs[k + 1], Qs[k + 1])
         # x_pred = f(x) + B u,  P_pred = F P F' + Q
         x_pred = self.add_control(motion.mean, us[k + 1], None)
@@ -185,12 +192,13 @@ def run_batch(
     list of Run
     """
     positive("dt", dt)
-    if not isinstance(measurements, np.ndarray):
-        measurements = sequences = [list(sequence) for sequence in measurements]
-        if len({len(sequence) for sequence in sequences}) != 1 or not sequences[0]:
-            return Tracker.run_batch(self, sequences, dt)
+    sequences = [list(rows("measurements", each)) for each in rows("measurements", measurements)]
+    if len({len(sequence) for sequence in sequences}) != 1 or not sequences[0]:
+        return Tracker.run_batch(self, sequences, dt)
     started = time.perf_counter()
-    xs, Ps = _filter_block(self, _measurement_block(measurements, self.dim_z), dt)
+    if not (isinstance(measurements, np.ndarray) and measurements.shape[2:] == (self.dim_z,)):
+        measurements = [[measurement_vector(z, self.dim_z) for z in row] for row in sequences]
+    xs, Ps = _filter_block(self, real_numbers("measurements", measurements), dt)
     elapsed = (time.perf_counter() - started) / xs.shape[1]
     steps = dt * np.arange(len(xs), dtype=np.float64)
     n_entries = np.full(len(xs), self.dim_x)
@@ -198,15 +206,6 @@ def run_batch(
         Run(StateEstimate, {"x": x, "P": P}, x, n_entries, steps, elapsed)
         for x, P in zip(xs.swapaxes(0, 1), Ps.swapaxes(0, 1), strict=True)
     ]
-
-
-def _measurement_block(sequences: Iterable[Iterable[ArrayLike | None]], m: int) -> Float:
-    """Return sequences as (n_sequences, n_steps, m), NaN where measurements are missing."""
-    if isinstance(sequences, np.ndarray) and sequences.ndim == 3 and sequences.shape[2] == m:
-        return real("measurements", sequences)
-    return np.array(
-        [[measurement_vector(np.nan if z is None else z, m) for z in row] for row in sequences]
-    )
 
 
 def _filter_block(tracker: GaussianFilter, zs: Float, dt: float) -> tuple[Float, Float]:
@@ -217,7 +216,7 @@ def _filter_block(tracker: GaussianFilter, zs: Float, dt: float) -> tuple[Float,
     xs, Ps = [], []
     for z in zs.swapaxes(0, 1):
         x, P = tracker.predict_belief(x, P, dt)
-        x, P = tracker.update_belief(x, P, z, missing_mask(z), tracker.measurement.R)[:2]
+        x, P = tracker.update_belief(x, P, z, missing_mask(z), tracker.held_measurement.R)[:2]
         x = wrapped(x, tracker.state_angles)
         xs.append(x)
         Ps.append(P)

@@ -105,18 +105,18 @@ class UKF(GaussianFilter):
 
     def linearize_motion(self, x: Float, P: Float, dt: float) -> Linearization:
         """Return the regression of f over the sigma points."""
-        angles = self.motion.angles
+        angles = self.held_motion.angles
         motion = self._regression(
             x,
             P,
-            lambda points: self.motion.f(points, dt),
+            lambda points: self.held_motion.f(points, dt),
             lambda a, b: difference(a, b, angles),
         )
         return motion._replace(mean=wrapped(motion.mean, angles))
 
     def linearize_measurement(self, x: Float, P: Float) -> Linearization:
         """Return the regression of h over the sigma points."""
-        return self._regression(x, P, self.measurement.h, self.measurement.residual)
+        return self._regression(x, P, self.held_measurement.h, self.held_measurement.residual)
 
     def _regression(
         self,

@@ -242,12 +242,12 @@ class InterpolationEKF(GaussianFilter):
         """Number of sensors."""
         return len(self.measurement.grid_index)
 
-    @property
+    @property  # type: ignore[misc]  # it follows the samples
     def H(self) -> Float:
         """Slopes of `y`, at the present mean and the newest snapshots, (n_sensors, dim_x)."""
         return self._present_observation().H
 
-    @property
+    @property  # type: ignore[misc]  # it follows the samples
     def R(self) -> Float:
         """Noise of `y` at the present mean, scaled to a source of power 1."""
         return np.diag(self._present_observation().R)

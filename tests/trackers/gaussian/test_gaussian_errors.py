@@ -82,8 +82,12 @@ BAD_CALLS: list[tuple[Any, type[Exception], str]] = [
     (lambda f: f.update([1.0]), ValueError, r"z must have shape \(2,\) or \(2, 1\); got \(1,\)"),
     (lambda f: f.update(1.0), ValueError, r"z must have shape \(2,\)"),
     (lambda f: f.update([[1.0, 2.0], [3.0, 4.0]]), ValueError, r"z must have shape"),
-    (lambda f: f.update([1.0, np.inf]), ValueError, "z must be finite, or NaN where missing"),
-    (lambda f: f.update("text"), TypeError, "z must hold real numbers"),
+    (lambda f: f.update("text"), TypeError, "z must hold numbers, NaN for a missing one"),
+    (lambda f: f.update([[1.0], [2.0, 3.0]]), ValueError, "z must have rows of one length"),
+    (lambda f: f.predict(np.nan), ValueError, "u must be finite; got nan"),
+    (lambda f: f.predict([1.0], B=[[np.inf], [0.0]]), ValueError, "B must be finite"),
+    (lambda f: f.predict(F=[[np.inf, 0.0], [0.0, 1.0]]), ValueError, "F must be finite"),
+    (lambda f: f.update([1.0, 2.0], H=np.full((2, 2), np.nan)), ValueError, "H must be finite"),
     (
         lambda f: f.update([1.0, 2.0], R=np.eye(3)),
         ValueError,
@@ -138,6 +142,38 @@ def test_invalid_calls_leave_the_filter_unchanged(
     with pytest.raises(error, match=message):
         call(tracker)
     assert difference(before, vars(tracker)) is None
+
+
+TOO_LONG = "belief must stay finite|dt must be at most"
+
+
+@every_kind
+@pytest.mark.parametrize("dt", [1e110, 1e200, 1e308])
+def test_step_that_overflows_raises_and_leaves_the_filter_unchanged(
+    kind: type[GaussianFilter], dt: float
+) -> None:
+    tracker = kind(WALK, POSITION, X, P)
+    before = copy.deepcopy(vars(tracker))
+    with np.errstate(all="ignore"), pytest.raises(ValueError, match=TOO_LONG):
+        tracker.predict(dt=dt)
+    assert difference(before, vars(tracker)) is None
+
+
+@every_kind
+def test_infinite_and_masked_numbers_are_missing(kind: type[GaussianFilter]) -> None:
+    tracker, other = kind(WALK, POSITION, X, P), kind(WALK, POSITION, X, P)
+    other.update([np.nan, 0.3])
+    masked = np.ma.array([7.0, 0.3], mask=[True, False])
+    partly: list[Any] = [[np.inf, 0.3], [-1e200, 0.3], [None, 0.3], [[None], [0.3]], masked]
+    for z in (*partly, masked[:, None]):
+        tracker.x, tracker.P = X, P
+        tracker.update(z)
+        np.testing.assert_array_equal(tracker.x, other.x)
+        np.testing.assert_array_equal(tracker.z, other.z)
+    nothing: list[Any] = [np.inf, [np.inf, None], np.ma.array([1.0, 2.0], mask=True)]
+    for z in nothing:
+        tracker.update(z)
+        assert np.isnan(tracker.z).all()
 
 
 @every_kind

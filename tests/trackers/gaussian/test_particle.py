@@ -160,7 +160,7 @@ def test_invalid_parameters_raise(
 def test_invalid_calls_leave_the_filter_unchanged() -> None:
     tracker = Particle(WALK, POSITION, [0.0, 0.0], np.eye(2), 30, rng=0)
     calls: list[tuple[Callable[[], object], type[Exception], str]] = [
-        (lambda: tracker.predict(1.0), ValueError, "u must be None or 0; got 1.0"),
+        (lambda: tracker.predict(1.0), ValueError, "u must be None or 0 for a method"),
         (lambda: tracker.update([1.0]), ValueError, r"z must have shape \(2,\)"),
         (
             lambda: tracker.update([1j, 1j]),

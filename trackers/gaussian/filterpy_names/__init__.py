@@ -1,0 +1,1 @@
+"""filterpy's names on Gaussian filters: attributes, matrices, and further methods."""
