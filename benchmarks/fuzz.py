@@ -1,4 +1,4 @@
-"""Malformed inputs to trackers, models, files and the command line: what is tried, what fails."""
+"""Malformed inputs, kills and interrupts: what is tried, what fails."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from fuzzing.judging import Fault, Report, try_input
 
-PARTS = ("trackers", "models", "files", "cli")
+PARTS = ("trackers", "models", "files", "cli", "signals")
 LIMIT_S, MEMORY = 30.0, 4 << 30  # of one input, and of the process that tries it
 
 

@@ -56,7 +56,7 @@ def kinds() -> list[str]:
     return list(COMMANDS)
 
 
-def _prepare() -> Path:
+def prepare(n_samples: int = 256) -> Path:
     """Return a folder with small valid inputs; only they are in it."""
     place = folder() / "work"
     (place / "folder").mkdir(parents=True, exist_ok=True)
@@ -65,7 +65,7 @@ def _prepare() -> Path:
             entry.unlink()
     from scipy.io import wavfile
 
-    phase = 0.25 * np.pi * np.arange(256)[:, None] + 0.4 * np.arange(3)
+    phase = 0.25 * np.pi * np.arange(n_samples)[:, None] + 0.4 * np.arange(3)
     noise = np.random.default_rng(0).standard_normal(phase.shape)
     wavfile.write(place / "tow.wav", 8000, (8000 * np.cos(phase) + 100 * noise).astype("<i2"))
     (place / "array.toml").write_text(ARRAY)
@@ -97,7 +97,7 @@ def calls(kind: str, rng: np.random.Generator) -> Iterator[Call]:
 
 def _run(arguments: list[str]) -> Any:
     """Run a command; return its status, its outputs and the files that it left."""
-    place, before = _prepare(), os.getcwd()
+    place, before = prepare(), os.getcwd()
     given = sorted(os.listdir(place))
     out, err = io.StringIO(), io.StringIO()
     stdin = io.TextIOWrapper(io.BytesIO(b"\x01\x00" * 600))
