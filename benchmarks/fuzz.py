@@ -1,4 +1,4 @@
-"""Malformed inputs to trackers, models, files and the command line: what is tried, what fails."""
+"""Malformed inputs, kills and interrupts: what is tried, what fails."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import multiprocessing
 import os
 import resource
 import sys
+import tempfile
 import time
 from multiprocessing.connection import Connection
 from typing import Any
@@ -16,7 +17,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from fuzzing.judging import Fault, Report, try_input
 
-PARTS = ("trackers", "models")
+PARTS = ("trackers", "models", "files", "cli", "signals")
 LIMIT_S, MEMORY = 30.0, 4 << 30  # of one input, and of the process that tries it
 
 
@@ -36,8 +37,11 @@ def try_inputs(name: str, seed: int, numbers: range, only: str | None = None) ->
     return report
 
 
-def _work(name: str, seed: int, numbers: range, only: str | None, results: Connection) -> None:
+def _work(
+    name: str, seed: int, numbers: range, only: str | None, folder: str, results: Connection
+) -> None:
     """Try inputs, and send the result of each."""
+    tempfile.tempdir = folder
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     null = os.open(os.devnull, os.O_RDWR)
     for stream in (0, 1, 2):
@@ -57,6 +61,13 @@ def _work(name: str, seed: int, numbers: range, only: str | None, results: Conne
 
 def supervise(name: str, seed: int, n_inputs: int, seconds: float, only: str | None) -> Report:
     """Try inputs in a child process that is replaced when it dies or hangs."""
+    with tempfile.TemporaryDirectory(prefix="arrivals-fuzz-") as folder:
+        return _supervise(name, seed, n_inputs, seconds, only, folder)
+
+
+def _supervise(
+    name: str, seed: int, n_inputs: int, seconds: float, only: str | None, folder: str
+) -> Report:
     report, started, first = Report(), time.monotonic(), 0
     kinds = part(name).kinds()
     step = 1 if only is None else len(kinds)
@@ -64,7 +75,7 @@ def supervise(name: str, seed: int, n_inputs: int, seconds: float, only: str | N
     fork = multiprocessing.get_context("fork")
     while first < n_inputs and time.monotonic() - started < seconds:
         results, end = fork.Pipe(duplex=False)
-        arguments = (name, seed, range(first, n_inputs, step), only, end)
+        arguments = (name, seed, range(first, n_inputs, step), only, folder, end)
         child = fork.Process(target=_work, args=arguments, daemon=True)
         child.start()
         end.close()

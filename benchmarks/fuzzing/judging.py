@@ -130,7 +130,7 @@ def _of_error(error: Exception, call: Call) -> tuple[str, str] | None:
     if "\n" in message:
         return f"multi-line {kind.__name__}: {_short(message)}", place
     if len(message) > LONGEST_MESSAGE:
-        return f"{kind.__name__} of {len(message)} characters: {_short(message)}", place
+        return f"long {kind.__name__}: {len(message)} characters, {_short(message)}", place
     if call.deliberate and not line.startswith("raise"):
         return f"foreign {kind.__name__}: {_short(message)}", place
     return None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -227,9 +228,9 @@ FUNCTIONS: dict[str, tuple[Callable[..., Any], Arguments]] = {
                                mm.LinearMeasurement(np.eye(4), np.eye(4))).log_likelihood,
         {"z": np.zeros(7), "x": X4},
     ),
-    "numbers": (numbers, {"name": "z", "value": X4}),
-    "real_numbers": (real_numbers, {"name": "z", "value": X4}),
-    "rows": (rows, {"name": "z", "measurements": X4}),
+    "numbers": (partial(numbers, "z"), {"value": X4}),
+    "real_numbers": (partial(real_numbers, "z"), {"value": X4}),
+    "rows": (partial(rows, "z"), {"measurements": X4}),
     "is_missing": (is_missing, {"z": X4}),
     "composite": (mm.composite, {"z": X4 * 1j}),
     "db_to_neper": (mm.db_to_neper, {"level_db": X4}),

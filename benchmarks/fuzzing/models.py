@@ -122,7 +122,9 @@ def _is_modest(value: Any) -> bool:
         return False
     try:
         numbers = np.abs(np.asarray(value, dtype=np.complex128))
-    except (TypeError, ValueError, OverflowError, RecursionError):
+    except OverflowError:
+        return False
+    except (TypeError, ValueError, RecursionError):
         return not isinstance(value, list | tuple | np.ndarray)
     return bool(((numbers < MODEST) & ((numbers > 1 / MODEST) | (numbers == 0))).all())
 

@@ -65,7 +65,7 @@ def not_negative(name: str, value: Any) -> float:
         raise ValueError(f"{name} must be finite and not negative; got {value}")
     if not size < LARGEST:
         raise ValueError(f"{name} must be at most {LARGEST}; got {value}")
-    return size
+    return size + 0.0  # no -0.0
 
 
 def time_step(dt: Any) -> float:
@@ -78,7 +78,7 @@ def time_step(dt: Any) -> float:
     ValueError: dt must be finite and not negative; got nan
     """
     if type(dt) is float and 0.0 <= dt < LONGEST_STEP:
-        return dt  # the usual case
+        return dt + 0.0  # the usual case; no -0.0
     step = not_negative("dt", dt)
     if not step < LONGEST_STEP:
         raise ValueError(f"dt must be at most {LONGEST_STEP}; got {dt}")

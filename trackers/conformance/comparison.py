@@ -69,7 +69,7 @@ def _parts(value: Any) -> dict[Any, Any] | None:
     if isinstance(value, Mapping):
         return dict(value)
     if isinstance(value, list | tuple | np.ndarray):
-        return dict(enumerate(value))
+        return dict(enumerate(value.ravel() if isinstance(value, np.ndarray) else value))
     if callable(value) or not hasattr(value, "__dict__"):
         return None
     parts: dict[str, Any] = vars(value)
