@@ -26,6 +26,7 @@ from arrivals.trackers.rss.belief import SourceBeliefs, keep_finite
 from arrivals.trackers.rss.inference.joint_posterior import JointPosterior
 from arrivals.trackers.rss.inference.solution import Diagnostics, Solution, WeightedReadings
 from arrivals.trackers.rss.model_order.track_table import TrackTable
+from arrivals.trackers.rss.pooled_readings import PooledReadings
 from arrivals.trackers.rss.settings import AmplitudePrior, BirthDeath, GridSearch
 from arrivals.trackers.run import Run
 from arrivals.typing import Float
@@ -89,6 +90,7 @@ class RSSTracker(Tracker):
         self.tracks = TrackTable.certain(len(sources.u))
         self.label, self.existence = self.tracks.padded(0)
         self.elapsed = np.inf
+        self.pool = PooledReadings.none(model.dim_z)
         self.set_belief(sources, self.tracks)
         self.record_missed()
         warn_initial(sources.x[:, self.position], self.measurement.sensors)
@@ -152,6 +154,8 @@ class RSSTracker(Tracker):
         predicted = self.predict_sources(sources, dt)
         self.set_belief(predicted, self.current_tracks(len(sources.u)))
         self.elapsed = self.elapsed + dt
+        if self.births or sources.u.size == 0:
+            self.pool = self.pool.later(dt)
 
     def predict_sources(self, sources: SourceBeliefs, dt: float) -> SourceBeliefs:
         """Return beliefs after `dt`."""
@@ -171,7 +175,8 @@ class RSSTracker(Tracker):
         z = self._vector(z)
         if np.isnan(z).all():
             return None
-        return self.weighted(self.measurement.readings(z)[None], np.array([self.elapsed]))
+        readings = self.weighted(self.measurement.readings(z)[None], np.array([self.elapsed]))
+        return readings if readings.W.any() else None
 
     def _vector(self, z: ArrayLike | None) -> Float:
         """Return a measurement as (n_sensors,); NaN everywhere if it is missing."""
@@ -217,6 +222,8 @@ class RSSTracker(Tracker):
         """Set belief, likelihood and diagnostics; solution and diagnostics have a batch axis."""
         self.log_likelihood = float(solution.log_likelihood[0])
         self.diagnostics = Diagnostics(*(np.asarray(part)[0].item() for part in diagnostics))
+        if not np.isfinite(self.log_likelihood):  # no source and no noise: nothing is explained
+            self.record_missed()
         self.elapsed = 0.0
         self.set_belief(sources, tracks or self.current_tracks(len(sources.u)))
 

@@ -14,6 +14,7 @@ from arrivals.trackers.rss.arguments import (
     without_position,
 )
 from arrivals.trackers.rss.belief import Entries, SourceBeliefs
+from arrivals.trackers.rss.inference.joint_posterior import JointPosterior
 from arrivals.trackers.rss.inference.solution import Marginals, WeightedReadings
 from arrivals.trackers.rss.model_order.birth_death import (
     BirthDeathUpdate,
@@ -28,6 +29,7 @@ from arrivals.trackers.rss.model_order.model_selection import (
     local_search,
 )
 from arrivals.trackers.rss.model_order.track_table import TrackTable
+from arrivals.trackers.rss.pooled_readings import PooledReadings, displacement_variance
 from arrivals.trackers.rss.settings import AmplitudePrior, GridSearch
 from arrivals.typing import Float
 
@@ -38,28 +40,90 @@ PATIENCE = 2  # sources added without a gain of evidence before the selection en
 
 
 def detect_sources(tracker: RSSTracker, readings: WeightedReadings) -> None:
-    """Update the belief of a tracker where the number of sources is unknown or changes."""
-    sources, W = tracker.source_beliefs(), readings.W[0]
-    tracks, max_sources = tracker.current_tracks(len(sources.u)), tracker.search.max_sources
-    new = new_source_prior(tracker.measurement.sensors[W > 0], tracker.amplitude, tracker.search)
-    problem = tracker.joint_posterior(sources, readings)
-    problem = problem._replace(xi=readings.xi[0], W=W).at_valid_sensors()
-    predicted = Candidate(problem, sources.u, problem.prior.theta)
+    """Update the belief of a tracker where the number of sources is unknown or changes.
+
+    A step with too few readings for its sources is searched together with those before it.
+    """
+    sources, xi, W = tracker.source_beliefs(), readings.xi[0], readings.W[0]
+    tracks, prior = tracker.current_tracks(len(sources.u)), sources.prior(tracker.position)
+    propagation, max_sources = tracker.measurement.propagation, tracker.search.max_sources
+    pool, weights, new = pool_readings(tracker, xi, W)
+    around = propagation._replace(sensors=pool.sensors)
+    step, together = (
+        Candidate(problem.at_valid_sensors(), sources.u, prior.theta)
+        for problem in (
+            JointPosterior(propagation, xi, W, prior),
+            JointPosterior(around, pool.xi, weights, prior),
+        )
+    )
     if tracker.births:
         steps = tracker.births.confirm_steps
-        result = update_with_births(predicted, tracks, new, tracker.solve, steps, max_sources)
-        candidate, tracks = result.candidate, result.tracks
+        result = update_with_births(
+            step, together, tracks, new, tracker.solve, steps, max_sources
+        )  # fmt: skip
+        candidate, searched, tracks = result.candidate, result.searched, result.tracks
         sources = update_supported(sources, result, tracker.position, tracker.motion)
         n_known = len(result.supported)
     else:
-        candidate = select_sources(predicted, new, tracker.n_sources, max_sources)
+        grown = int(pool.seen.sum()) > int(tracker.pool.seen.sum())
+        chosen = sufficient(step, together, tracker.n_sources or 1, grown)
+        if chosen is None:
+            tracker.pool = pool
+            tracker.record_missed()
+            return
+        candidate = searched = select_sources(chosen, new, tracker.n_sources, max_sources)
         tracks, n_known = TrackTable.certain(len(candidate.u)), 0
-    detected = new_beliefs(candidate, tracker.P0, tracker.motion.dim_x, tracker.position)
+    detected = new_beliefs(searched, tracker.P0, tracker.motion.dim_x, tracker.position)
     sources = sources.joined(detected.select(slice(n_known, None)))
-    active = tracks.active
-    problem = candidate.problem._replace(W=readings.precision[0, W > 0]).select(None)
-    diagnostics = problem.diagnose(candidate.solution)
-    tracker.store(sources.select(active), candidate.solution, diagnostics, tracks.select(active))
+    active, solution = tracks.active, candidate.solution
+    fraction = readings.W.sum() / readings.precision.sum()
+    problem = candidate.problem._replace(W=candidate.problem.W / fraction)
+    diagnostics = problem.select(None).diagnose(solution)
+    tracker.store(sources.select(active), solution, diagnostics, tracks.select(active))
+    tracker.pool = pool
+
+
+def pool_readings(
+    tracker: RSSTracker, xi: Float, W: Float
+) -> tuple[PooledReadings, Float, NewSourcePrior]:
+    """Return the pooled readings after a step, their weights now, and the prior of new sources."""
+    pool, valid = tracker.pool, W > 0
+    if len(pool.xi) != len(xi):
+        pool = PooledReadings.none(len(xi))
+    sensors = np.where(valid[:, None], tracker.measurement.sensors, pool.sensors)
+    new = new_source_prior(sensors[valid | pool.seen], tracker.amplitude, tracker.search)
+    motion, position = tracker.motion, tracker.position
+    P0 = without_position(tracker.P0, motion.dim_x, position)
+
+    def spread(age: Float) -> Float:
+        # a displacement s at the distance of the area's deviation changes a level by ½α s/std
+        variance = displacement_variance(motion, P0, position, age) / new.std**2
+        slope = 0.5 * tracker.measurement.alpha
+        return np.where(variance < 1, slope**2 * variance, np.inf)
+
+    pool = pool.joined(xi, W, sensors, spread(pool.age))
+    return pool, pool.aged(spread(pool.age)), new
+
+
+def sufficient(
+    step: Candidate, together: Candidate, n_sources: int, grown: bool
+) -> Candidate | None:
+    """Return the readings that sources are detected in; None to wait for more.
+
+    Parameters
+    ----------
+    step, together : Candidate
+        Without a source: readings of the step, and pooled with those before.
+    n_sources : int
+    grown : bool
+        Whether a sensor has its first reading.
+    """
+    n, n_together = len(step.problem.W), len(together.problem.W)
+    if n >= 3 * n_sources:
+        return step
+    if n_together >= 3 * n_sources or not grown:
+        return together
+    return step if n >= max(3, 2 * n_sources) else None
 
 
 def new_source_prior(

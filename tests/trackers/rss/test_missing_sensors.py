@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from arrivals.measurement_models import LogNormalRSS, db_to_neper
 from arrivals.motion_models import ConstantVelocity
 from arrivals.trackers import AmplitudePrior, create
+from arrivals.trackers.rss.pooled_readings import PooledReadings
 from arrivals.typing import Float
 
 PLACES = np.array(
@@ -111,3 +112,36 @@ def test_covariance_grows_while_readings_are_missing() -> None:
     before = np.trace(result.estimate.covariance[0])
     result.run([None] * 100)
     assert len(result.estimate.label) == 0 or np.trace(result.estimate.covariance[0]) > 100 * before
+
+
+def one_reading_a_step(z: Float) -> Float:
+    alone = np.full((z.size, z.shape[1]), np.nan)
+    each = np.arange(z.size)
+    alone[each, each % z.shape[1]] = z.ravel()
+    return alone
+
+
+@pytest.mark.parametrize("params", [{"births": True}, {"n_sources": 1}, {}])
+def test_readings_that_arrive_one_by_one_are_searched_together(params: dict[str, Any]) -> None:
+    z = one_reading_a_step(readings(1, 1))
+    run = tracker("rss_vb", slice(None), **params).run(z, dt=0.05)
+    assert (run.label[-1] >= 0).sum() == 1
+    np.testing.assert_allclose(run.position[-1][0], TRUTH[0], atol=2.5)
+    assert np.isnan(run.position[1]).all()
+
+
+def test_displacement_ages_the_pooled_readings() -> None:
+    pool = PooledReadings.none(2)
+    first = np.array([1.0, 2.0]), np.array([4.0, 4.0])
+    pool = pool.joined(*first, np.zeros((2, 2)), np.zeros(2)).later(3.0)
+    np.testing.assert_allclose(pool.aged(np.array([0.0, np.inf])), [4.0, 0.0])
+    after = pool.joined(np.array([9.0, 9.0]), np.array([4.0, 0.0]), np.ones((2, 2)), np.zeros(2))
+    np.testing.assert_allclose(after.xi, [9.0, 2.0])  # a change of many deviations
+    np.testing.assert_allclose(after.age, [0.0, 3.0])
+
+
+def test_readings_that_no_model_explains_leave_a_finite_likelihood() -> None:
+    few = tracker("rss_vb", slice(2), births=True)
+    few.update(readings(0, 1)[0, :2])
+    assert few.log_likelihood == 0.0
+    assert len(few.estimate.label) == 0

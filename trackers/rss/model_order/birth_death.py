@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -23,20 +24,24 @@ class BirthDeathUpdate(NamedTuple):
     Parameters
     ----------
     candidate : Candidate
-        Estimates of the supported sources, followed by the new ones.
+        Estimates of the supported sources, followed by the new ones if the step was searched.
     supported : ndarray of int
         Indices of the supported ones among the predicted sources.
+    searched : Candidate
+        The same in the readings that were searched for new sources.
     tracks : TrackTable
         Predicted sources with the evidence of this step, followed by the new ones.
     """
 
     candidate: Candidate
     supported: Int
+    searched: Candidate
     tracks: TrackTable
 
 
 def update_with_births(
     predicted: Candidate,
+    together: Candidate,
     tracks: TrackTable,
     new: NewSourcePrior,
     solve: Solve,
@@ -47,14 +52,16 @@ def update_with_births(
 
     Sources supported by the readings are updated; the others keep their prediction. The support
     of a source is the difference of the Laplace evidence with it and without it. A source whose
-    addition increases the evidence by ln 99 is new if the step has three readings or more for each
-    of its sources. It is confirmed, and later deleted, by the
+    addition increases the evidence by ln 99 is new. A step with fewer than three readings a source
+    is searched together with those before it. A new source is confirmed, and later deleted, by the
     log odds in the track table.
 
     Parameters
     ----------
     predicted : Candidate
         Predicted sources.
+    together : Candidate
+        The same in the readings of the step and those before it.
     tracks : TrackTable
         Their labels and existence.
     new : NewSourcePrior
@@ -69,11 +76,18 @@ def update_with_births(
     """
     candidate, supported, evidence = supported_sources(predicted, solve)
     tracks = tracks.updated(evidence, confirm_steps)
-    n_free = min(
-        max_sources - len(predicted.u), carried_sources(len(predicted.problem.W)) - len(supported)
-    )
-    candidate, gains = add_new_sources(candidate, predicted.part(supported), new, n_free)
-    return BirthDeathUpdate(candidate, supported, tracks.extended(gains, confirm_steps))
+    searched, known, n_known = candidate, predicted.part(supported), len(supported)
+    is_short = carried_sources(len(predicted.problem.W)) <= n_known
+    if is_short:
+        known = together.part(supported)
+        searched = replace(known, u=candidate.u, theta=candidate.theta)
+    n_free = carried_sources(len(known.problem.W)) - n_known
+    n_free = min(n_free, max_sources - len(predicted.u))
+    if is_short and n_free > 0:
+        searched = searched.refitted()
+    searched, gains = add_new_sources(searched, known, new, n_free)
+    tracks = tracks.extended(gains, confirm_steps)
+    return BirthDeathUpdate(candidate if is_short else searched, supported, searched, tracks)
 
 
 def carried_sources(n_readings: int) -> int:
