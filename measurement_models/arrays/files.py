@@ -19,16 +19,19 @@ of the whole array, or one for each that is not missing.
 
 from __future__ import annotations
 
-import csv
 import tomllib
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from arrivals.files import open_input
 from arrivals.measurement_models.arrays.sensor_array import SensorArray
+from arrivals.measurements import real_numbers
+from arrivals.tables import TableLine, table_lines
 from arrivals.validation import count
 
+MAX_SENSORS = 100_000
 KEYS = {
     "ula": ("n_sensors", "spacing"),
     "uca": ("n_sensors", "radius"),
@@ -46,11 +49,14 @@ def from_toml(path: str | Path) -> SensorArray:
         If the file is not TOML, lacks a key or has one that its kind does not have, or if its
         numbers make no array; the message starts with the file's name.
     """
+    with open_input(path) as file:
+        data = file.read()
     try:
-        with open(path, "rb") as file:
-            return from_description(tomllib.load(file))
+        return from_description(tomllib.loads(data.decode("utf-8-sig").replace("\r\n", "\n")))
     except (ValueError, TypeError) as error:
         raise ValueError(f"{path}: {error}") from None
+    except (RecursionError, MemoryError):
+        raise ValueError(f"{path}: the values are nested too deeply") from None
 
 
 def from_description(description: dict[str, Any]) -> SensorArray:
@@ -74,6 +80,9 @@ def from_description(description: dict[str, Any]) -> SensorArray:
     for name in KEYS[kind]:
         if name not in keys:
             raise ValueError(f"an array of kind {kind!r} needs the key {name!r}")
+    n = keys.get("n_sensors")
+    if isinstance(n, int) and n > MAX_SENSORS:
+        raise ValueError(f"n_sensors must be at most {MAX_SENSORS}; got {n}")
     unknown = sorted(set(keys) - set(KEYS[kind]))
     if unknown:
         raise ValueError(f"an array of kind {kind!r} has no key {unknown[0]!r}")
@@ -86,12 +95,7 @@ def from_description(description: dict[str, Any]) -> SensorArray:
 
 
 def _positions(rows: Any) -> SensorArray:
-    try:
-        return SensorArray(np.array(rows, dtype=np.float64))
-    except (TypeError, ValueError) as error:
-        if "inhomogeneous" in str(error) or "could not convert" in str(error):
-            raise ValueError("positions must be numbers, or lists of the same length") from None
-        raise
+    return SensorArray(real_numbers("positions", rows))
 
 
 def _wired(array: SensorArray, missing: Any, channels: Any) -> SensorArray:
@@ -123,27 +127,30 @@ def from_csv(path: str | Path, *, speed: float | None = None) -> SensorArray:
     ValueError
         If a row has no number where one is wanted, or rows differ in length.
     """
+    with open_input(path) as file:
+        data = file.read()
     try:
-        with open(path, newline="", encoding="utf-8-sig") as file:
-            rows = [row for row in csv.reader(file) if any(cell.strip() for cell in row)]
-    except (UnicodeDecodeError, csv.Error):
-        raise ValueError(f"{path}: not a table of numbers") from None
-    if rows and not any(_is_number(cell) for cell in rows[0]):
-        rows = rows[1:]
-    if not rows:
-        raise ValueError(f"{path}: holds no positions")
-    for line, row in enumerate(rows, start=1):
-        if len(row) != len(rows[0]) or not all(_is_number(cell) for cell in row):
-            raise ValueError(f"{path}: row {line} must hold {len(rows[0])} numbers; got {row}")
-    try:
+        lines = list(table_lines(data))
+        rows = [_numbers(line) for line in lines]
+        if rows and not any(number is not None for number in rows[0]):
+            lines, rows = lines[1:], rows[1:]
+        if not rows:
+            raise ValueError("the file has no positions")
+        n = len(rows[0])
+        for line, row in zip(lines, rows, strict=True):
+            if len(row) != n or None in row:
+                raise ValueError(f"line {line.number} must have {n} numbers; got {line.cells}")
         return SensorArray(np.array(rows, dtype=np.float64), speed)
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
 
 
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True
+def _numbers(line: TableLine) -> list[float | None]:
+    """Return the numbers of a line, None for other cells."""
+    row: list[float | None] = []
+    for column in range(len(line.cells)):
+        try:
+            row.append(line.real(column))
+        except ValueError:
+            row.append(None)
+    return row

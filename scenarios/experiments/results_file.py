@@ -1,23 +1,32 @@
-"""Resumable results file of a study: one row a number, below a line with the configuration."""
+"""Resumable results file of a study: one row a number, below a line with the configuration.
+
+A row ends with a checksum of itself and of that line; rows of older files have none.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import hashlib
 import io
 import json
 import os
 import sys
+import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from arrivals import measurement_models, motion_models, trackers
-from arrivals.files import atomic_write
+from arrivals.files import atomic_write, open_input
 from arrivals.scenarios.experiments.batch import Row
 
 MARK = "# arrivals study "
+COLUMNS = (*Row._fields, "check")
+NO_ROW = "is not a row of a study: remove it to resume"
+CHANGED = "does not agree with its checksum, it or line 1 was changed: remove it to resume"
+MAX_CONFIG = 2**24  # characters of the first line
 
 
 def fingerprint(config: Mapping[str, Any]) -> str:
@@ -109,8 +118,7 @@ class Results:
             return
         with atomic_write(self.path) as file:
             file.write(self._head())
-            rows = (row for row in self.rows() if condition(row))
-            csv.writer(file, lineterminator="\n").writerows(rows)
+            self._write(file, (row for row in self.rows() if condition(row)))
 
     @contextmanager
     def writing(self) -> Iterator[None]:
@@ -150,21 +158,33 @@ class Results:
             return
         new = not self.path.exists()  # removed again if its first rows cannot be written
         lines = io.StringIO()
-        csv.writer(lines, lineterminator="\n").writerows(rows)
+        self._write(lines, rows)
+        size = 0 if new else self.path.stat().st_size
         try:
             with open(self.path, "ab") as file:
                 file.write(((self._head() if new else "") + lines.getvalue()).encode())
         except OSError as error:
-            if new:
-                self.path.unlink(missing_ok=True)
+            with contextlib.suppress(OSError):
+                self.path.unlink() if new else os.truncate(self.path, size)
             raise OSError(
                 error.errno,
                 f"{error.strerror}: finished runs are kept; call again to resume",
                 str(self.path),
             ) from None
 
+    def _write(self, file: IO[str], rows: Iterable[Row]) -> None:
+        first = self._head().partition("\n")[0]
+        cells = ([str(value) for value in row] for row in rows)
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerows([*row, _checksum(first, row)] for row in cells)
+
     def _head(self) -> str:
-        return f"{MARK}{_text(self.config)}\n{','.join(Row._fields)}\n"
+        return f"{MARK}{_text(self.config)}\n{','.join(COLUMNS)}\n"
+
+
+def _checksum(first: str, cells: Iterable[str]) -> str:
+    """Return the checksum of a row below a first line, eight hexadecimal digits."""
+    return f"{zlib.crc32(chr(0).join([first, *cells]).encode()):08x}"
 
 
 def _place(path: Path, config: Mapping[str, Any]) -> Path:
@@ -177,10 +197,16 @@ def _place(path: Path, config: Mapping[str, Any]) -> Path:
 
 
 def _is_complete(path: Path) -> bool:
-    """Return True if the last line of a file is complete."""
-    with open(path, "rb") as file:
+    """Return True if the last line of a file is complete, and its rows have checksums."""
+    with open_input(path) as file:
+        file.readline(MAX_CONFIG)
+        heading = file.readline(MAX_CONFIG).decode(errors="replace")
         file.seek(-1, os.SEEK_END)
-        return file.read() == b"\n"
+        return file.read() == b"\n" and heading == ",".join(COLUMNS) + "\n"
+
+
+def _opened(path: Path) -> IO[str]:
+    return io.TextIOWrapper(open_input(path), encoding="utf-8", errors="replace", newline="")
 
 
 def read_config(path: Path) -> dict[str, Any]:
@@ -191,14 +217,14 @@ def read_config(path: Path) -> dict[str, Any]:
     ValueError
         If the file is not a study file.
     """
-    with open(path, encoding="utf-8", errors="replace") as file:
-        first = file.readline()
+    with _opened(path) as file:
+        first = file.readline(MAX_CONFIG)
     try:
-        if not first.startswith(MARK):
-            raise ValueError
-        config: dict[str, Any] = json.loads(first.removeprefix(MARK))
-    except ValueError:
-        raise ValueError(f"{path} is not a study file") from None
+        config: Any = json.loads(first.removeprefix(MARK)) if first.startswith(MARK) else None
+    except (ValueError, RecursionError):
+        config = None
+    if not isinstance(config, dict) or not {"scenarios", "methods"} <= config.keys():
+        raise ValueError(f"{path} is not a study file")
     return config
 
 
@@ -208,20 +234,25 @@ def read_rows(path: Path) -> Iterator[Row]:
     Raises
     ------
     ValueError
-        If another line is not a row.
+        If another line is not a row, or does not agree with its checksum.
     """
     if not path.exists():
         return
-    with open(path, encoding="utf-8", errors="replace", newline="") as file:
-        file.readline()
-        file.readline()
+    with _opened(path) as file:
+        first = file.readline(MAX_CONFIG).removesuffix("\n")
+        has_checksums = file.readline(MAX_CONFIG) == ",".join(COLUMNS) + "\n"
         lines = csv.reader(line for line in file if line.endswith("\n"))
-        for number, cells in enumerate(lines, start=3):
-            try:
-                case, run, method, metric, value, note = cells
-                row = Row(case, int(run), method, metric, float(value), note)
-            except ValueError:
-                raise ValueError(
-                    f"line {number} of {path} is not a row of a study: remove it to resume"
-                ) from None
-            yield row
+        try:
+            for cells in lines:
+                yield _row(cells, first, has_checksums)
+        except (ValueError, csv.Error) as error:
+            fault = CHANGED if str(error) == CHANGED else NO_ROW
+            raise ValueError(f"line {lines.line_num + 2} of {path} {fault}") from None
+
+
+def _row(cells: list[str], first: str, has_checksum: bool) -> Row:
+    case, run, method, metric, value, note, *check = cells
+    row = Row(case, int(run), method, metric, float(value), note)
+    if (check or has_checksum) and check != [_checksum(first, cells[: len(row)])]:
+        raise ValueError(CHANGED)
+    return row

@@ -184,5 +184,7 @@ def test_recording_with_invalid_arguments_is_refused(
 
 
 def test_recording_of_text_is_refused() -> None:
-    with pytest.raises(TypeError, match="samples must be numbers; got <U1"):
+    with pytest.raises(
+        TypeError, match="samples must hold numbers, NaN for a missing one; got <U1"
+    ):
         Recording(np.array(["a", "b"]))

@@ -2,6 +2,7 @@
 
 import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -64,6 +65,88 @@ def test_invalid_tables_raise_a_one_line_error(
 ) -> None:
     with pytest.raises(ValueError, match=message):
         read_network(*files(tmp_path, readings, sensors))
+
+
+@pytest.mark.parametrize(
+    ("readings", "sensors"),
+    [
+        ("time_s;a;b;c\r\n0;-60;-71,5;\r\n4;-61;;-80\r\n", "name;x_m;y_m\na;0;0\nb;50,0;0\nc;0;50"),
+        ("time_s\ta\tb\tc\n0\t-60\t-71,5\tNA\n4\t-61\tnan\t-80\n", SENSORS.replace(",", "\t")),
+        ('"time_s","a","b","c"\n0,"-60",-71.5,None\n4,-61,#N/A,-80\n', "\ufeff" + SENSORS),
+    ],
+)
+def test_tables_of_any_spreadsheet_are_read(tmp_path: Path, readings: str, sensors: str) -> None:
+    network = read_network(*files(tmp_path, readings, sensors))
+    np.testing.assert_array_equal(network.rss_db, [[-60, -71.5, np.nan], [-61, np.nan, -80]])
+    np.testing.assert_array_equal(network.sensors[0], [[0, 0], [50, 0], [0, 50]])
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("readings.csv", "time_s,a\n0,-60\nä".encode("latin-1"), "line 3 must be UTF-8 text"),
+        ("sensors.csv", "name,x_m,y_m\nä,0,0\n".encode("latin-1"), "line 2 must be UTF-8 text"),
+        ("sensors.csv", b"name,x_m,y_m\na,0,1\nb,east,0\n", "line 3: 'east' is not a number"),
+        ("readings.csv", b'time_s,a\n0,-60\n0,"-61\n', "line 3: unexpected end of data"),
+        ("readings.csv", b"time_s,a\nNA,-60\n", "time must be finite; got NaN in step 0"),
+        ("readings.csv", b"time_s,a\n0,1e999\n", "rss_db must have a valid reading"),
+        ("readings.csv", b"\0" * 100, "the sensor .* is not in the table|no row below"),
+    ],
+)
+def test_message_about_a_table_begins_with_its_name(
+    tmp_path: Path, name: str, content: bytes, message: str
+) -> None:
+    tables = files(tmp_path, WIDE)
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(ValueError, match=message) as error:
+        read_network(*tables)
+    assert str(error.value).startswith(str(tmp_path / name))
+
+
+def test_row_that_begins_like_a_comment_is_a_row(tmp_path: Path) -> None:
+    readings, sensors = files(tmp_path, "time_s,#1,%2\n0,-60,-70\n", "name,x_m,y_m\n#1,0,0\n%2,1,0")
+    assert read_network(readings, sensors).name == ("#1", "%2")
+
+
+@pytest.mark.parametrize(
+    ("arrays", "message"),
+    [
+        ({"rss_db": np.ones(4)}, r"rss_db must have shape \(n_steps, n_sensors\); got \(4,\)"),
+        ({"sensor_xy": np.ones((3, 2))}, r"sensor_xy must have shape .* or \(8, 2\); got \(3, 2\)"),
+        ({"rss_db": np.full((4, 8), "x")}, "rss_db must hold numbers"),
+        ({"time": [0.0, 1.0]}, r"rss_db must have shape \(2, 8\)"),
+        ({"tx_xy": np.ones((4, 2))}, r"truth must have shape \(4, n_sources, 2\); got \(4, 2\)"),
+        ({"rss_db": np.full((4, 8), None)}, "truncated, or not a NumPy file of numbers: Object"),
+        ({"sensor_name": np.array(["a"] * 8)}, "name must have no duplicates"),
+    ],
+)
+def test_npz_with_other_shapes_is_refused(tmp_path: Path, arrays: Any, message: str) -> None:
+    path = tmp_path / "n.npz"
+    np.savez(path, **{"rss_db": np.ones((4, 8)), "sensor_xy": np.ones((8, 2))} | arrays)
+    with pytest.raises(ValueError, match=message) as error:
+        read_network(path)
+    assert str(error.value).startswith(f"{path}: ")
+
+
+def test_damaged_npz_is_a_value_error_with_its_name(tmp_path: Path) -> None:
+    path, rng = tmp_path / "n.npz", np.random.default_rng(2)
+    np.savez(path, rss_db=np.ones((4, 8)), sensor_xy=np.ones((8, 2)))
+    whole = path.read_bytes()
+    for _ in range(100):
+        damaged = bytearray(whole[: rng.integers(len(whole))] if rng.random() < 0.3 else whole)
+        for at in rng.integers(0, max(1, len(damaged)), 2 * (len(damaged) > 0)):
+            damaged[at] ^= 1 << rng.integers(8)
+        path.write_bytes(damaged)
+        try:
+            read_network(path)
+        except ValueError as error:
+            assert str(error).startswith(f"{path}: ")  # noqa: PT017  (some are right)
+
+
+def test_masked_readings_are_missing() -> None:
+    masked = np.ma.masked_less([[-60.0, -200.0], [-61.0, -70.0]], -100)
+    network = Network.fixed(["a", "b"], np.eye(2), masked)
+    np.testing.assert_array_equal(network.rss_db, [[-60, np.nan], [-61, -70]])
 
 
 def test_a_table_of_readings_needs_its_sensors(tmp_path: Path) -> None:

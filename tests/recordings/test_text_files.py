@@ -26,6 +26,8 @@ def text(path: Path, content: str) -> Any:
     [
         "1,2.5\n-3,4\n",
         "a;b\n1;2,5\n-3;4",
+        "a\tb\n1\t2,5\n-3\t4",
+        '"a";"b"\r\n"1";"2,5"\r\n"-3";"4"\r\n',
         "# made by hand\n\n 1   2.5 \n-3e0 4\n",
         "\ufeffleft\tright\r\n1\t2.5\r\n-3\t4\r\n",
         "% left, right\n1, 2.5\n-3, 4\n",
@@ -55,6 +57,18 @@ def test_empty_cell_is_missing(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.parametrize("word", ["nan", "None", "NA", "N/A", "#N/A", "null", "", "1e999", "-inf"])
+def test_word_for_missing_is_missing(tmp_path: Path, word: str) -> None:
+    assert_array_equal(text(tmp_path / "a.csv", f"a,b\n{word},2\n3,4\n"), [[np.nan, 2], [3, 4]])
+    assert_array_equal(text(tmp_path / "a.csv", f"{word},{word}\n3,4\n")[-1], [3, 4])
+    assert len(text(tmp_path / "a.csv", f"{word},{word}\n3,4\n")) == 2
+
+
+def test_text_in_utf_16_is_read(tmp_path: Path) -> None:
+    (tmp_path / "a.txt").write_bytes("a\tb\r\n1\t2,5\r\n".encode("utf-16"))
+    assert_array_equal(read(tmp_path / "a.txt").samples, [[1, 2.5]])
+
+
 def test_column_of_times_is_not_a_channel(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("time,a,b\n1.0,5,6\n1.5,7,8\n2.0,9,1\n")
     recording = read(tmp_path / "a.csv")
@@ -76,8 +90,15 @@ def test_invalid_text_is_refused(tmp_path: Path) -> None:
     ]:
         path.write_text(content)
         assert_refused(path, message)
-    path.write_bytes(b"\xff\xfe\x00\x81")
-    assert_refused(path, "codec can't decode")
+    for raw, message in [
+        (b"1,2\n3,\xe4\n", "line 2 must be UTF-8 text; got the byte 0xe4: save the file as UTF-8"),
+        (b'1,2\n"3,4\n', "line 2: unexpected end of data"),
+        (b"1,2\n3,\0\n", "line 2"),
+        (b"1,5 2,5\n", "line 1 must contain numbers; got '5 2'"),
+        (b"1_000,2\n", "line 1 must contain numbers; got '1_000'"),
+    ]:
+        path.write_bytes(raw)
+        assert_refused(path, message)
 
 
 # Any file

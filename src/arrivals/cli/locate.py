@@ -234,6 +234,8 @@ def locate(arguments: argparse.Namespace, bar: Callable[..., Any]) -> None:
     """
     _check_outputs(arguments)
     network = read_network(arguments.file, arguments.sensors)
+    if (np.diff(network.time) <= 0).any():
+        raise ValueError(f"{arguments.file}: time must increase from row to row")
     path_loss = PathLossSettings(
         arguments.alpha, arguments.sigma, arguments.floor, arguments.r_min, arguments.tau
     )

@@ -28,7 +28,7 @@ def track_band(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -> N
         return
     refuse(arguments, ("dtype", "channels"), "requires samples from standard input")
     recording = read(arguments.file, rate=arguments.rate, variable=arguments.variable,
-                     transpose=arguments.transpose, array=array)  # fmt: skip
+                     transpose=arguments.transpose, array=array, rate_required=True)  # fmt: skip
     if recording.is_narrowband:
         raise ValueError(f"{arguments.file}: --band requires real samples; got complex ones")
     tracker, rate = _band_tracker(arguments, array, recording.rate)

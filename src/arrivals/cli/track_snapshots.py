@@ -31,7 +31,7 @@ def _track_file(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -> 
         tracker = make_tracker(arguments.tracker, measurement, dict(arguments.set))
     refuse(arguments, ("dtype", "channels"), "requires samples from standard input")
     recording = read(arguments.file, rate=arguments.rate, variable=arguments.variable,
-                     transpose=arguments.transpose, array=array)  # fmt: skip
+                     transpose=arguments.transpose, array=array, rate_required=True)  # fmt: skip
     frequencies = selected_frequencies(arguments, recording.rate)
     if arguments.band:
         measurement = model_at(array, arguments, frequencies)

@@ -60,7 +60,7 @@ def track_sources(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -
     refuse(arguments, ("frequencies",), "requires another tracker: this one takes --frequency")
     model = model_at(array, arguments, [arguments.frequency])
     recording = read(arguments.file, rate=arguments.rate, variable=arguments.variable,
-                     transpose=arguments.transpose, array=array)  # fmt: skip
+                     transpose=arguments.transpose, array=array, rate_required=True)  # fmt: skip
     every_sample = not (recording.is_narrowband or arguments.window)
     z, time = _samples(recording, arguments) if every_sample else _snapshots(recording, arguments)
     tracker = separator(dict(arguments.set), z, model, every_sample)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import csv
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -12,10 +12,16 @@ from typing import Any
 
 import numpy as np
 
+from arrivals.files import open_input
 from arrivals.measurement_models import LogNormalRSS, db_to_neper
+from arrivals.measurements import real_numbers
+from arrivals.recordings.file_contents import MAX_BYTES, check_size
+from arrivals.recordings.numpy_files import numpy_arrays
+from arrivals.tables import TableRow, named_rows
 from arrivals.typing import Float
 
 TIMES = ("time_s", "time", "t")
+ARRAYS = ("rss_db", "sensor_xy", "sensor_name", "time", "tx_xy")  # of an npz file
 LEVELS = ("rss_db", "rss_dbm", "level_db", "rss")
 
 
@@ -52,16 +58,26 @@ class Network:
     truth: Float | None = None
 
     def __post_init__(self) -> None:
+        for key in ("time", "rss_db", "sensors", "truth"):
+            if getattr(self, key) is not None:
+                object.__setattr__(self, key, real_numbers(key, getattr(self, key)))
         repeated = sorted({name for name in self.name if self.name.count(name) > 1})
         if repeated:
             raise ValueError(f"name must have no duplicates; got {repeated[0]!r} twice")
-        shape = (len(self.time), len(self.name))
+        shape = (self.time.size, len(self.name))
+        if self.time.ndim != 1:
+            raise ValueError(f"time must have shape (n_steps,); got {self.time.shape}")
         for name, expected in (("rss_db", shape), ("sensors", (*shape, 2))):
             got = getattr(self, name).shape
             if got != expected:
                 raise ValueError(
                     f"{name} must have shape {expected}; got {getattr(self, name).shape}"
                 )
+        if not np.isfinite(self.time).all():
+            raise ValueError(f"time must be finite; got NaN in step {np.isnan(self.time).argmax()}")
+        got = (len(self), 0, 2) if self.truth is None else self.truth.shape
+        if len(got) != 3 or got[::2] != (len(self), 2):
+            raise ValueError(f"truth must have shape ({len(self)}, n_sources, 2); got {got}")
         valid = np.isfinite(self.rss_db)
         if not valid.any():
             raise ValueError("rss_db must have a valid reading; all are missing")
@@ -77,9 +93,10 @@ class Network:
         cls, name: Sequence[str], positions: Float, rss_db: Any, time: Float | None = None
     ) -> Network:
         """Return a network of sensors that do not move, positions (n_sensors, 2), m."""
-        rss_db = np.asarray(rss_db, dtype=np.float64)
+        rss_db = real_numbers("rss_db", rss_db)
+        positions = real_numbers("positions", positions)
         sensors = np.broadcast_to(positions, (len(rss_db), *np.shape(positions)))
-        distinct = {tuple(position) for position in np.asarray(positions).tolist()}
+        distinct = {tuple(position) for position in positions.tolist()}
         if len(distinct) < len(positions):
             warnings.warn("two sensors have the same position", stacklevel=2)
         time = np.arange(len(rss_db), dtype=np.float64) if time is None else time
@@ -149,107 +166,106 @@ def read_network(
     Traceback (most recent call last):
     ValueError: readings.csv requires a table of sensors, with the columns name, x_m, y_m
     """
-    if Path(readings).suffix == ".npz":
+    if Path(readings).suffix.lower() == ".npz":
         return _from_npz(readings)
     if sensors is None:
         raise ValueError(f"{readings} requires a table of sensors, with the columns name, x_m, y_m")
     name, positions = read_sensors(sensors)
-    time, rss_db = _levels(readings, name)
-    return Network.fixed(name, positions, rss_db, time)
+    with _named(readings):
+        time, rss_db = _levels(_table(readings), name)
+        return Network.fixed(name, positions, rss_db, time)
 
 
 def read_sensors(path: str | PathLike[str]) -> tuple[list[str], Float]:
     """Return names and positions (n_sensors, 2), m, of a table with columns name, x_m, y_m."""
-    rows = _table(path)
-    for column in ("name", "x_m", "y_m"):
-        if column not in rows[0]:
-            raise ValueError(f"{path}: the column {column!r} is missing")
-    name = [row["name"].strip() for row in rows]
-    repeated = sorted({one for one in name if name.count(one) > 1})
-    if repeated:
-        raise ValueError(f"{path}: the sensor {repeated[0]!r} is listed twice")
-    positions = np.array([[_number(path, row[c]) for c in ("x_m", "y_m")] for row in rows])
-    if not np.isfinite(positions).all():
-        raise ValueError(f"{path}: a position is missing")
-    return name, positions
+    with _named(path):
+        rows = _table(path)
+        for column in ("name", "x_m", "y_m"):
+            if column not in rows[0].columns:
+                raise ValueError(f"the column {column!r} is missing")
+        name = [row["name"].strip() for row in rows]
+        repeated = sorted({one for one in name if name.count(one) > 1})
+        if repeated:
+            raise ValueError(f"the sensor {repeated[0]!r} is listed twice")
+        positions = np.array([[row.real(c) for c in ("x_m", "y_m")] for row in rows])
+        if not np.isfinite(positions).all():
+            missing = rows[int(np.argmin(np.isfinite(positions).all(axis=1)))]
+            raise ValueError(f"line {missing.number}: a position is missing")
+        return name, positions
 
 
 def _from_npz(path: str | PathLike[str]) -> Network:
-    with np.load(path) as file:
-        held = {key: file[key] for key in file.files}
-    for key in ("rss_db", "sensor_xy"):
-        if key not in held:
-            raise ValueError(f"{path}: the array {key!r} is missing")
-    rss_db = held["rss_db"].astype(np.float64)
-    n_steps, n_sensors = rss_db.shape
-    sensors = np.broadcast_to(held["sensor_xy"], (n_steps, n_sensors, 2)).astype(np.float64)
-    name = held.get("sensor_name", np.arange(n_sensors)).astype(str).tolist()
-    time = held.get("time", np.arange(n_steps)).astype(np.float64)
-    truth = held["tx_xy"].astype(np.float64) if "tx_xy" in held else None
-    return Network(tuple(name), time, rss_db, sensors, truth)
+    with open_input(path) as file, _named(path):
+        stored = numpy_arrays(file)
+        for key in ("rss_db", "sensor_xy"):
+            if key not in stored:
+                raise ValueError(f"the array {key!r} is missing")
+        check_size(sum(each.n_bytes for each in stored.values()), MAX_BYTES)
+        held = {key: each.load() for key, each in stored.items() if key in ARRAYS}
+        rss_db = real_numbers("rss_db", held["rss_db"])
+        sensors = real_numbers("sensor_xy", held["sensor_xy"])
+        if rss_db.ndim != 2:
+            raise ValueError(f"rss_db must have shape (n_steps, n_sensors); got {rss_db.shape}")
+        if sensors.shape not in ((*rss_db.shape, 2), (rss_db.shape[1], 2)):
+            either = f"{(*rss_db.shape, 2)} or {(rss_db.shape[1], 2)}"
+            raise ValueError(f"sensor_xy must have shape {either}; got {sensors.shape}")
+        sensors = np.broadcast_to(sensors, (*rss_db.shape, 2))
+        name = held.get("sensor_name", np.arange(rss_db.shape[1])).astype(str).ravel().tolist()
+        time = held.get("time", np.arange(float(len(rss_db))))
+        return Network(tuple(name), time, rss_db, sensors, held.get("tx_xy"))
 
 
-def _levels(path: str | PathLike[str], name: list[str]) -> tuple[Float, Float]:
+def _levels(rows: list[TableRow], name: list[str]) -> tuple[Float, Float]:
     """Return times (n_steps,) and levels (n_steps, n_sensors) of a table of readings."""
-    rows = _table(path)
-    time = next((key for key in TIMES if key in rows[0]), None)
-    level = next((key for key in LEVELS if key in rows[0]), None)
-    if "sensor" in rows[0] and level is not None:
-        return _long(path, rows, name, time, level)
-    columns = [key for key in rows[0] if key != time]
-    _check_sensor_names(path, columns, name)
+    time = next((key for key in TIMES if key in rows[0].columns), None)
+    level = next((key for key in LEVELS if key in rows[0].columns), None)
+    if "sensor" in rows[0].columns and level is not None:
+        return _long(rows, name, time, level)
+    columns = [key for key in rows[0].columns if key != time]
+    for column in columns:
+        _check_sensor_name(column, name)
     rss_db = np.full((len(rows), len(name)), np.nan)
     for column in columns:
-        rss_db[:, name.index(column)] = [_number(path, row[column]) for row in rows]
+        rss_db[:, name.index(column)] = [row.real(column) for row in rows]
     if time is None:
         return np.arange(len(rows), dtype=np.float64), rss_db
-    return np.array([_number(path, row[time]) for row in rows]), rss_db
+    return np.array([row.real(time) for row in rows]), rss_db
 
 
 def _long(
-    path: str | PathLike[str],
-    rows: list[dict[str, str]],
-    name: list[str],
-    time: str | None,
-    level: str,
+    rows: list[TableRow], name: list[str], time: str | None, level: str
 ) -> tuple[Float, Float]:
     if time is None:
-        raise ValueError(f"{path}: the column 'time_s' is missing")
-    _check_sensor_names(path, [row["sensor"].strip() for row in rows], name)
-    times = np.array([_number(path, row[time]) for row in rows])
+        raise ValueError("the column 'time_s' is missing")
+    times = np.array([row.real(time) for row in rows])
     steps, at = np.unique(times, return_inverse=True)
     rss_db = np.full((len(steps), len(name)), np.nan)
     for step, row in zip(at.ravel(), rows, strict=True):
-        sensor = name.index(row["sensor"].strip())
+        one = row["sensor"].strip()
+        _check_sensor_name(one, name, f"line {row.number}: ")
+        sensor = name.index(one)
         if np.isfinite(rss_db[step, sensor]):
-            raise ValueError(f"{path}: {row['sensor']!r} has two readings at {row[time]} s")
-        rss_db[step, sensor] = _number(path, row[level])
+            raise ValueError(
+                f"line {row.number}: {one!r} has two readings at {row[time].strip()} s"
+            )
+        rss_db[step, sensor] = row.real(level)
     return steps, rss_db
 
 
-def _check_sensor_names(path: str | PathLike[str], names: list[str], table: list[str]) -> None:
-    for name in names:
-        if name not in table:
-            raise ValueError(f"{path}: the sensor {name!r} is not in the table of sensors")
+def _check_sensor_name(name: str, table: list[str], place: str = "") -> None:
+    if name not in table:
+        raise ValueError(f"{place}the sensor {name!r} is not in the table of sensors")
 
 
-def _table(path: str | PathLike[str]) -> list[dict[str, str]]:
-    with open(path, newline="", encoding="utf-8-sig") as file:
-        reader = csv.DictReader(file, skipinitialspace=True, restval="")
-        header = reader.fieldnames or []
-        repeated = sorted({name for name in header if header.count(name) > 1})
-        if repeated:
-            raise ValueError(f"{path}: the column {repeated[0]!r} is listed twice")
-        rows = list(reader)
-    if not rows:
-        raise ValueError(f"{path}: there is no row below the header")
-    if any(None in row for row in rows):
-        raise ValueError(f"{path}: a row has more cells than the header")
-    return rows
+def _table(path: str | PathLike[str]) -> list[TableRow]:
+    with open_input(path) as file:
+        return named_rows(file.read())
 
 
-def _number(path: str | PathLike[str], cell: str) -> float:
+@contextmanager
+def _named(path: str | PathLike[str]) -> Iterator[None]:
+    """Begin the messages of errors with the name of a file."""
     try:
-        return float(cell) if cell.strip() else np.nan
-    except ValueError:
-        raise ValueError(f"{path}: {cell!r} is not a number") from None
+        yield
+    except (ValueError, TypeError) as error:
+        raise ValueError(f"{path}: {error}") from error

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arrivals.measurement_models import SensorArray
+from arrivals.measurements import LARGEST, numbers
 from arrivals.recordings.narrowband import check_frequency, default_window, narrowband
 from arrivals.typing import Complex, Float
 from arrivals.validation import count, positive, shaped
@@ -43,8 +44,8 @@ class Recording:
     ----------
     samples : array_like, shape (n_samples, n_channels)
         Real samples, stored as float32 if they are, else as float64; or complex ones (complex128),
-        each row a narrowband snapshot. One channel may have the shape (n_samples,). Infinite
-        samples become NaN, which means missing.
+        each row a narrowband snapshot. One channel may have the shape (n_samples,). Masked,
+        infinite and missing samples become NaN, as in `arrivals.measurements.numbers`.
     rate : float, optional
         Rows per second, Hz.
     time : array_like, shape (n_samples,), optional
@@ -78,7 +79,7 @@ class Recording:
     array: SensorArray | None = None
 
     def __post_init__(self) -> None:
-        samples = _cleaned(np.asarray(self.samples))
+        samples = _cleaned(self.samples)
         object.__setattr__(self, "samples", samples)
         if self.rate is not None:
             object.__setattr__(self, "rate", positive("rate", self.rate))
@@ -180,18 +181,19 @@ class Recording:
             )
 
 
-def _cleaned(samples: NDArray[Any]) -> Samples:
-    """Return samples (n_samples, n_channels) of type `Samples`, NaN where not finite."""
-    if samples.dtype.kind not in "iufc":
-        raise TypeError(f"samples must be numbers; got {samples.dtype}")
+def _cleaned(value: Any) -> Samples:
+    """Return samples (n_samples, n_channels) of type `Samples`, NaN where missing."""
+    is_plain = type(value) is np.ndarray and value.dtype.kind in "iufc"
+    samples = value if is_plain else numbers("samples", value)
     if samples.ndim not in (1, 2):
         raise ValueError(f"samples must have shape (n_samples, n_channels); got {samples.shape}")
     if samples.size == 0:
         raise ValueError(f"the recording is empty; its shape is {samples.shape}")
     single = samples.dtype.kind == "f" and samples.dtype.itemsize == 4
     kind: Any = np.complex128 if samples.dtype.kind == "c" else np.float32 if single else np.float64
-    cleaned: NDArray[Any] = samples.reshape(len(samples), -1).astype(kind, copy=False)
-    finite = np.isfinite(cleaned)
-    if not finite.any():
+    with np.errstate(over="ignore"):  # of extended precision
+        cleaned: NDArray[Any] = samples.reshape(len(samples), -1).astype(kind, copy=False)
+    valid = np.isfinite(cleaned) if single else np.abs(cleaned) < LARGEST
+    if not valid.any():
         raise ValueError("no sample of the recording is finite")
-    return cleaned if finite.all() else np.where(finite, cleaned, kind(np.nan))
+    return cleaned if valid.all() else np.where(valid, cleaned, kind(np.nan))

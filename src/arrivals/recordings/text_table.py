@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import io
+import math
 import re
-from collections.abc import Iterator
 from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from arrivals.recordings.file_contents import FileContents
+from arrivals.tables import MISSING, TableLine, plain, table_lines
 
 TIME_HEADINGS = ("time", "time_s", "t")  # of a first column with times
 
@@ -19,13 +19,14 @@ def read_text(file: BinaryIO) -> FileContents:
     """Return the table of a text file, and the times of a first column with that heading."""
     rows: list[NDArray[Any]] = []
     heading: list[str] | None = None
-    for line, cells in _lines(io.TextIOWrapper(file, encoding="utf-8-sig")):
-        if not rows and heading is None and not any(map(_is_number, cells)):
-            heading = cells
+    for line in table_lines(file.read()):
+        if not rows and heading is None and _is_heading(line):
+            heading = line.cells
             continue
-        if rows and len(cells) != len(rows[0]):
-            raise ValueError(f"line {line} must have {len(rows[0])} values; got {len(cells)}")
-        rows.append(np.array([_cell(cell, line) for cell in cells]))
+        n = len(line.cells)
+        if rows and n != len(rows[0]):
+            raise ValueError(f"line {line.number} must have {len(rows[0])} values; got {n}")
+        rows.append(np.array([_number(line, column) for column in range(n)]))
     if not rows:
         raise ValueError("the file contains no numbers")
     table = np.array(rows)
@@ -34,34 +35,30 @@ def read_text(file: BinaryIO) -> FileContents:
     return FileContents(table)
 
 
-def _lines(file: io.TextIOWrapper) -> Iterator[tuple[int, list[str]]]:
-    """Yield the number and the cells of each line that is not blank or a comment."""
-    separator: str | None = ""
-    for number, line in enumerate(file, 1):
-        line = line.strip(" \r\n")
-        if not line or line[0] in "#%":
-            continue
-        if separator == "":
-            separator = next((s for s in ";,\t" if s in line), None)
-        line = line.replace(",", ".") if separator == ";" else line  # a decimal comma
-        yield number, line.split(separator)
+def _is_heading(line: TableLine) -> bool:
+    """Return True if no cell is a number and a cell is something else than missing."""
+    return not any(_is_number(line, column) for column in range(len(line.cells))) and any(
+        cell.strip().lower() not in MISSING for cell in line.cells
+    )
 
 
-def _is_number(cell: str) -> bool:
+def _is_number(line: TableLine, column: int) -> bool:
     try:
-        return bool(cell.strip()) and _cell(cell, 1) is not None
+        is_nan = line.cells[column].strip().lower() == "nan"
+        return is_nan or not math.isnan(abs(_number(line, column)))
     except ValueError:
         return False
 
 
-def _cell(cell: str, line: int) -> float | complex:
-    """Return the number in a cell, NaN if it is empty."""
-    text = cell.strip()
+def _number(line: TableLine, column: int) -> float | complex:
+    """Return the real or complex number in a cell, NaN if it is missing."""
     try:
-        return float(text or "nan")
+        return line.real(column)
     except ValueError:
-        pass
+        text = plain(line.cells[column], line.separator)
     try:
-        return complex(re.sub(r"i(?=\)?$)", "j", text.replace(" ", "")).replace("+-", "-"))
+        text = re.sub(r"\s*([+-])\s*", r"\1", re.sub(r"i(?=\)?$)", "j", text)).replace("+-", "-")
+        return complex("" if "_" in text else text)
     except ValueError:
-        raise ValueError(f"line {line} must contain numbers; got {text!r}") from None
+        got = line.cells[column].strip()
+        raise ValueError(f"line {line.number} must contain numbers; got {got!r}") from None

@@ -9,14 +9,14 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from arrivals.recordings.file_contents import FileContents
+from arrivals.recordings.file_contents import MAX_BYTES, FileContents, check_size
 from arrivals.validation import positive
 
 # sizes in the headers of ffmpeg, sox and arecord when they write to a pipe
 UNKNOWN_SIZES = (0, 0x7FFFF000, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF)
 
 
-def read_wav(file: BinaryIO) -> FileContents:
+def read_wav(file: BinaryIO, max_bytes: float = MAX_BYTES) -> FileContents:
     """Return the samples of a WAV file, integers scaled to [-1, 1), and its rate."""
     from scipy.io import wavfile
 
@@ -26,6 +26,7 @@ def read_wav(file: BinaryIO) -> FileContents:
         file = _with_sizes(file, start, present // frame * frame)
     elif announced > present:
         raise ValueError(f"truncated: expected {announced} bytes of samples; got {present}")
+    check_size(present if streamed else announced, max_bytes)
     file.seek(0)
     rate, samples = wavfile.read(file)
     return FileContents(_scaled(samples), positive("rate", rate))

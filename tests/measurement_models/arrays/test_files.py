@@ -79,10 +79,13 @@ BAD = [
         'kind = "positions"\npositions = [[0, 1], [0, 1]]',
         r"share the position \(0, 1\) m: numbers 1 and 2 of 2",
     ),
-    ('kind = "positions"\npositions = [[0, 1], [0]]', "positions must be numbers, or lists of the"),
-    ('kind = "positions"\npositions = ["a"]', "positions must be numbers, or lists of the same"),
+    ('kind = "positions"\npositions = [[0, 1], [0]]', "positions must have rows of one length"),
+    ('kind = "positions"\npositions = ["a"]', "positions must hold numbers"),
     ('kind = "positions"\npositions = [0, inf]', "positions must be finite; sensor 1"),
     ('kind = "positions"\npositions = []', "positions must have shape"),
+    ('kind = "ula"\nn_sensors = 1000000000\nspacing = 1', "n_sensors must be at most 100000; got"),
+    ('kind = "positions"\npositions = [0, 1' + "0" * 400 + "]", "positions must be finite"),
+    ('kind = "ula"\nx = ' + "[" * 5000, "nested too deeply"),
     ("kind = ula", "Invalid value"),
     ("kind = \"ula\"\nkind = 'ula'", "Cannot overwrite a value"),
 ]
@@ -107,6 +110,19 @@ def test_file_that_is_not_text_or_not_there(tmp_path: Path) -> None:
             read(tmp_path / "no.toml")
 
 
+def test_array_file_of_windows_is_read(tmp_path: Path) -> None:
+    file = tmp_path / "array.toml"
+    text = 'kind = "ula"\r\nn_sensors = 3\r\nspacing = 0.5\r\n'
+    file.write_bytes(b"\xef\xbb\xbf" + text.encode())
+    assert SensorArray.from_toml(file) == SensorArray.ula(3, 0.5)
+
+
+def test_array_file_must_be_a_regular_file(tmp_path: Path) -> None:
+    for read in (SensorArray.from_toml, SensorArray.from_csv):
+        with pytest.raises(OSError, match="not a regular file"):
+            read(tmp_path)
+
+
 def test_description_is_not_modified() -> None:
     description = {"kind": "ula", "n_sensors": 3, "spacing": 0.1, "missing": [2]}
     kept = copy.deepcopy(description)
@@ -127,6 +143,9 @@ def csv(path: Path, content: bytes) -> Path:
         (b"x,y\r\n0,1\r\n\r\n2,3\r\n", [[0.0, 1.0], [2.0, 3.0]]),
         (b"0, 1, 2\n3, 4, 5", [[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]]),
         (b"\xef\xbb\xbf0\n1\n", [[0.0], [1.0]]),  # a mark that spreadsheets put in front
+        (b"x;y\r\n0;1,5\r\n2,25;3\r\n", [[0.0, 1.5], [2.25, 3.0]]),
+        (b'"x"\t"y"\n# metres\n0\t"1"\n', [[0.0, 1.0]]),
+        ("x,y\n0,1\n".encode("utf-16"), [[0.0, 1.0]]),
     ],
 )
 def test_positions_from_a_table(
@@ -139,10 +158,10 @@ def test_positions_from_a_table(
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (b"", "holds no positions"),
-        (b"x,y\n", "holds no positions"),
-        (b"0,1\n2\n", r"row 2 must hold 2 numbers; got \['2'\]"),
-        (b"0,1\n2,b\n", "row 2 must hold 2 numbers"),
+        (b"", "has no positions"),
+        (b"x,y\n", "has no positions"),
+        (b"0,1\n2\n", r"line 2 must have 2 numbers; got \['2'\]"),
+        (b"0,1\n2,b\n", "line 2 must have 2 numbers"),
         (b"0,1\n0,1\n", "numbers 1 and 2 of"),
         (b"0,1\n0,nan\n", "must be finite"),
         (b"1,2,3,4\n", "dim 1, 2 or 3"),

@@ -109,6 +109,49 @@ def test_full_disk_is_reported_and_study_resumes(tmp_path: Path) -> None:
     assert numbers(small(out=tmp_path)) == reference()
 
 
+def without_checksums(text: str) -> str:
+    """Return a study file as it was before rows had checksums."""
+    first, *rows = text.splitlines()
+    return "\n".join([first, *(row.rpartition(",")[0] for row in rows), ""])
+
+
+def test_file_without_checksums_is_read_and_resumed_with_them(tmp_path: Path) -> None:
+    path = tmp_path / "study.csv"
+    small(2, out=path)
+    new = path.read_text()
+    path.write_text(without_checksums(new))
+    assert numbers(Study.read(path)) == [row for row in reference() if row[1] < 2]
+    assert path.read_text() == without_checksums(new)
+    small(2, out=path)
+    assert path.read_text() == new
+
+
+def test_changed_first_line_is_seen_by_every_reader(tmp_path: Path) -> None:
+    path = tmp_path / "study.csv"
+    small(1, out=path)
+    path.write_text(path.read_text().replace('"seed": 3', '"seed": 1', 1))
+    with pytest.raises(ValueError, match=r"line 3 of .* checksum, it or line 1 was changed"):
+        Study.read(path)
+
+
+def test_every_changed_digit_of_a_row_is_seen(tmp_path: Path) -> None:
+    row = Row("case", 12, "cbf", "rmse", 0.25, "a note,\n'quoted' \"twice\"")
+    results = Results({"scenarios": {"case": {}}, "methods": []}, tmp_path / "study.csv")
+    results.add([row, row])
+    path = tmp_path / "study.csv"
+    assert list(read_rows(path)) == [row, row]
+    whole = path.read_bytes()
+    for place in range(whole.index(b"check\n") + 6, len(whole) - 1):
+        path.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
+        with pytest.raises(ValueError, match=r"line \d of .*study\.csv"):
+            list(read_rows(path))
+
+
+def test_study_file_must_be_a_regular_file(tmp_path: Path) -> None:
+    with pytest.raises(OSError, match="not a regular file"):
+        Study.read(tmp_path)
+
+
 @pytest.mark.parametrize(
     ("damage", "message"),
     [
@@ -117,9 +160,15 @@ def test_full_disk_is_reported_and_study_resumes(tmp_path: Path) -> None:
         (lambda text: text.replace(",1,", ",one,", 1), r"line \d+ of .* is not a row of a study"),
         (lambda text: text + "\x00\xff,\n", r"line \d+ of .* is not a row of a study"),
         (
-            lambda text: text.replace("fig6,0", "fig66,0"),
+            lambda text: without_checksums(text).replace("fig6,0", "fig66,0"),
             "must be those of its first line; got 'fig66'",
         ),
+        (lambda text: text.replace("fig6,0", "fig66,0"), r"line 3 of .* agree with its checksum"),
+        (lambda text: text.replace(",gospa,", ",gospa,1", 1), r"line \d+ of .* with its checksum"),
+        (lambda text: text + text.splitlines()[-1][:-1] + "z\n", "with its checksum, it or line 1"),
+        (lambda text: text.replace('"seed": 3', '"seed": 1', 1), "got another seed"),
+        (lambda text: "# arrivals study " + "[" * 10**5 + text, "is not a study file"),
+        (lambda text: "# arrivals study []\n" + text, "is not a study file"),
     ],
 )
 def test_damaged_file_is_rejected_and_kept(
