@@ -123,7 +123,7 @@ def mutated(rng: np.random.Generator, content: bytes, is_text: bool) -> tuple[by
             at = int(rng.integers(min(len(data), 400) + 1)) // 2 * 2
             word, size = int(rng.choice(WORDS)), int(rng.choice([1, 2, 4, 8]))
             order = "little" if rng.random() < 0.8 else "big"
-            data[at : at + size] = (word % 256**size).to_bytes(size, order)  # type: ignore[arg-type]
+            data[at : at + size] = (word % 256**size).to_bytes(size, order)
         else:
             cell = CELLS[int(rng.integers(len(CELLS)))]
             end = at + int(rng.integers(0, 6))
