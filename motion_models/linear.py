@@ -235,9 +235,7 @@ def _drift(n: int, dt: float) -> Float:
 
 @lru_cache(maxsize=64)
 def _unit_noise(n: int, dt: float) -> Float:
-    dt = np.float64(dt)
-    with np.errstate(over="ignore"):  # filters raise where the covariance overflows
-        return _on_diagonal([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]], n)
+    return _on_diagonal([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]], n)
 
 
 def _on_diagonal(block: ArrayLike, n: int) -> Float:

@@ -15,7 +15,8 @@ from fuzzing.model_cases import CLASSES, FUNCTIONS, Arguments, state_of
 from fuzzing.values import malformed, value_of
 
 MAY_BE_NAN = (  # as documented
-    "bootstrap_interval", "circular_nees", "coverage", "position_nees", "position_coverage", "sdr",
+    "numbers", "real_numbers", "bootstrap_interval", "circular_nees", "coverage", "position_nees",
+    "position_coverage", "sdr",
 )  # fmt: skip
 MODEST = 1e100  # of arguments from which a result has to be finite
 
@@ -121,7 +122,8 @@ def _is_modest(value: Any) -> bool:
     if any(np.ma.isMaskedArray(part) for part in parts):
         return False
     try:
-        numbers = np.abs(np.asarray(value, dtype=np.complex128))
+        with np.errstate(all="ignore"):
+            numbers = np.abs(np.asarray(value, dtype=np.complex128))
     except OverflowError:
         return False
     except (TypeError, ValueError, RecursionError):

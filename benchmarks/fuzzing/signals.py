@@ -27,7 +27,7 @@ from fuzzing.judging import Call
 
 TRACK = ["track", "tow.wav", "--array", "array.toml", "--frequency", "1000", "--window", "64",
          "--tracker", "mvdr", "--quiet", "--out", "out.csv"]  # fmt: skip
-N_RUNS = 40
+N_RUNS = 15
 
 
 def kinds() -> list[str]:

@@ -7,6 +7,7 @@ valid one, and `same` one that means the same. In expressions the valid value is
 from __future__ import annotations
 
 import datetime
+import warnings
 from collections.abc import Iterator, Sequence
 from decimal import Decimal
 from fractions import Fraction
@@ -120,7 +121,11 @@ def ragged(a: Any) -> list[Any]:
 
 def put(a: Any, k: int, value: Any) -> Any:
     """Return a copy with one other entry; of objects where the entry is no number of its type."""
-    fits = isinstance(value, float | int) and abs(value) < 1e309 and np.ndim(a)
+    fits = (
+        isinstance(value, float | int)
+        and abs(value) <= float(np.finfo(np.float64).max)
+        and np.ndim(a)
+    )
     copy = np.array(a) if fits else np.array(a, dtype=object, ndmin=1)
     flat = copy.reshape(-1)
     if flat.size:
@@ -181,7 +186,8 @@ def value_of(expression: str, a: Any = None) -> Any:
     except ValueError:
         valid = np.array([np.asarray(each) for each in a], dtype=object)
     try:
-        with np.errstate(all="ignore"):
+        with np.errstate(all="ignore"), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
             return eval(expression, SPACE, {"a": valid})
     except (TypeError, ValueError, AttributeError, IndexError, OverflowError):
         return "text"
