@@ -107,6 +107,9 @@ class PAST(SubspaceTracker[DirectionFinder]):
         P of the paper: the inverse of the weighted sum of z zᴴ, z = Wᴴy.
     energy : float
         Weighted sum of ‖y‖².
+    prior : float
+        Weight of the initial P: power of each dimension that is not data. Smaller eigenvalues
+        count as noise.
     n_tracked : int
         Dimension of the subspace: that of `W`, or less if sensors have had no data yet.
     weight : ndarray, shape (n_sensors,)
@@ -167,7 +170,8 @@ class PAST(SubspaceTracker[DirectionFinder]):
 
     def _reset_subspace(self) -> None:
         n = self.measurement.array.n_sensors
-        self.age, self.weight, self.energy, self.n_tracked = 0.0, np.zeros(n), 0.0, 0
+        self.age, self.weight, self.n_tracked = 0.0, np.zeros(n), 0
+        self.energy, self.prior = 0.0, 0.0
         self.W = np.zeros((n, self.n_slots), dtype=np.complex128)
         self.inverse = np.eye(self.n_slots, dtype=np.complex128)
 
@@ -201,6 +205,7 @@ class PAST(SubspaceTracker[DirectionFinder]):
         beta, L = max(self.forgetting**self.age, MIN_FORGETTING), self.n_tracked
         W, P = past_step(self.W[:, :L], self.inverse[:L, :L], y, beta)
         self.energy, self.age = beta * self.energy + power + unexplained, 0.0
+        self.prior = beta * self.prior
         trace = self.energy * float(P.trace().real)
         P = P if trace < MAX_RELATIVE_TRACE else P * (MAX_RELATIVE_TRACE / trace)
         if self.n_slots > L:  # some sensors have had no data
@@ -216,6 +221,7 @@ class PAST(SubspaceTracker[DirectionFinder]):
             added = np.arange(old, L)
             self.W, self.inverse, self.n_tracked = self.W.copy(), self.inverse.copy(), L
             self.W[new[: L - old], added] = 1.0
+            self.prior = max(self.prior, power / np.count_nonzero(valid))
             self.inverse[added, added] = np.count_nonzero(valid) / power
 
     def _imputed(self, z: Complex) -> tuple[Complex, float]:
@@ -248,7 +254,8 @@ class PAST(SubspaceTracker[DirectionFinder]):
         S = R[:L] @ np.linalg.solve(inverse, R[:L].conj().T)
         values, rotation = np.linalg.eigh((S + S.conj().T) / 2)
         noise = (self.energy - values.sum()) / max(n - L, 1)  # the power outside, spread evenly
-        values = np.concatenate([values[::-1], np.full(n - L, max(noise, 0.0))])
+        values = np.concatenate([values[::-1], np.full(n - L, noise)])
+        values = np.maximum(values, max(self.prior, noise))  # no dimension has less than noise
         return values, np.concatenate([Q[:, :L] @ rotation[:, ::-1], Q[:, L:]], axis=1)
 
     def direction_finder(self, model: ArraySnapshot) -> DirectionFinder:
