@@ -168,9 +168,9 @@ class Tones(SourceCorrelation):
                     f"powers must be {len(frequencies)}, one for each tone; got {len(powers)}"
                 )
             object.__setattr__(self, "powers", powers)
-        powers = np.ones(len(frequencies)) if self.powers is None else np.asarray(self.powers)
+        shares = np.ones(len(frequencies)) if self.powers is None else np.asarray(self.powers)
         object.__setattr__(self, "omega", 2 * np.pi * np.asarray(frequencies))
-        object.__setattr__(self, "shares", powers / powers.sum())
+        object.__setattr__(self, "shares", shares / shares.sum())
 
     @property
     def highest(self) -> float:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -43,6 +43,7 @@ def run_batch(
     list of Run
     """
     positive("dt", dt)
+    sequences: Sequence[Any] | Float
     if getattr(measurements, "shape", ())[2:] == (self.dim_z,):
         sequences = real_numbers("measurements", measurements)
     else:

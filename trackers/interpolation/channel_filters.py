@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -82,10 +83,10 @@ class ChannelFilters:
 
     def broadcast(self, shape: tuple[int, ...]) -> ChannelFilters:
         """Return the same state for recordings of leading axes `shape`."""
-        arrays = {
-            name: np.broadcast_to(value, shape + value.shape)
-            for name, value in vars(self).items()
-            if isinstance(value, np.ndarray)
+        names = ("state", "last", "age", "error", "energy", "n_steps")
+        arrays: dict[str, Any] = {
+            name: np.broadcast_to(value := getattr(self, name), shape + value.shape)
+            for name in names
         }
         return replace(self, zero_runs=self.zero_runs.broadcast(shape), **arrays)
 

@@ -83,10 +83,8 @@ class InterpolationEKF(GaussianFilter):
     Warns
     -----
     UserWarning
-        If a joint filter starts from a prior that is wider than the main lobe.
-
-    UserWarning
-        Once, if a channel is zero for so long that it counts as missing.
+        If a joint filter starts from a prior that is wider than the main lobe; once, if a channel
+        is zero for so long that it counts as missing.
 
     Notes
     -----
@@ -140,9 +138,9 @@ class InterpolationEKF(GaussianFilter):
         self.variant = to_variant(variant)
         self.doa, self.std, self.rate_std = number("doa", doa), std, positive("rate_std", rate_std)
         self.acquisition, self.gate = count("acquisition", acquisition), gate
-        for name in ("std", "gate"):
-            if getattr(self, name) is not None:
-                positive(name, getattr(self, name))
+        for name, value in (("std", std), ("gate", gate)):
+            if value is not None:
+                positive(name, value)
         if not abs(self.doa) <= np.pi / 2:
             raise ValueError(f"doa must lie within ±π/2 rad; got {doa}")
         self._built = SimpleNamespace(key=(None,) * 5)
@@ -192,7 +190,7 @@ class InterpolationEKF(GaussianFilter):
         R : float or array_like, shape (n_sensors, n_sensors), optional
             Replaces the noise of `y`, one vector measurement, linear at the present mean.
         H : array_like, shape (m, dim_x), optional
-            Replaces the snapshot by another measurement of the state: z = H x + v with z (m,).
+            Replaces the snapshot by another measurement of the state: z = H x + v.
         """
         if H is not None:
             super().update(z, self.measurement.noise_ratio if R is None else R, H)

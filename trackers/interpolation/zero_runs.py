@@ -57,7 +57,8 @@ class ZeroRuns:
 
     def broadcast(self, shape: tuple[int, ...]) -> ZeroRuns:
         """Return the same state for recordings of leading axes `shape`."""
-        length, missing = (np.broadcast_to(a, shape + a.shape) for a in (self.length, self.missing))
+        length = np.broadcast_to(self.length, shape + self.length.shape)
+        missing = np.broadcast_to(self.missing, length.shape)
         zeros, repeated = (np.broadcast_to(a, shape) for a in (self.zeros, self.repeated))
         return ZeroRuns(length, missing, zeros, repeated, self.active, self.reported)
 

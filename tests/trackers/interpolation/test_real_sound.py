@@ -3,6 +3,7 @@
 import copy
 import pickle
 import warnings
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -49,7 +50,7 @@ def replaced(x: Float, rows: slice, columns: Any, value: float) -> Float:
     return x
 
 
-DISTURBED = {
+DISTURBED: dict[str, Callable[[Float], Float]] = {
     "nothing": lambda x: x,
     "hum": lambda x: x + hum(50.0, 14.0),
     "harmonic": lambda x: x + hum(100.0, 20.0) + hum(150.0, 7.0),
