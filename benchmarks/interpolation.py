@@ -279,16 +279,15 @@ def array_calls(made: InterpolationEKF, samples: Float) -> int:
 
     lead, n, assembly = samples.shape[:1], made.dim_x, made.assembly
     F, Q = transition(assembly.motion, 1.0)
-    scale = made.measurement.power, made.measurement.noise_ratio
     x: Float = np.broadcast_to(made.x, (*lead, n)).copy().view(Counting)
     P: Float = np.broadcast_to(made.P, (*lead, n, n)).copy().view(Counting)
     buffer = made.buffer.broadcast(lead)
     buffer = replace(buffer, frames=buffer.frames.copy().view(Counting))
     for k in range(3):
         calls = 0
-        buffer = buffer.append(samples[:, k].view(Counting))
-        frames = buffer.scaled(*scale)
-        x, P = assembly.update(*predict(x, P, F, Q), frames, buffer.n_snapshots)
+        buffer = buffer.append(samples[:, k].view(Counting), made.gate, made.measurement.power)
+        frames = buffer.scaled(made.measurement)
+        x, P, _ = assembly.update(*predict(x, P, F, Q), frames, buffer.n_snapshots, buffer.misfit)
     return calls
 
 

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.arrays.sensor_array import SensorArray
+from arrivals.measurement_models.delays.band_filter import BandFilter
 from arrivals.measurement_models.delays.source_correlation import SourceCorrelation
+from arrivals.measurements import real_numbers
 from arrivals.parameters import FrozenModel
 from arrivals.typing import Float, Int
 from arrivals.validation import instance, number, positive
+
+MARGIN = 1.1  # of the edges of a filter, so that it does not change the spectrum in the band
 
 
 @dataclass(frozen=True)
@@ -35,6 +41,9 @@ class ArraySamples(FrozenModel):
         Power of the source over that of the noise, at one sensor.
     power : float, optional
         Power of the source at one sensor; if None, a tracker estimates it from the data.
+    band : (float, float), optional
+        Band that a tracker filters the samples to, Hz, as hum, offsets and other sources outside of
+        the source's band need; if None, samples are used as they are.
 
     Attributes
     ----------
@@ -42,6 +51,10 @@ class ArraySamples(FrozenModel):
         κ, the delay between neighbouring grid points at endfire, samples.
     grid_index : ndarray of int, shape (n_sensors,)
         Grid point of each sensor, counted from the largest coordinate.
+    band_filter : BandFilter or None
+        Filter to `band`; None if there is nothing to filter.
+    received_noise_ratio : float
+        ε after that filter: of white noise, the share within the band.
 
     Raises
     ------
@@ -68,8 +81,11 @@ class ArraySamples(FrozenModel):
     correlation: SourceCorrelation
     snr_db: float = 0.0
     power: float | None = None
+    band: Sequence[float] | None = None
     kappa: float = field(init=False, repr=False, compare=False)
     grid_index: Int = field(init=False, repr=False, compare=False)
+    band_filter: BandFilter | None = field(init=False, repr=False, compare=False)
+    received_noise_ratio: float = field(init=False, repr=False, compare=False)
 
     @property
     def places(self) -> Int:
@@ -83,6 +99,12 @@ class ArraySamples(FrozenModel):
         number("snr_db", self.snr_db)
         if self.power is not None:
             positive("power", self.power)
+        band = None if self.band is None else checked_band(self.band, self.rate)
+        filtered = None if band is None else band_filter(band, self.rate)
+        share = 1.0 if filtered is None else filtered.noise_share
+        object.__setattr__(self, "band", band)
+        object.__setattr__(self, "band_filter", filtered)
+        object.__setattr__(self, "received_noise_ratio", share * self.noise_ratio)
         spacing = self.array.spacing
         if spacing is None:
             raise ValueError(
@@ -123,16 +145,18 @@ class ArraySamples(FrozenModel):
         ValueError
             If there is not one number a sensor.
         """
-        z = np.asarray(z)
-        if z.dtype.kind not in "biuf":
-            raise TypeError(f"a snapshot must hold real samples; got {z.dtype}")
+        z = real_numbers("z", z)
         if z.ndim == 0 or z.shape[-1] != self.array.n_sensors:
             raise ValueError(
                 f"a snapshot must have shape (..., {self.array.n_sensors}), one sample a sensor; "
                 f"got {z.shape}"
             )
+        return self.on_grid(z)
+
+    def on_grid(self, z: Float) -> Float:
+        """Return `frame` without the checks."""
         frame = np.full((*z.shape[:-1], self.n_grid_points), np.nan)
-        frame[..., self.grid_index] = np.where(np.isfinite(z), z, np.nan)
+        frame[..., self.grid_index] = z
         return frame
 
     def delay(self, doa: ArrayLike) -> Float:
@@ -152,3 +176,33 @@ class ArraySamples(FrozenModel):
         return np.asarray(
             np.asarray(std) / (self.kappa * np.maximum(np.cos(self.doa(delay)), 0.05))
         )
+
+
+@lru_cache(maxsize=32)
+def band_filter(band: tuple[float, float], rate: float) -> BandFilter | None:
+    """Return the filter to a band, Hz, with edges a tenth outside; the same one every time.
+
+    Examples
+    --------
+    >>> band_filter((0.0, 4000.0), 8000.0) is None
+    True
+    """
+    low, high = band[0] / MARGIN / rate, min(band[1] * MARGIN / rate, 0.5)
+    return None if (low, high) == (0.0, 0.5) else BandFilter(low, high)
+
+
+def checked_band(band: Sequence[float], rate: float) -> tuple[float, float]:
+    """Return the edges of a band, Hz.
+
+    Examples
+    --------
+    >>> checked_band([500.0, 300.0], 8000.0)
+    Traceback (most recent call last):
+    ValueError: band must lie between 0 and half the rate, 4000 Hz; got 500 and 300
+    """
+    low, high = (number("band", edge) for edge in band)
+    if not 0 <= low < high <= rate / 2:
+        raise ValueError(
+            f"band must lie between 0 and half the rate, {rate / 2:g} Hz; got {low:g} and {high:g}"
+        )
+    return low, high

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.base import MeasurementModel
+from arrivals.measurement_models.delays.band_filter import BandFilter
 from arrivals.measurement_models.delays.source_correlation import SourceCorrelation
 from arrivals.parameters import FrozenModel
 from arrivals.typing import Float
@@ -27,6 +28,9 @@ def window(reach: float) -> tuple[int, ...]:
     return tuple(range(math.floor(1e-9 - reach) - 1, math.ceil(reach - 1e-9) + 3))
 
 
+WHITE = 0.01  # of filtered noise, share that stays white: without it, many taps are singular
+
+
 @dataclass(frozen=True)
 class DelayInterpolator(FrozenModel):
     """The linear least-squares estimate of s(k - τ) from s(k - o₁), ..., s(k - o_L).
@@ -40,6 +44,9 @@ class DelayInterpolator(FrozenModel):
     loading : float
         ε_c, noise power over source power that the taps are taken to carry. 0 gives the paper's
         coefficients; with the true ratio the noise biases no delay.
+    noise_filter : BandFilter, optional
+        Filter that the taps have passed, so that their noise is correlated; ε is the ratio of the
+        white noise in front of it.
 
     Raises
     ------
@@ -68,7 +75,9 @@ class DelayInterpolator(FrozenModel):
     correlation: SourceCorrelation
     offsets: Sequence[int] = (0, 1)
     loading: float = 0.0
+    noise_filter: BandFilter | None = None
     r0: Float = field(init=False, repr=False, compare=False)
+    noise: Float | float = field(init=False, repr=False, compare=False)
     G: Float = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -78,14 +87,17 @@ class DelayInterpolator(FrozenModel):
         if not offsets or len(set(offsets)) < len(offsets):
             raise ValueError(f"offsets must be different whole numbers; got {self.offsets}")
         object.__setattr__(self, "offsets", offsets)
-        r0 = self.correlation.rho(np.subtract.outer(offsets, offsets))
-        r = r0 + self.loading * np.eye(len(offsets))
+        lags = np.subtract.outer(offsets, offsets)
+        r0, noise = self.correlation.rho(lags), np.eye(len(offsets))
+        if self.noise_filter is not None:
+            noise = self.noise_filter.autocorrelation(lags) + WHITE * noise
+        r = r0 + self.loading * noise
         if np.linalg.cond(r) > 1e12:
             raise ValueError(
                 f"loading must be at least 1e-9 for {len(offsets)} taps on this source; got "
                 f"{self.loading}: the correlation matrix is singular"
             )
-        for name, matrix in (("r0", r0), ("G", np.linalg.inv(r))):
+        for name, matrix in (("r0", r0), ("noise", noise), ("G", np.linalg.inv(r))):
             matrix.setflags(write=False)
             object.__setattr__(self, name, matrix)
 
@@ -113,8 +125,10 @@ class DelayInterpolator(FrozenModel):
     def linearise(self, tau: ArrayLike, noise_ratio: float = 0.0) -> tuple[Float, Float]:
         """Return coefficients with their derivatives, (..., 2, n_taps), and the error variance."""
         lags = self._lags(tau)
-        p, dp = self.correlation.rho(lags), self.correlation.drho(lags)
-        both: Float = np.stack([p, dp], axis=-2) @ self.G
+        both = np.empty((*lags.shape[:-1], 2, lags.shape[-1]))
+        both[..., 0, :] = p = self.correlation.rho(lags)
+        both[..., 1, :] = self.correlation.drho(lags)
+        both = both @ self.G
         return both, self._error(both[..., 0, :], p, noise_ratio)
 
     def _lags(self, tau: ArrayLike) -> Float:
@@ -125,7 +139,9 @@ class DelayInterpolator(FrozenModel):
         return np.asarray((p[..., None, :] @ self.G)[..., 0, :])
 
     def _error(self, c: Float, p: Float, noise_ratio: float) -> Float:
-        mixed = (c[..., None, :] @ self.r0)[..., 0, :] + noise_ratio * c - 2 * p
+        mixed = (c[..., None, :] @ self.r0)[..., 0, :] - 2 * p
+        noise = c if self.noise_filter is None else (c[..., None, :] @ self.noise)[..., 0, :]
+        mixed += noise_ratio * noise
         return np.asarray(1 + (mixed * c).sum(axis=-1))
 
 
@@ -229,6 +245,10 @@ class InterpolationDelay(MeasurementModel):
         """Return c(mΔ) with c'(mΔ), (..., 2, n_taps), and R(mΔ), (...), for delays (...)."""
         tau = self.baseline * np.asarray(delay)
         taps, error = self.interpolator.linearise(tau, self.noise_ratio)
+        noise_filter = self.interpolator.noise_filter
+        if noise_filter is not None:
+            # residuals are correlated: those of 1 / share samples count as one
+            error = error / noise_filter.noise_share
         return taps, self.inflation * (self.noise_ratio + error)
 
     @property

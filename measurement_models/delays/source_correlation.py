@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -131,6 +131,11 @@ class Tones(SourceCorrelation):
     powers : sequence of float, optional
         Powers of the tones, scaled to the sum 1; equal if None.
 
+    Attributes
+    ----------
+    omega, shares : ndarray, shape (n_tones,)
+        Angular frequencies, rad per sample, and shares of the tones in the power.
+
     Raises
     ------
     ValueError
@@ -145,6 +150,8 @@ class Tones(SourceCorrelation):
 
     frequencies: Sequence[float] | float
     powers: Sequence[float] | None = None
+    omega: Float = field(init=False, repr=False, compare=False)
+    shares: Float = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         frequencies = tuple(np.atleast_1d(real("frequencies", self.frequencies)).tolist())
@@ -161,17 +168,9 @@ class Tones(SourceCorrelation):
                     f"powers must be {len(frequencies)}, one for each tone; got {len(powers)}"
                 )
             object.__setattr__(self, "powers", powers)
-
-    @property
-    def omega(self) -> Float:
-        """Angular frequencies, rad per sample, (n_tones,)."""
-        return 2 * np.pi * np.asarray(self.frequencies)
-
-    @property
-    def shares(self) -> Float:
-        """Shares of the tones in the power, (n_tones,)."""
-        powers = np.ones(len(self.omega)) if self.powers is None else np.asarray(self.powers)
-        return np.asarray(powers / powers.sum())
+        shares = np.ones(len(frequencies)) if self.powers is None else np.asarray(self.powers)
+        object.__setattr__(self, "omega", 2 * np.pi * np.asarray(frequencies))
+        object.__setattr__(self, "shares", shares / shares.sum())
 
     @property
     def highest(self) -> float:

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.delays.array_samples import ArraySamples
+from arrivals.measurements import real_numbers, rows
 from arrivals.trackers.base import Tracker
 from arrivals.trackers.estimates import DirectionEstimate
-from arrivals.trackers.interpolation.sample_buffer import to_snapshot
+from arrivals.trackers.interpolation.gating import widened
+from arrivals.trackers.interpolation.sample_buffer import receive, to_snapshot
 from arrivals.trackers.interpolation.updates import predict, transition
 from arrivals.trackers.run import Run
 from arrivals.typing import Float
@@ -41,8 +43,15 @@ def run_batch(
     list of Run
     """
     positive("dt", dt)
-    sequences = [[to_snapshot(z, self.dim_z) for z in sequence] for sequence in measurements]
-    if len({len(sequence) for sequence in sequences}) != 1 or not sequences[0]:
+    sequences: Sequence[Any] | Float
+    if getattr(measurements, "shape", ())[2:] == (self.dim_z,):
+        sequences = real_numbers("measurements", measurements)
+    else:
+        sequences = [
+            [to_snapshot(z, self.dim_z) for z in rows("measurements", sequence)]
+            for sequence in rows("measurements", measurements)
+        ]
+    if len({len(sequence) for sequence in sequences}) != 1 or len(sequences[0]) == 0:
         return Tracker.run_batch(self, sequences, dt)
     started = time.perf_counter()
     x, P = self.trajectory(np.array(sequences), dt)
@@ -70,21 +79,24 @@ def trajectory(
     x : ndarray, shape (..., n_steps, dim_x)
     P : ndarray, shape (..., n_steps, dim_x, dim_x)
     """
-    frames = self.measurement.frame(measurements)
-    if frames.ndim < 2:
+    snapshots = real_numbers("measurements", measurements)
+    if snapshots.ndim < 2 or snapshots.shape[-1] != self.dim_z:
         raise ValueError(
-            f"measurements must have shape (..., n_steps, n_sensors); got {frames.shape}"
+            f"measurements must have shape (..., n_steps, {self.dim_z}); got {snapshots.shape}"
         )
-    power, noise_ratio = self.measurement.power, self.measurement.noise_ratio
-    assembly, lead = self.assembly, frames.shape[:-2]
+    assembly, lead = self.assembly, snapshots.shape[:-2]
     F, Q = transition(assembly.motion, dt)
     x, P = (np.broadcast_to(a, (*lead, *a.shape)) for a in self.belief())
-    buffer = self.buffer.broadcast(lead)
-    xs, Ps = np.empty((*frames.shape[:-1], len(F))), np.empty((*frames.shape[:-1], *F.shape))
-    for k in range(frames.shape[-2]):
-        buffer = buffer.append(frames[..., k, :])
+    channels, buffer = self.channels.broadcast(lead), self.buffer.broadcast(lead)
+    n_steps = snapshots.shape[-2]
+    xs, Ps = np.empty((*lead, n_steps, len(F))), np.empty((*lead, n_steps, *F.shape))
+    for k in range(n_steps):
+        channels, buffer = receive(self, channels, buffer, snapshots[..., k, :])
         x, P = predict(x, P, F, Q)
-        x, P = assembly.update(x, P, buffer.scaled(power, noise_ratio), buffer.n_snapshots)
+        P = widened(P, buffer.missing, self.largest_variance)
+        samples = buffer.scaled(self.measurement)
+        x, P, misfit = assembly.update(x, P, samples, buffer.n_snapshots, buffer.misfit)
+        buffer = buffer.with_misfit(misfit)
         xs[..., k, :], Ps[..., k, :, :] = x, P
     return xs, Ps
 

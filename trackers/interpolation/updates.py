@@ -22,9 +22,9 @@ from arrivals.motion_models.base import MotionModel
 from arrivals.parameters import FrozenModel
 from arrivals.trackers.gaussian.equations import joseph, predict_gaussian, update_scalar
 from arrivals.trackers.gaussian.linalg import apply, symmetric
+from arrivals.trackers.interpolation.gating import is_used
 from arrivals.typing import Bool, Float
 
-MAX_INITIAL_STD = 0.12  # over κ: standard deviation of the delay at the start of a joint filter
 MAX_PHASE_STD = 0.35  # rad: of the phase of a baseline longer than 1, so that no cycle is lost
 
 
@@ -34,6 +34,15 @@ class DelayObservation(NamedTuple):
     y: Float  # (..., n_sensors), 0 for a sensor without a residual
     H: Float  # (..., n_sensors, dim_x), 0 there too
     R: Float  # variances of v, (..., n_sensors)
+
+
+class DelayUpdate(NamedTuple):
+    """Beliefs after a snapshot, and which of its residuals were used."""
+
+    x: Float
+    P: Float
+    e: Float  # of the first baseline, (..., n); NaN where there is none
+    used: Bool
 
 
 @lru_cache(maxsize=128)
@@ -54,18 +63,6 @@ def predict(x: Float, P: Float, F: Float, Q: Float) -> tuple[Float, Float]:
     return apply(F, x), symmetric(predict_gaussian(P, F, Q))
 
 
-def is_used(e: Float, variance: Float, gate: float | None) -> Bool:
-    """Return True for residuals that exist and are within `gate` standard deviations.
-
-    Examples
-    --------
-    >>> is_used(np.array([0.1, np.nan, 5.0]), np.ones(3), gate=3.0)
-    array([ True, False, False])
-    """
-    finite = np.isfinite(e)
-    return finite if gate is None else finite & (e * e <= gate**2 * variance)
-
-
 @dataclass(frozen=True, eq=False)
 class PairwiseUpdate(FrozenModel):
     """Updates along the array: each sensor is interpolated from one `baseline` away.
@@ -81,8 +78,6 @@ class PairwiseUpdate(FrozenModel):
     sequential, aligned : bool
         `sequential_update` and `aligned` of `Variant`. A vector update is linear in the delay:
         e - H (Δ - Δ₀).
-    gate : float, optional
-        Standard deviations beyond which a residual is dropped.
     """
 
     baseline_models: tuple[InterpolationDelay, ...]
@@ -90,9 +85,13 @@ class PairwiseUpdate(FrozenModel):
     max_frequency: float
     sequential: bool = False
     aligned: bool = False
-    gate: float | None = None
 
     source: ClassVar[None] = None  # the source is not in the state
+
+    @property
+    def gated_variance(self) -> float:
+        """Variance of the delay below which residuals are gated."""
+        return (MAX_PHASE_STD / (2 * np.pi * self.max_frequency)) ** 2
 
     @property
     def latency(self) -> int:
@@ -104,21 +103,34 @@ class PairwiseUpdate(FrozenModel):
         """Number of snapshots to buffer."""
         return self.latency + 1 + max(model.memory for model in self.baseline_models)
 
-    def update(self, x: Float, P: Float, frames: Float) -> tuple[Float, Float]:
-        """Update beliefs by the newest of `frames`, (..., span or more, n_sensors)."""
+    def update(self, x: Float, P: Float, frames: Float, limit: Float | None) -> DelayUpdate:
+        """Update beliefs by the newest of `frames`, (..., span or more, n_sensors).
+
+        Residuals whose squares are beyond `limit` times their variance are left out.
+        """
+        first_baseline = []
         for model in self.baseline_models:
             z, X = self._split(model, frames)
             n = 1 if self.sequential else model.dim_z
             for first in range(0, model.dim_z, n):
                 sensors = slice(first, first + n)
                 # e = y_j - c'X, H = m c''X, R   (11)
-                e, H, R = self._residuals(x, P, model, z[..., sensors], X[..., sensors, :])
+                e, H, R, used = self._residuals(
+                    x, P, model, z[..., sensors], X[..., sensors, :], limit
+                )
+                if model is self.baseline_models[0]:
+                    first_baseline.append((e, used))
+                if not used.all():
+                    e, H = np.where(used, e, 0.0), np.where(used, H, 0.0)
                 # K = P H' (H P H' + R)^-1, x = x + K e, P = P - K H P   (20)-(23)
                 x, P = update_scalar(x, P, e, H, R)
                 x[..., 0] = np.clip(x[..., 0], -self.kappa, self.kappa)
-        return x, P
+        if len(first_baseline) == 1:
+            return DelayUpdate(x, P, *first_baseline[0])
+        e, used = (np.concatenate(each, axis=-1) for each in zip(*first_baseline, strict=True))
+        return DelayUpdate(x, P, e, used)
 
-    def linearize(self, x: Float, P: Float, frames: Float) -> DelayObservation:
+    def linearize(self, x: Float, P: Float, frames: Float, limit: Float | None) -> DelayObservation:
         """Return the residuals of the newest of `frames`, all baselines of a sensor combined.
 
         Baselines l of a sensor have residuals e, slopes h and variances r. They are equivalent to
@@ -128,7 +140,9 @@ class PairwiseUpdate(FrozenModel):
         information, gradient, sign = np.zeros((3, *frames.shape[:-2], frames.shape[-1]))
         R = self.baseline_models[0].linearise(x[..., 0])[1][..., None]
         for model in self.baseline_models:
-            e, h, r = self._residuals(x, P, model, *self._split(model, frames))
+            e, h, r, used = self._residuals(x, P, model, *self._split(model, frames), limit)
+            if not used.all():
+                e, h = np.where(used, e, 0.0), np.where(used, h, 0.0)
             first = max(model.baseline, 0)
             sensors = slice(first, first + model.dim_z)
             information[..., sensors] += h * h / r[..., None]
@@ -147,17 +161,17 @@ class PairwiseUpdate(FrozenModel):
         return model.split(frames, frames.shape[-2] - 1 - latency)
 
     def _residuals(
-        self, x: Float, P: Float, model: InterpolationDelay, z: Float, X: Float
-    ) -> tuple[Float, Float, Float]:
-        """Return residuals, slopes and variance of a baseline; 0 where one is not used."""
+        self, x: Float, P: Float, model: InterpolationDelay, z: Float, X: Float, limit: Float | None
+    ) -> tuple[Float, Float, Float, Bool]:
+        """Return residuals, slopes and variance of a baseline, and which are used."""
         # c(mΔ), c'(mΔ) (4), R(mΔ)
         taps, R = model.linearise(x[..., 0])
         predicted = taps @ np.swapaxes(X, -1, -2)  # c'X and c''X, (..., 2, n)
         e, H = z - predicted[..., 0, :], model.baseline * predicted[..., 1, :]
-        used = is_used(e, H * H * P[..., :1, 0] + R[..., None], self.gate)
+        used = is_used(e, H * H * P[..., :1, 0] + R[..., None], limit)
         if abs(model.baseline) > 1:
             used &= self._is_unambiguous(model.baseline, P)[..., None]
-        return np.where(used, e, 0.0), np.where(used, H, 0.0), R
+        return e, H, R, used
 
     def _is_unambiguous(self, baseline: int, P: Float) -> Bool:
         """Return True where the phase of a baseline is known to a fraction of a cycle."""
@@ -173,20 +187,26 @@ class JointUpdate(FrozenModel):
     ----------
     source : SourceAtCentre
         Model of all sensors.
-    kappa, gate
+    kappa, max_frequency : float
         As in `PairwiseUpdate`.
     """
 
     source: SourceAtCentre
     kappa: float
-    gate: float | None = None
+    max_frequency: float
 
     latency: ClassVar[int] = 0  # snapshots by which the estimate may lag
     span: ClassVar[int] = 1  # number of snapshots to buffer
 
-    def update(self, x: Float, P: Float, frames: Float) -> tuple[Float, Float]:
+    @property
+    def gated_variance(self) -> float:
+        """Variance of the delay below which residuals are gated: of the outermost sensors."""
+        reach = np.pi * self.max_frequency * (self.source.n_sensors - 1)
+        return (MAX_PHASE_STD / reach) ** 2
+
+    def update(self, x: Float, P: Float, frames: Float, limit: Float | None) -> DelayUpdate:
         """Update beliefs by the newest of `frames`, (..., span or more, n_sensors)."""
-        e, H, R = self.linearize(x, P, frames)
+        (e, H, R), residuals, used = self._residuals(x, P, frames, limit)
         R = R[..., None] * np.eye(R.shape[-1])
         # K = P H' (H P H' + R)^-1, x = x + K e   (20)-(22)
         HP = H @ P
@@ -194,85 +214,17 @@ class JointUpdate(FrozenModel):
         x = x + apply(K, e)
         x[..., 0] = np.clip(x[..., 0], -self.kappa, self.kappa)
         # P = (I - K H) P (I - K H)' + K R K'   (23), in Joseph's form
-        return x, joseph(P, K, H, R)
+        return DelayUpdate(x, joseph(P, K, H, R), residuals, used)
 
-    def linearize(self, x: Float, P: Float, frames: Float) -> DelayObservation:
+    def linearize(self, x: Float, P: Float, frames: Float, limit: Float | None) -> DelayObservation:
         """Return the residuals of the newest of `frames`."""
+        return self._residuals(x, P, frames, limit)[0]
+
+    def _residuals(
+        self, x: Float, P: Float, frames: Float, limit: Float | None
+    ) -> tuple[DelayObservation, Float, Bool]:
         h, H, R = self.source.linearise(x)
         e = frames[..., -1, :] - h
-        used = is_used(e, ((H @ P) * H).sum(axis=-1) + R, self.gate)
-        return DelayObservation(np.where(used, e, 0.0), np.where(used[..., None], H, 0.0), R)
-
-
-@dataclass(frozen=True, eq=False)
-class FilterAssembly(FrozenModel):
-    """Models and updates of a variant for one array, source and motion.
-
-    Parameters
-    ----------
-    motion : MotionModel
-        Motion of the whole state.
-    acquire : PairwiseUpdate or None
-        Update of the first `acquisition` snapshots, if it differs from `final`.
-    final : PairwiseUpdate or JointUpdate
-        Update of the other snapshots.
-    kappa : float
-    n_grid_points : int
-        Grid points of the line.
-    acquisition : int
-    """
-
-    motion: MotionModel
-    acquire: PairwiseUpdate | None
-    final: PairwiseUpdate | JointUpdate
-    kappa: float
-    n_grid_points: int
-    acquisition: int
-
-    @property
-    def source(self) -> SourceAtCentre | None:
-        """Model of all sensors, None for pairwise variants."""
-        return self.final.source
-
-    @property
-    def n_delay(self) -> int:
-        """Number of elements of the state before those of the source."""
-        return self.motion.dim_x - (0 if self.source is None else self.source.dim_source)
-
-    @property
-    def span(self) -> int:
-        """Number of snapshots to buffer."""
-        return self.final.span if self.acquire is None else max(self.acquire.span, self.acquisition)
-
-    def stage(self, n: int) -> PairwiseUpdate | JointUpdate:
-        """Return the update of the n-th snapshot."""
-        return self.acquire if self.acquire is not None and n <= self.acquisition else self.final
-
-    def initial_belief(self, delay: float, variance: float, rate_std: float) -> tuple[Float, Float]:
-        """Return the belief before the first snapshot."""
-        x, P = np.zeros(self.motion.dim_x), np.zeros((self.motion.dim_x, self.motion.dim_x))
-        P[np.diag_indices(self.n_delay)] = (self.kappa * rate_std) ** 2
-        x[0], P[0, 0] = delay, variance
-        if self.source is not None:
-            P[self.n_delay :, self.n_delay :] = self.source.covariance
-        return x, P
-
-    def update(self, x: Float, P: Float, frames: Float, n: int) -> tuple[Float, Float]:
-        """Update beliefs by snapshot n, the newest of `frames`, (..., span, n_grid_points)."""
-        x, P = self.stage(n).update(x, P, frames)
-        if self.acquire is not None and n == self.acquisition:
-            return self._replay(x, P, frames[..., -n:, :])
-        return x, P
-
-    def _replay(self, x: Float, P: Float, frames: Float) -> tuple[Float, Float]:
-        """Start the joint filter at the acquired delay, and process `frames` again."""
-        n = self.n_delay
-        x0, P0 = self.initial_belief(0.0, 0.0, 0.0)
-        x0, P0 = np.zeros_like(x) + x0, np.zeros_like(P) + P0
-        x0[..., :n], P0[..., :n, :n] = x[..., :n], P[..., :n, :n]
-        P0[..., 0, 0] = np.minimum(2 * P[..., 0, 0], (MAX_INITIAL_STD * self.kappa) ** 2)
-        x, P = x0, P0
-        F, Q = transition(self.motion, 1.0)
-        for k in range(frames.shape[-2]):
-            x, P = self.final.update(*predict(x, P, F, Q), frames[..., k : k + 1, :])
-        return x, P
+        used = is_used(e, ((H @ P) * H).sum(axis=-1) + R, limit)
+        y, H = np.where(used, e, 0.0), np.where(used[..., None], H, 0.0)
+        return DelayObservation(y, H, R), e, used

@@ -22,12 +22,9 @@ from arrivals.motion_models.base import MotionModel
 from arrivals.motion_models.combined import CombinedMotion
 from arrivals.motion_models.linear import LinearMotion
 from arrivals.parameters import FrozenModel
-from arrivals.trackers.interpolation.updates import (
-    MAX_INITIAL_STD,
-    FilterAssembly,
-    JointUpdate,
-    PairwiseUpdate,
-)
+from arrivals.trackers.interpolation.assembly import MAX_INITIAL_STD, FilterAssembly
+from arrivals.trackers.interpolation.channel_filters import settling_steps
+from arrivals.trackers.interpolation.updates import JointUpdate, PairwiseUpdate
 from arrivals.validation import not_negative, one_of, positive
 
 VariantName: TypeAlias = Literal["B", "Bw", "C", "D", "E", "E2", "phasor"]
@@ -139,17 +136,21 @@ def assemble_filter(
 ) -> FilterAssembly:
     """Return the filter of a variant for an array, a source and a motion of the delay."""
     kappa = measurement.kappa
+    acquisition += settling_steps(measurement.band_filter, measurement.noise_ratio)
     pairwise = PairwiseUpdate(
         _baseline_models(measurement, variant), kappa, measurement.correlation.highest,
-        variant.sequential_update, variant.aligned, gate,
+        variant.sequential_update, variant.aligned,
     )  # fmt: skip
     source = _source_model(measurement, variant)
     if source is None:
-        return FilterAssembly(motion, None, pairwise, kappa, measurement.n_grid_points, acquisition)
+        return FilterAssembly(
+            motion, None, pairwise, kappa, measurement.n_grid_points, acquisition, gate
+        )
     motion = CombinedMotion(motion, LinearMotion(source.transition, source.innovation))
     return FilterAssembly(
-        motion, pairwise if variant.acquire else None, JointUpdate(source, kappa, gate), kappa,
-        measurement.n_grid_points, acquisition,
+        motion, pairwise if variant.acquire else None,
+        JointUpdate(source, kappa, pairwise.max_frequency), kappa, measurement.n_grid_points,
+        acquisition, gate,
     )  # fmt: skip
 
 
@@ -203,7 +204,7 @@ def _baseline_models(measurement: ArraySamples, variant: Variant) -> tuple[Inter
         offsets = window(m * kappa) if offsets is None else tuple(offsets)
         if not variant.extrapolate:
             _check_reach(source, offsets, m * kappa)
-        taps = DelayInterpolator(source, offsets, loading)
+        taps = DelayInterpolator(source, offsets, loading, measurement.band_filter)
         models += [
             InterpolationDelay(taps, measurement.n_grid_points, ratio, direction * m, inflation)
             for direction in ((1, -1) if variant.bidirectional else (1,))

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models import ArraySamples, FlatBand, SensorArray
+from arrivals.measurement_models.delays.array_samples import checked_band
 from arrivals.trackers import Run, Tracker
 from arrivals.trackers.run import RunRecorder
 from arrivals.typing import Float
@@ -19,7 +20,7 @@ from arrivals.validation import count, one_of, positive
 def band_samples(
     array: SensorArray, rate: float, band: Sequence[float], snr_db: float = 0.0
 ) -> ArraySamples:
-    """Return the measurement model of a source that fills a band.
+    """Return the measurement model of a source that fills a band, and samples filtered to it.
 
     Parameters
     ----------
@@ -48,13 +49,8 @@ def band_samples(
     >>> round(band_samples(array, 16000.0, (1000.0, 3000.0)).kappa, 3)
     2.133
     """
-    low, high = (float(edge) for edge in band)
-    rate = positive("rate", rate)
-    if not 0 <= low < high <= rate / 2:
-        raise ValueError(
-            f"band must lie between 0 and half the rate, {rate / 2:g} Hz; got {low:g} and {high:g}"
-        )
-    return ArraySamples(array, rate, FlatBand(low / rate, high / rate), snr_db)
+    low, high = checked_band(band, positive("rate", rate))
+    return ArraySamples(array, rate, FlatBand(low / rate, high / rate), snr_db, band=(low, high))
 
 
 def track_samples(

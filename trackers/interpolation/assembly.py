@@ -1,0 +1,116 @@
+"""Models and updates of a variant, put together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from arrivals.measurement_models.delays.delay_line import SourceAtCentre
+from arrivals.motion_models.base import MotionModel
+from arrivals.parameters import FrozenModel
+from arrivals.trackers.interpolation.gating import gate_limit, updated_misfit
+from arrivals.trackers.interpolation.updates import (
+    DelayObservation,
+    JointUpdate,
+    PairwiseUpdate,
+    predict,
+    transition,
+)
+from arrivals.typing import Float
+
+MAX_INITIAL_STD = 0.12  # over κ: standard deviation of the delay at the start of a joint filter
+
+
+@dataclass(frozen=True, eq=False)
+class FilterAssembly(FrozenModel):
+    """Models and updates of a variant for one array, source and motion.
+
+    Parameters
+    ----------
+    motion : MotionModel
+        Motion of the whole state.
+    acquire : PairwiseUpdate or None
+        Update of the first `acquisition` snapshots, if it differs from `final`.
+    final : PairwiseUpdate or JointUpdate
+        Update of the other snapshots.
+    kappa : float
+    n_grid_points : int
+        Grid points of the line.
+    acquisition : int
+    gate : float or None
+        Standard deviations beyond which a residual is left out.
+    """
+
+    motion: MotionModel
+    acquire: PairwiseUpdate | None
+    final: PairwiseUpdate | JointUpdate
+    kappa: float
+    n_grid_points: int
+    acquisition: int
+    gate: float | None
+
+    @property
+    def source(self) -> SourceAtCentre | None:
+        """Model of all sensors, None for pairwise variants."""
+        return self.final.source
+
+    @property
+    def n_delay(self) -> int:
+        """Number of elements of the state before those of the source."""
+        return self.motion.dim_x - (0 if self.source is None else self.source.dim_source)
+
+    @property
+    def span(self) -> int:
+        """Number of snapshots to buffer."""
+        return self.final.span if self.acquire is None else max(self.acquire.span, self.acquisition)
+
+    def stage(self, n: int) -> PairwiseUpdate | JointUpdate:
+        """Return the update of the n-th snapshot."""
+        return self.acquire if self.acquire is not None and n <= self.acquisition else self.final
+
+    def initial_belief(self, delay: float, variance: float, rate_std: float) -> tuple[Float, Float]:
+        """Return the belief before the first snapshot."""
+        x, P = np.zeros(self.motion.dim_x), np.zeros((self.motion.dim_x, self.motion.dim_x))
+        P[np.diag_indices(self.n_delay)] = (self.kappa * rate_std) ** 2
+        x[0], P[0, 0] = delay, variance
+        if self.source is not None:
+            P[self.n_delay :, self.n_delay :] = self.source.covariance
+        return x, P
+
+    def linearize(
+        self, x: Float, P: Float, frames: Float, n: int, misfit: Float
+    ) -> DelayObservation:
+        """Return the residuals of snapshot n, the newest of `frames`."""
+        stage = self.stage(n)
+        return stage.linearize(x, P, frames, self._limit(stage, P, misfit))
+
+    def update(
+        self, x: Float, P: Float, frames: Float, n: int, misfit: Float
+    ) -> tuple[Float, Float, Float]:
+        """Update beliefs and misfits by snapshot n, newest of `frames` (..., span, n_grid_points).
+
+        Misfits are those of `updated_misfit`.
+        """
+        stage = self.stage(n)
+        limit = self._limit(stage, P, misfit)
+        x, P, e, used = stage.update(x, P, frames, limit)
+        if self.acquire is not None and n == self.acquisition:
+            x, P = self._replay(x, P, frames[..., -n:, :])
+        return x, P, misfit if limit is None else updated_misfit(misfit, e, used)
+
+    def _limit(self, stage: PairwiseUpdate | JointUpdate, P: Float, misfit: Float) -> Float | None:
+        return gate_limit(self.gate, misfit, P[..., 0, 0], stage.gated_variance)
+
+    def _replay(self, x: Float, P: Float, frames: Float) -> tuple[Float, Float]:
+        """Start the joint filter at the acquired delay, and process `frames` again."""
+        n = self.n_delay
+        x0, P0 = self.initial_belief(0.0, 0.0, 0.0)
+        x0, P0 = np.zeros_like(x) + x0, np.zeros_like(P) + P0
+        x0[..., :n], P0[..., :n, :n] = x[..., :n], P[..., :n, :n]
+        P0[..., 0, 0] = np.minimum(2 * P[..., 0, 0], (MAX_INITIAL_STD * self.kappa) ** 2)
+        x, P = x0, P0
+        F, Q = transition(self.motion, 1.0)
+        for k in range(frames.shape[-2]):
+            x, P = self.final.update(*predict(x, P, F, Q), frames[..., k : k + 1, :], None)[:2]
+        return x, P
