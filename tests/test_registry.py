@@ -122,6 +122,16 @@ def test_foreign_class_is_listed_and_imported_on_demand(
     assert animals.name_of(cow) == "cow"
 
 
+@pytest.mark.parametrize("code", ["raise SystemExit(3)", "1 / 0", "x = ", "\0"])
+def test_package_that_fails_or_exits_is_an_error_with_its_name(
+    code: str, animals: Registry[Animal], foreign: list[EntryPoint], tmp_path: Path
+) -> None:
+    (tmp_path / "rude_farm.py").write_text(code)
+    foreign.append(point("cow", "rude_farm:Cow"))
+    with pytest.raises(ValueError, match="'cow', rude_farm:Cow, cannot be loaded"):
+        animals.find("cow")
+
+
 def test_foreign_class_may_be_named_by_another_path(
     animals: Registry[Animal], foreign: list[EntryPoint]
 ) -> None:

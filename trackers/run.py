@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
@@ -12,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from arrivals.files import atomic_write
+from arrivals.measurements import real_numbers
 from arrivals.trackers.estimates import Estimate
 from arrivals.typing import Float
 
@@ -141,7 +143,7 @@ class Run:
         Run
             A copy with the times.
         """
-        time = np.asarray(time, dtype=np.float64)
+        time = real_numbers("time", time)
         if time.shape != self.time.shape:
             raise ValueError(f"time must have shape {self.time.shape}; got {time.shape}")
         return replace(self, time=time)
@@ -153,15 +155,20 @@ def header(kind: type[Estimate]) -> tuple[str, ...]:
 
 
 def text(row: tuple[Any, ...]) -> list[str]:
-    """Return the cells of a row of a tracks file: numbers to 9 digits, empty for NaN.
+    """Return the cells of a row of a tracks file: numbers to 9 digits, empty if not finite.
 
     Examples
     --------
-    >>> text((3, 0.1, np.int64(7), 1 / 3, np.nan))
+    >>> text((3, 0.1, np.int64(7), 1 / 3, np.inf))
     ['3', '0.1', '7', '0.333333333', '']
     """
-    return ["" if value != value else f"{value:.9g}" if isinstance(value, float) else str(value)
-            for value in row]  # fmt: skip
+    return [_cell(value) for value in row]
+
+
+def _cell(value: Any) -> str:
+    if not isinstance(value, float):
+        return str(value)
+    return f"{value:.9g}" if math.isfinite(value) else ""
 
 
 class RunRecorder:

@@ -2,9 +2,10 @@
 
 import os
 import sys
+import warnings
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import TextIO
+from typing import Any, TextIO
 
 MAX_MESSAGE_LENGTH = 1000  # characters: an error may quote a whole file
 
@@ -51,11 +52,18 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _run(argv: Sequence[str] | None) -> int:
     from arrivals.cli.main import run
 
-    try:
-        run(argv)
-    except SystemExit as end:  # of -h and --version
-        return end.code if isinstance(end.code, int) else 2 if end.code else 0
+    with warnings.catch_warnings():
+        warnings.showwarning = _print_warning  # type: ignore[assignment]  # its first argument
+        try:
+            run(argv)
+        except SystemExit as end:  # of -h and --version
+            return end.code if isinstance(end.code, int) else 2 if end.code else 0
     return 0
+
+
+def _print_warning(text: Warning | str, *_: Any, **__: Any) -> None:
+    with suppress(OSError):
+        print(f"arrivals: warning: {' '.join(str(text).split())}", file=sys.stderr)
 
 
 def message(error: Exception) -> str:

@@ -158,7 +158,7 @@ class Registry(Generic[Base]):
         """Import the class of an entry point; any error becomes a ValueError with its name."""
         try:
             loaded: type[Base] = point.load()
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise ValueError(
                 f"the {self.noun} {point.name!r}, {point.value}, cannot be loaded: {error}"
             ) from error

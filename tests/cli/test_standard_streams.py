@@ -4,6 +4,7 @@ import io
 import os
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
 import pytest
@@ -74,6 +75,16 @@ def test_unexpected_error_is_one_line_and_a_traceback_on_request(
     monkeypatch.setenv("ARRIVALS_DEBUG", "1")
     assert main(["list"]) == 2
     assert "Traceback" in capsys.readouterr().err
+
+
+def test_warning_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(commands, "_parser", lambda: warnings.warn("two\nlines", stacklevel=2))
+    with warnings.catch_warnings():
+        warnings.simplefilter("default")
+        main(["list"])
+    assert capsys.readouterr().err.startswith("arrivals: warning: two lines\n")
 
 
 @pytest.mark.parametrize(
