@@ -229,7 +229,7 @@ def paired(z: ArrayLike, z_pred: ArrayLike) -> tuple[Float, Float]:
     ValueError: z and z_pred must have the same shape; got (2,) and (3,)
     """
     z, z_pred = real("z", z), real("z_pred", z_pred)
-    if z.shape != z_pred.shape:
+    if z.shape not in (z_pred.shape, z_pred.shape[-1:]):
         try:
             np.broadcast(z, z_pred)
         except (ValueError, RuntimeError):
