@@ -72,7 +72,10 @@ def test_no_errors_have_no_average(value: float) -> None:
         (lambda: exact_detection(1.5, 10, 1.0), "false_alarm must lie in"),
         (lambda: exact_detection(0.1, 0, 1.0), "n_snapshots must be finite and at least 1"),
         (lambda: network_detection(0.1, [1.0, 2.0], [1.0, -1.0]), "snr must be finite"),
-        (lambda: network_detection(0.1, [1.0, 2.0], [1.0] * 3), "false_alarm, weights, snr must have shapes"),
+        (
+            lambda: network_detection(0.1, [1.0, 2.0], [1.0] * 3),
+            "false_alarm, weights, snr must have shapes",
+        ),
         (lambda: snapshot_bound(LINE, 0.1, [1.0], 0.1), "doa and amplitude must have shape"),
         (lambda: snapshot_bound(LINE, [0.1], [1.0], -0.1), "noise must be finite and not"),
         (lambda: rss_bound(NETWORK, [9.0], [[np.nan, 1.0]]), "theta must be finite"),
