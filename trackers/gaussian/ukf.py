@@ -160,13 +160,17 @@ class UKF(Queries, GaussianFilter):
         offsets = subtract(images, middle)
         shift = apply(offsets.swapaxes(-1, -2), mean_weights)
         residuals = offsets - shift[..., None, :]
-        # P_xy = Σ w_i d_i (Y_i - y)'
-        cross = (weights[:, None] * steps).swapaxes(-1, -2) @ residuals
-        # F = P_xy' P^-1
-        jacobian = np.asarray(np.linalg.solve(P, cross), np.float64).swapaxes(-1, -2)
-        # P_yy - F P_xy
-        extra_noise = weighted_covariance(residuals, weights) - jacobian @ cross
-        return Linearization(middle[..., 0, :] + shift, jacobian, extra_noise, jittered)
+        n = self.dim_x
+        plus, minus = residuals[..., 1 : n + 1, :], residuals[..., n + 1 :, :]
+        # F = P_xy' P^-1 = (L^-T G)',  G = (Y_i+ - Y_i-) / 2 sqrt(scale): as exact as L, not as P
+        slopes = (plus - minus) / (2 * np.sqrt(scale))
+        jacobian = np.linalg.solve(L.swapaxes(-1, -2), slopes).swapaxes(-1, -2)
+        # P_yy - F P_xy, of the parts of Y that are even in d_i: 0 of linear functions
+        even = np.concatenate([residuals[..., :1, :], np.sqrt(0.5) * (plus + minus)], axis=-2)
+        extra_noise = weighted_covariance(even, weights[: n + 1])
+        return Linearization(
+            middle[..., 0, :] + shift, np.asarray(jacobian, np.float64), extra_noise, jittered
+        )
 
 
 def _refuse_positional(call: str, arguments: tuple[Any, ...]) -> None:
