@@ -72,7 +72,7 @@ def interpolation_ekf() -> tuple[Tracker, Any]:
 
 
 STEPS: list[tuple[Callable[[], tuple[Tracker, Any]], int]] = [
-    (kalman, 6),
+    (kalman, 7),
     (svalse, 18),
     (rss_vb, 12),
     (interpolation_ekf, 10),

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.base import MeasurementModel
+from arrivals.measurements import LARGEST
 from arrivals.motion_models.base import MotionModel
 from arrivals.trackers.base import Tracker
 from arrivals.trackers.estimates import StateEstimate
@@ -92,8 +93,7 @@ class GaussianFilter(ModelMatrices, DeclaredAttributes, Tracker):
         self, motion: MotionModel, measurement: MeasurementModel, x: ArrayLike, P: ArrayLike
     ) -> None:
         self.motion, self.measurement = check_models(motion, measurement)
-        self.x, self.P = real("x", x), P  # type: ignore[assignment]  # made an array if a number
-        self.P = real("P", self.P)
+        self.x, self.P = real("x", x), real("P", P)  # a number becomes a matrix
         mean, _ = belief_arrays(self.x, self.P, self.dim_x)
         n, m = self.dim_x, self.dim_z
         shaped("F of the motion", self.motion.F(mean), n, n)
@@ -146,7 +146,8 @@ class GaussianFilter(ModelMatrices, DeclaredAttributes, Tracker):
             Replaces the motion model's `control` in this step.
         """
         x, P = self.belief()
-        dt = time_step(dt)
+        if type(dt) is not float or dt != self.last_dt:
+            dt = time_step(dt)
         x, P = self.predict_belief(x, P, dt, F, Q)
         self.record_prediction(self.add_control(x, u, B), P, dt)
 
@@ -209,10 +210,14 @@ class GaussianFilter(ModelMatrices, DeclaredAttributes, Tracker):
         self, z: ArrayLike | None, R: ArrayLike | None, H: Float | None
     ) -> tuple[Float, Bool | None, Float] | None:
         """Return a measurement (m,), its missing mask and its noise; None if all is missing."""
-        m = self.dim_z if H is None else len(H)
-        values, missing = measurement_and_mask(z, m)
-        if missing is not None and missing.all():
-            return None
+        m = self.held_measurement.dim_z if H is None else len(H)
+        usual = type(z) is np.ndarray and z.shape == (m,) and z.dtype == np.float64
+        if usual and z.dot(z) < LARGEST**2:  # type: ignore[union-attr]  # an array
+            values, missing = z.copy(), None  # type: ignore[union-attr]
+        else:
+            values, missing = measurement_and_mask(z, m)
+            if missing is not None and missing.all():
+                return None
         R = self.held_measurement.R if R is None else covariance_matrix("R", R, m)
         return values, missing, R if H is None else shaped("R", R, m, m)
 
@@ -228,7 +233,9 @@ class GaussianFilter(ModelMatrices, DeclaredAttributes, Tracker):
 
     def record_prediction(self, x: Float, P: Float, dt: float) -> None:
         """Set the belief and the attributes of the last prediction."""
-        check_finite(x, P)
+        entries = P.ravel()
+        if not entries.dot(entries) < np.inf:  # faster than isfinite
+            check_finite(x, P)
         if type(self.x) is not np.ndarray or self.x.ndim > 1:
             x = x.reshape(np.shape(self.x))
         # faster than assignments, which are checked
@@ -268,6 +275,11 @@ class GaussianFilter(ModelMatrices, DeclaredAttributes, Tracker):
         self.z, self.y = np.full(shape, np.nan), np.zeros(shape)
         self.log_likelihood = self.mahalanobis = 0.0
         self.x_post, self.P_post = np.array(self.x), np.array(self.P)
+
+    @property
+    def state_angles(self) -> tuple[int, ...]:
+        """Entries of the state that are angles."""
+        return self.held_angles
 
     @property
     def likelihood(self) -> float:

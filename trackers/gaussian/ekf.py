@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+from numpy.typing import ArrayLike
+
 from arrivals.trackers.gaussian.base import GaussianFilter
+from arrivals.trackers.gaussian.filterpy_names.function_updates import (
+    has_functions,
+    predict_update,
+    predict_x,
+    update_by_functions,
+)
+from arrivals.trackers.gaussian.filterpy_names.queries import FadingMemory, Queries
 from arrivals.trackers.gaussian.linearization import Linearization, at_each
 from arrivals.trackers.registry import register
 from arrivals.typing import Float
 
 
 @register("ekf")
-class EKF(GaussianFilter):
+class EKF(FadingMemory, Queries, GaussianFilter):
     """Extended Kalman filter: models linearized by their Jacobians at the mean.
 
     Parameters
@@ -42,6 +53,25 @@ class EKF(GaussianFilter):
     >>> tracker.x.round(1)
     array([5., 5.])
     """
+
+    predict_update = predict_update
+    predict_x = predict_x
+
+    def update(self, z: ArrayLike | None, *arguments: Any, **named: Any) -> None:
+        """Update mean and covariance by a measurement.
+
+        Parameters
+        ----------
+        z : array_like, shape (m,) or (m, 1), or float
+            None or NaN where it is missing; the valid entries are used.
+        *arguments, **named
+            R and H, as in `GaussianFilter.update`; or filterpy's: HJacobian, Hx, R, args, hx_args,
+            residual, which replace the measurement model in this update.
+        """
+        if (arguments or named) and has_functions(arguments, named):
+            update_by_functions(self, z, *arguments, **named)
+        else:
+            super().update(z, *arguments, **named)
 
     def linearize_motion(self, x: Float, P: Float, dt: float) -> Linearization:
         """Return f(x) and its Jacobian."""

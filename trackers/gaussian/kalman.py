@@ -17,6 +17,13 @@ from arrivals.trackers.gaussian.arguments import (
 )
 from arrivals.trackers.gaussian.base import GaussianFilter
 from arrivals.trackers.gaussian.equations import predict_gaussian, update_gaussian
+from arrivals.trackers.gaussian.filterpy_names.kalman_updates import (
+    predict_steadystate,
+    update_correlated,
+    update_sequential,
+    update_steadystate,
+)
+from arrivals.trackers.gaussian.filterpy_names.queries import FadingMemory, Queries
 from arrivals.trackers.gaussian.linalg import apply
 from arrivals.trackers.gaussian.linearization import Linearization
 from arrivals.trackers.registry import register
@@ -27,7 +34,7 @@ ArrayFunction = Callable[[Float], Float]
 
 
 @register("kalman")
-class Kalman(GaussianFilter):
+class Kalman(FadingMemory, Queries, GaussianFilter):
     """Kalman filter, for linear models.
 
     Parameters
@@ -41,6 +48,13 @@ class Kalman(GaussianFilter):
     P : array_like, shape (n, n)
         Initial covariance.
 
+    Attributes
+    ----------
+    M : ndarray, shape (n, m)
+        Correlation E[w v'] of the noises of motion and measurement, for `update_correlated`.
+    alpha : float
+        Factor of fading memory: P = alpha² F P F' + Q.
+
     Raises
     ------
     TypeError
@@ -48,7 +62,7 @@ class Kalman(GaussianFilter):
 
     Notes
     -----
-    Attributes and methods are those of `GaussianFilter`. Results equal those of
+    Further attributes and methods are those of `GaussianFilter`. Results equal those of
     `filterpy.kalman.KalmanFilter`.
 
     References
@@ -73,6 +87,12 @@ class Kalman(GaussianFilter):
     ) -> None:
         super().__init__(motion, measurement, x, P)
         check_linear(motion, measurement)
+        self.M = np.zeros((self.dim_x, self.dim_z))
+
+    predict_steadystate = predict_steadystate
+    update_steadystate = update_steadystate
+    update_sequential = update_sequential
+    update_correlated = update_correlated
 
     def predict(
         self,
@@ -85,13 +105,15 @@ class Kalman(GaussianFilter):
     ) -> None:
         """Predict mean and covariance; parameters as in `GaussianFilter.predict`."""
         x, P = self.belief()
-        n, dt = len(x), time_step(dt)
+        n = len(x)
+        if type(dt) is not float or dt != self.last_dt:
+            dt = time_step(dt)
         F = self.held_motion.F(x, dt) if F is None else finite_matrix("F", F, n, n)
         Q = self.held_motion.Q(dt) if Q is None else covariance_matrix("Q", Q, n)
         # x = F x + B u   (4.20)
         x = self.add_control(F.dot(x), u, B)
         # P = F P F' + Q   (4.20)
-        P = predict_gaussian(P, F, Q)
+        P = predict_gaussian(P, F, Q, self.fading)
         self.record_prediction(x, P, dt)
 
     def update(

@@ -89,7 +89,7 @@ def predict_belief(
     # f(x + d) = f + F d + e,  e ~ (0, Q)
     motion, Q = linear_step(tracker, x, P, dt, F, Q)
     # x = f,  P = F P F' + Q
-    return motion.mean, predict_gaussian(P, motion.jacobian, Q)
+    return motion.mean, predict_gaussian(P, motion.jacobian, Q, tracker.fading)
 
 
 def update_belief(

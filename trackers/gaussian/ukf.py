@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,6 +12,8 @@ from arrivals.measurement_models.base import MeasurementModel
 from arrivals.motion_models.base import MotionModel
 from arrivals.trackers.gaussian.base import GaussianFilter
 from arrivals.trackers.gaussian.circular import difference, weighted_covariance, wrapped
+from arrivals.trackers.gaussian.filterpy_names.attributes import Elsewhere
+from arrivals.trackers.gaussian.filterpy_names.queries import Queries
 from arrivals.trackers.gaussian.linalg import apply, cholesky
 from arrivals.trackers.gaussian.linearization import Linearization
 from arrivals.trackers.registry import register
@@ -36,7 +39,7 @@ def merwe_weights(n: int, alpha: float, beta: float, kappa: float) -> tuple[Floa
 
 
 @register("ukf")
-class UKF(GaussianFilter):
+class UKF(Queries, GaussianFilter):
     """Unscented Kalman filter: models linearized by regression over Merwe's sigma points.
 
     Parameters
@@ -87,6 +90,18 @@ class UKF(GaussianFilter):
     array([5., 5.])
     """
 
+    alpha: float = 0.5  # of the sigma points
+    fx = Elsewhere("assign motion, a FunctionMotion(fx, Q=...)")
+    hx = Elsewhere("assign measurement, a FunctionMeasurement(hx, R=...)")
+    points_fn = Elsewhere("set alpha, beta and kappa of the sigma points")
+    Wm = Wc = Elsewhere("call merwe_weights(dim_x, alpha, beta, kappa)")
+    sigmas_f = sigmas_h = Elsewhere("sigma points are drawn in each step from x and P")
+    compute_process_sigmas = Elsewhere("call linearize_motion(x, P, dt)")
+    cross_variance = Elsewhere("call linearize_measurement(x, P): its jacobian is P_xz' P^-1")
+    msqrt = Elsewhere("the square root is the Cholesky factor")
+    x_mean = residual_x = state_add = Elsewhere("give the motion model `angles`")
+    z_mean = residual_z = Elsewhere("give the measurement model a `residual`")
+
     def __init__(
         self,
         motion: MotionModel,
@@ -102,6 +117,16 @@ class UKF(GaussianFilter):
         self.kappa = number("kappa", kappa)
         if not kappa > -self.dim_x:
             raise ValueError(f"kappa must be above -{self.dim_x}; got {kappa}")
+
+    def batch_filter(self, zs: Any, *arguments: Any, **named: Any) -> Any:
+        """Filter a sequence; arguments by name, as in `GaussianFilter.batch_filter`."""
+        _refuse_positional("batch_filter(zs, Rs=..., dts=..., saver=...)", arguments)
+        return super().batch_filter(zs, **named)
+
+    def rts_smoother(self, Xs: Any, Ps: Any, *arguments: Any, **named: Any) -> Any:
+        """Smooth a sequence; arguments by name, as in `GaussianFilter.rts_smoother`."""
+        _refuse_positional("rts_smoother(Xs, Ps, Qs=..., dts=...)", arguments)
+        return super().rts_smoother(Xs, Ps, **named)
 
     def linearize_motion(self, x: Float, P: Float, dt: float) -> Linearization:
         """Return the regression of f over the sigma points."""
@@ -135,13 +160,23 @@ class UKF(GaussianFilter):
         offsets = subtract(images, middle)
         shift = apply(offsets.swapaxes(-1, -2), mean_weights)
         residuals = offsets - shift[..., None, :]
-        # P_xy = Σ w_i d_i (Y_i - y)'
-        cross = (weights[:, None] * steps).swapaxes(-1, -2) @ residuals
-        # F = P_xy' P^-1
-        jacobian = np.asarray(np.linalg.solve(P, cross), np.float64).swapaxes(-1, -2)
-        # P_yy - F P_xy
-        extra_noise = weighted_covariance(residuals, weights) - jacobian @ cross
-        return Linearization(middle[..., 0, :] + shift, jacobian, extra_noise, jittered)
+        n = self.dim_x
+        plus, minus = residuals[..., 1 : n + 1, :], residuals[..., n + 1 :, :]
+        # F = P_xy' P^-1 = (L^-T G)',  G = (Y_i+ - Y_i-) / 2 sqrt(scale): as exact as L, not as P
+        slopes = (plus - minus) / (2 * np.sqrt(scale))
+        jacobian = np.linalg.solve(L.swapaxes(-1, -2), slopes).swapaxes(-1, -2)
+        # P_yy - F P_xy, of the parts of Y that are even in d_i: 0 of linear functions
+        even = np.concatenate([residuals[..., :1, :], np.sqrt(0.5) * (plus + minus)], axis=-2)
+        extra_noise = weighted_covariance(even, weights[: n + 1])
+        return Linearization(
+            middle[..., 0, :] + shift, np.asarray(jacobian, np.float64), extra_noise, jittered
+        )
+
+
+def _refuse_positional(call: str, arguments: tuple[Any, ...]) -> None:
+    """Refuse arguments by position, whose order in filterpy's unscented filter is another."""
+    if arguments:
+        raise TypeError(f"arguments must be passed by name, {call}; got {len(arguments)} without")
 
 
 def _sigma_steps(L: Float) -> Float:

@@ -54,14 +54,16 @@ class Elsewhere:
     ...     mug = Elsewhere("use fill")
     >>> Cup().mug
     Traceback (most recent call last):
-    AttributeError: Cup has no attribute 'mug': use fill
+    AttributeError: Cup does not have mug of filterpy: use fill
     """
 
     def __init__(self, cure: str) -> None:
         self.cure = cure
 
+        self.names: list[str] = []
+
     def __set_name__(self, owner: type, name: str) -> None:
-        self.name = name
+        self.names.append(name)
 
     def __get__(self, owner: object, kind: type) -> Any:
         if owner is None:
@@ -73,7 +75,8 @@ class Elsewhere:
 
     def message(self, kind: type) -> str:
         """Return the sentence for a class of trackers."""
-        return f"{kind.__name__} has no attribute {self.name!r}: {self.cure}"
+        names = ", ".join(self.names)
+        return f"{kind.__name__} does not have {names} of filterpy: {self.cure}"
 
 
 def annotated(kind: type, name: str) -> bool:

@@ -13,7 +13,6 @@ from arrivals.trackers.gaussian.arguments import (
     control_matrix,
     covariance_matrix,
     finite_matrix,
-    overrides,
 )
 from arrivals.trackers.gaussian.filterpy_names.replaced_models import (
     replace_measurement,
@@ -70,6 +69,8 @@ class ModelMatrices:
     ----------
     held_motion, held_measurement : MotionModel, MeasurementModel
         The models, as of the last step.
+    held_angles : tuple of int
+        Entries of the state of the motion that are angles.
     handed : dict of str to tuple
         Arrays that a user may write to, and their bytes when they were last read.
     last_dt : float
@@ -78,10 +79,17 @@ class ModelMatrices:
 
     x: Float
     held_motion: MotionModel
+    held_angles: tuple[int, ...]
     held_measurement: MeasurementModel
     handed: dict[str, tuple[Float, bytes]]
     last_dt: float
     linear_only = False  # True where models are linear even if they do not say so
+    fading = 1.0  # factor of F P F', above 1 for a fading memory
+
+    @property
+    def alpha(self) -> float:
+        """Factor of fading memory: 1, none, unless a filter has one."""
+        return 1.0
 
     @property
     def motion(self) -> MotionModel:
@@ -91,7 +99,7 @@ class ModelMatrices:
 
     @motion.setter
     def motion(self, motion: MotionModel) -> None:
-        self.held_motion = motion
+        self.hold_motion(motion)
         self._forget(OF_MOTION)
 
     @property
@@ -105,16 +113,14 @@ class ModelMatrices:
         self.held_measurement = measurement
         self._forget(OF_MEASUREMENT)
 
+    def hold_motion(self, motion: MotionModel) -> None:
+        """Set the model of the next step."""
+        self.held_motion, self.held_angles = motion, motion.angles
+
     @property
     def state_motion(self) -> MotionModel:
         """Motion of the whole state: `motion`, unless a method adds entries to the state."""
         return self.held_motion
-
-    @property
-    def state_angles(self) -> tuple[int, ...]:
-        """Entries of the state that are angles."""
-        motion = self.state_motion
-        return motion.angles if overrides(type(motion), MotionModel, "angles") else ()
 
     @property
     def dim_x(self) -> int:
@@ -239,7 +245,8 @@ class ModelMatrices:
             motion = replace_motion(motion, of_motion)
         if of_measurement:
             measurement = replace_measurement(measurement, of_measurement)
-        self.held_motion, self.held_measurement = motion, measurement
+        self.hold_motion(motion)
+        self.held_measurement = measurement
         self._hand_out(changes)
 
     def _checked(self, name: str, value: Any) -> Any:

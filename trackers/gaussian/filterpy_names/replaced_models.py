@@ -13,6 +13,7 @@ from arrivals.measurement_models.base import MeasurementModel
 from arrivals.measurement_models.linear import LinearMeasurement
 from arrivals.motion_models.base import MotionModel
 from arrivals.motion_models.linear import LinearMotion
+from arrivals.trackers.gaussian.circular import wrapped
 from arrivals.typing import Float
 from arrivals.validation import state
 
@@ -69,7 +70,7 @@ class ReplacedMotion(MotionModel):
         """Return the states after `dt`, without noise: (..., dim_x) -> (..., dim_x)."""
         if self.transition is None:
             return self.motion.f(x, dt)
-        return np.asarray(state(x, self.dim_x) @ self.F(x, dt).T)
+        return wrapped(np.asarray(state(x, self.dim_x) @ self.F(x, dt).T), self.angles)
 
     def F(self, x: ArrayLike, dt: float = 1.0) -> Float:
         """Return the Jacobian of `f` at one state, (dim_x, dim_x)."""
