@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import time
+import warnings
 from abc import abstractmethod
 from collections.abc import Iterable, Sequence
 from itertools import zip_longest
@@ -12,6 +13,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from arrivals.measurement_models.direction_measurement import DirectionMeasurement
 from arrivals.measurements import rows
 from arrivals.trackers.base import Tracker
 from arrivals.trackers.estimates import DirectionEstimate
@@ -48,6 +50,29 @@ def padded(values: Float | Int | Bool, n: int, filler: float) -> Float:
     full = np.full(n, filler)
     full[: len(values[:n])] = values[:n]
     return full
+
+
+def warn_of_ambiguity(measurement: DirectionMeasurement) -> None:
+    """Warn if two directions have the same response at every frequency.
+
+    Parameters
+    ----------
+    measurement : DirectionMeasurement
+        Model of a tracker that is constructed.
+
+    Warns
+    -----
+    UserWarning
+        With the two directions, degrees.
+    """
+    if (pair := measurement.ambiguity()) is not None:
+        one, other = np.rad2deg(pair)
+        warnings.warn(
+            f"directions {one:.1f} and {other:.1f} degrees are ambiguous: they have the same "
+            "response at every frequency, so sources may be reported at either. Several "
+            "frequencies, or a smaller spacing of the sensors, resolve them",
+            stacklevel=4,
+        )
 
 
 class DirectionTracker(Tracker):

@@ -10,7 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.arrays.plane_waves import PlaneWaves
-from arrivals.measurement_models.manifolds.manifold import Reference
+from arrivals.measurement_models.manifolds.manifold import (
+    UNIFORM_STD_OF_CIRCLE,
+    UNIFORM_STD_OF_LINE,
+    Reference,
+)
 from arrivals.typing import Complex, Float, Int
 
 NEGLIGIBLE = 1e-9  # of the largest harmonic
@@ -119,8 +123,9 @@ class FourierManifold:
         return np.where(np.abs(doa) > np.pi / 2, np.copysign(np.pi, doa) - doa, doa)
 
     def doa_std(self, theta: ArrayLike, std: ArrayLike) -> Float:
-        """Return the standard deviations as they are: the angle is the direction."""
-        return np.array(std, dtype=np.float64)
+        """Return the standard deviations, at most that of a uniform direction."""
+        limit = UNIFORM_STD_OF_LINE if self.front_back_ambiguous else UNIFORM_STD_OF_CIRCLE
+        return np.minimum(np.asarray(std, dtype=np.float64), limit)
 
     def slope(self, theta: ArrayLike) -> Float:
         """Return 1: the angle is the direction."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Literal, Protocol
 
@@ -10,6 +11,8 @@ from numpy.typing import ArrayLike
 from arrivals.typing import Complex, Float, Int
 
 Reference = Literal["middle", "first"]
+UNIFORM_STD_OF_LINE = math.pi / math.sqrt(12)  # rad, of a uniform direction in ±90°
+UNIFORM_STD_OF_CIRCLE = 2 * math.pi / math.sqrt(12)
 
 
 class Manifold(Protocol):

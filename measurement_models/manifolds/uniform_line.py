@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.arrays.sensor_array import SensorArray
-from arrivals.measurement_models.manifolds.manifold import Reference
+from arrivals.measurement_models.manifolds.manifold import UNIFORM_STD_OF_LINE, Reference
 from arrivals.typing import Complex, Float, Int
 from arrivals.validation import one_of
 
@@ -108,11 +108,11 @@ class UniformLineManifold:
         return np.where(beyond, np.nan, np.arcsin(np.minimum(np.maximum(sine, -1), 1)))
 
     def doa_std(self, theta: ArrayLike, std: ArrayLike) -> Float:
-        """Return half the width of the directions of θ ± std, which stays finite at endfire."""
+        """Return half the width of the directions of θ ± std, at most that of a uniform one."""
         inside = np.clip(np.asarray(theta, dtype=np.float64), -self.step, self.step)
         ends = (inside + np.multiply.outer([-1.0, 1.0], np.asarray(std))) / self.step
         low, high = np.arcsin(np.clip(ends, -1, 1))
-        return np.asarray((high - low) / 2)
+        return np.minimum((high - low) / 2, UNIFORM_STD_OF_LINE)
 
     def slope(self, theta: ArrayLike) -> Float:
         """Return dθ/dβ = 2π d/λ cos β, with a cosine of at least 0.1."""

@@ -9,7 +9,9 @@ from arrivals.trackers.beamforming.covariance import (
 from arrivals.trackers.beamforming.mvdr import MVDR, capon_power
 from arrivals.trackers.beamforming.spectrum import (
     bartlett_power,
+    ends_coincide,
     find_peaks,
+    local_maxima,
     mean_beam_power,
     parabolic_peak,
     refine_peaks,
@@ -24,7 +26,9 @@ __all__ = [
     "bartlett_power",
     "capon_power",
     "diagonal_loading",
+    "ends_coincide",
     "find_peaks",
+    "local_maxima",
     "mean_beam_power",
     "parabolic_peak",
     "refine_peaks",

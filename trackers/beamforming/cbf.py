@@ -8,14 +8,15 @@ from numpy.typing import ArrayLike
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.trackers.beamforming.spectrum import (
     bartlett_power,
+    ends_coincide,
     find_peaks,
     mean_beam_power,
     refine_peaks,
     scan_directions,
 )
-from arrivals.trackers.direction_tracker import DirectionTracker
+from arrivals.trackers.direction_tracker import DirectionTracker, warn_of_ambiguity
 from arrivals.trackers.registry import register
-from arrivals.typing import Complex, Float
+from arrivals.typing import Bool, Complex, Float
 from arrivals.validation import count, instance, no_control, positive, time_step
 
 
@@ -73,6 +74,7 @@ class CBF(DirectionTracker):
         self.max_sources = max_sources
         if max_sources is not None:
             count("max_sources", max_sources)
+        warn_of_ambiguity(measurement)
         self.reset()
 
     def reset(self) -> None:
@@ -101,10 +103,22 @@ class CBF(DirectionTracker):
         array = self.measurement.array
         self.doa_grid = scan_directions(array, self.n_directions)
         self.power = self._scan(z)
-        peaks = find_peaks(self.power, circular=array.dim > 1)
+        peaks = find_peaks(self.power, circular=array.dim > 1, joined=self._has_joined_ends(z))
         high = self.power[peaks] > self.power.max() * 10 ** (-self.threshold_db / 10)
         doa = refine_peaks(self.doa_grid, self.power, peaks[high][: self.n_slots])
         self.report(doa, amplitude=self._amplitude(doa, z))
+
+    def scanned_sensors(self, z: Complex) -> Bool:
+        """Return the sensors of the spectrum after a snapshot or several, (n_sensors,)."""
+        return np.asarray(~np.isnan(z).all(axis=tuple(range(z.ndim - 1))))
+
+    def _has_joined_ends(self, z: Complex) -> bool:
+        """Return True if the two ends of a line's scan are one direction."""
+        if self.measurement.array.dim > 1:
+            return False
+        sensors = self.scanned_sensors(z)
+        first, last = self.measurement.steering_vector(self.doa_grid[[0, -1]])[..., sensors]
+        return ends_coincide(first, last)
 
     def _scan(self, z: Complex) -> Float:
         model = self.measurement

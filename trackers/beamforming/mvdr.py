@@ -126,6 +126,10 @@ class MVDR(RunningCovariance, CBF):
         A = A if sensors.all() else A[:, sensors]
         return capon_power(A, self._loaded_covariance(sensors))
 
+    def scanned_sensors(self, z: Complex) -> Bool:
+        """Return the sensors of the spectrum: those with enough data."""
+        return self.sensors_with_data()
+
     def amplitudes(self, A: Complex, z: Complex) -> Complex:
         """Return wᴴz, w = R⁻¹a / aᴴR⁻¹a over the sensors with valid data."""
         if len(A) == 0:

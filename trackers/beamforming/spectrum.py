@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.arrays.sensor_array import SensorArray
-from arrivals.typing import Complex, Float, Int
+from arrivals.typing import Bool, Complex, Float, Int
+
+MAX_COHERENCE_OF_ENDS = 0.1  # of responses at ±90° of a line that count as two directions
 
 
 def scan_directions(array: SensorArray, n: int) -> Float:
@@ -125,7 +127,7 @@ def mean_beam_power(A: Complex, Y: Complex) -> Float:
     return np.asarray(power.sum(axis=(1, 3)).max(axis=0) / n_valid)
 
 
-def find_peaks(power: Float, *, circular: bool) -> Int:
+def find_peaks(power: Float, *, circular: bool, joined: bool = False) -> Int:
     """Return the indices of the local maxima of a spectrum, the highest first.
 
     Parameters
@@ -133,8 +135,10 @@ def find_peaks(power: Float, *, circular: bool) -> Int:
     power : ndarray, shape (n_directions,)
         Spectrum on a scan grid.
     circular : bool
-        True if the first direction follows the last. The ends of a line's spectrum are never
-        peaks.
+        True if the first direction follows the last. The ends of a line's spectrum are peaks if
+        they exceed their neighbours.
+    joined : bool
+        True if the ends of a line's spectrum are one peak at most: `ends_coincide`.
 
     Returns
     -------
@@ -143,16 +147,68 @@ def find_peaks(power: Float, *, circular: bool) -> Int:
 
     Examples
     --------
-    >>> find_peaks(np.array([9.0, 1.0, 3.0, 2.0, 4.0, 0.0]), circular=False)
-    array([4, 2])
+    >>> power = np.array([9.0, 1.0, 3.0, 2.0, 4.0, 5.0])
+    >>> find_peaks(power, circular=False), find_peaks(power, circular=False, joined=True)
+    (array([0, 5, 2]), array([0, 2]))
     """
     rise = 1e-9 * power.max()  # the ripple of a flat spectrum is rounding
-    around = np.concatenate([power[-1:], power, power[:1]])
-    is_peak = (power > around[:-2] + rise) & (power >= around[2:])
-    if not circular:
-        is_peak[[0, -1]] = False
-    peaks = is_peak.nonzero()[0]
+    peaks = local_maxima(power, circular=circular, joined=joined, rise=rise).nonzero()[0]
     return np.asarray(peaks[np.argsort(-power[peaks], kind="stable")])
+
+
+def local_maxima(power: Float, *, circular: bool, joined: bool, rise: float = 0.0) -> Bool:
+    """Return the mask of the local maxima of spectra.
+
+    Parameters
+    ----------
+    power : ndarray, shape (..., n_directions)
+        Spectra on a scan grid.
+    circular, joined : bool
+        As in `find_peaks`.
+    rise : float
+        Minimum difference to the neighbours.
+
+    Returns
+    -------
+    ndarray of bool, shape (..., n_directions)
+    """
+    around = np.concatenate([power[..., -1:], power, power[..., :1]], axis=-1)
+    if not circular:  # a line's spectrum is even about its ends
+        around[..., 0], around[..., -1] = power[..., 1], power[..., -2]
+    is_peak = (power > around[..., :-2] + rise) & (power >= around[..., 2:])
+    if joined and not circular:
+        first, last = power[..., 0], power[..., -1]
+        inner = np.maximum(power[..., 1], power[..., -2]) + rise
+        at_last = last > first + rise
+        is_peak[..., 0], is_peak[..., -1] = ~at_last & (first > inner), at_last & (last > inner)
+    return np.asarray(is_peak)
+
+
+def ends_coincide(first: Complex, last: Complex) -> bool:
+    """Return True if an array does not resolve the two ends of a line's scan.
+
+    At a spacing of half a wavelength -90 and 90 degrees have one response; slightly below, the
+    main lobe of a source at one end reaches the other.
+
+    Parameters
+    ----------
+    first, last : ndarray, shape (..., n_sensors)
+        Steering vectors of the first and the last direction.
+
+    Returns
+    -------
+    bool
+        True if the mean of |aᴴb|² / ‖a‖²‖b‖² is above 0.1.
+
+    Examples
+    --------
+    >>> doa = [-np.pi / 2, np.pi / 2]
+    >>> [ends_coincide(*SensorArray.ula(8, d).steering_vector(doa, 1.0)) for d in (0.5, 0.4)]
+    [True, False]
+    """
+    product = (first.conj() * last).sum(axis=-1)
+    norms = (np.abs(first) ** 2).sum(axis=-1) * (np.abs(last) ** 2).sum(axis=-1)
+    return bool((np.abs(product) ** 2 / norms).mean() > MAX_COHERENCE_OF_ENDS)
 
 
 def refine_peaks(doa_grid: Float, power: Float, peaks: Int) -> Float:
@@ -196,15 +252,20 @@ def parabolic_peak(doa_grid: Float, level: Float, peaks: Int) -> Float:
     Returns
     -------
     ndarray, shape (n_peaks,)
-        Directions, rad, at most half a grid step from the peaks.
+        Directions, rad, at most half a grid step from the peaks; of a circle in [-π, π).
 
     Examples
     --------
     >>> parabolic_peak(np.arange(4.0), np.array([3.0, 4.0, 4.0, 3.0]), np.array([1]))
     array([1.5])
     """
-    left, middle, right = level[peaks - 1], level[peaks], level[(peaks + 1) % len(level)]
+    n, step = len(level), doa_grid[1] - doa_grid[0]
+    before, after = peaks - 1, (peaks + 1) % n
+    is_circle = doa_grid[-1] - doa_grid[0] + step > 2 * np.pi * (1 - 1e-9)
+    if not is_circle:  # even about the ends
+        before, after = np.where(peaks == 0, 1, before), np.where(peaks == n - 1, n - 2, after)
+    left, middle, right = level[before], level[peaks], level[after]
     bend = 2 * middle - left - right
     shift = (right - left) / (2 * np.where(bend > 0, bend, np.inf))
-    step = doa_grid[1] - doa_grid[0]
-    return np.asarray(doa_grid[peaks] + step * np.maximum(np.minimum(shift, 0.5), -0.5))
+    doa = doa_grid[peaks] + step * np.maximum(np.minimum(shift, 0.5), -0.5)
+    return np.where(is_circle & (doa < -np.pi), doa + 2 * np.pi, doa)

@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import copy
 import inspect
+import warnings
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
+from arrivals.measurement_models.manifolds.manifold import (
+    UNIFORM_STD_OF_CIRCLE,
+    UNIFORM_STD_OF_LINE,
+)
 from arrivals.measurements import numbers
 from arrivals.motion_models.base import MotionModel
 from arrivals.motion_models.linear import ConstantVelocity
 from arrivals.motion_models.von_mises import wrap
 from arrivals.trackers.base import Tracker
-from arrivals.trackers.direction_tracker import DirectionTracker
+from arrivals.trackers.direction_tracker import DirectionTracker, warn_of_ambiguity
 from arrivals.trackers.estimates import DirectionEstimate
 from arrivals.trackers.multi_target.track_bank import TrackBank, nearest
 from arrivals.trackers.registry import find, register
@@ -103,6 +108,7 @@ class PeaksGNN(DirectionTracker):
         self.max_sources = max_sources
         if max_sources is not None:
             count("max_sources", max_sources)
+        warn_of_ambiguity(measurement)
         self.reset()
 
     def reset(self) -> None:
@@ -170,7 +176,9 @@ class PeaksGNN(DirectionTracker):
                 f"detector must require only the argument measurement; got {self.detector!r}, "
                 f"which requires {', '.join(required)}"
             )
-        return kind(measurement=self.measurement)  # type: ignore[call-arg]  # checked above
+        with warnings.catch_warnings():  # the constructor has warned
+            warnings.filterwarnings("ignore", "directions .* are ambiguous", UserWarning)
+            return kind(measurement=self.measurement)  # type: ignore[call-arg]  # checked above
 
     def _no_amplitude(self) -> Complex:
         return np.full(self.n_slots, complex(np.nan, np.nan))
@@ -185,8 +193,8 @@ class PeaksGNN(DirectionTracker):
     @property
     def _max_variance(self) -> float:
         """Variance of a uniform direction, rad²."""
-        span = np.pi if self.measurement.array.dim == 1 else 2 * np.pi
-        return span**2 / 12
+        is_line = self.measurement.array.dim == 1
+        return (UNIFORM_STD_OF_LINE if is_line else UNIFORM_STD_OF_CIRCLE) ** 2
 
     def _initial_covariance(self) -> Float:
         variances = np.full(self.motion.dim_x, self.speed_std**2)

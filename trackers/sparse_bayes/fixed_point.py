@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from arrivals.parameters import FrozenModel
+from arrivals.trackers.beamforming.spectrum import ends_coincide, local_maxima
 from arrivals.typing import Bool, Complex, Float, Int
 from arrivals.validation import count, positive
 
@@ -98,12 +99,13 @@ class FixedPointSolver(FrozenModel):
         B = len(Y)
         smallest, at = np.full(B, np.inf), np.zeros(B, dtype=np.int64)
         best = PowerEstimate(gamma.copy(), np.full(B, noise), *np.zeros((2, B), dtype=np.int64))
+        joined = not circular and ends_coincide(A[0], A[-1])
         converged, active = np.zeros(B, dtype=np.bool_), np.arange(B)
         sigma2 = best.noise.copy()
         for iteration in range(1, self.max_iterations + 1):
             old, y = gamma, Y[active]
             gamma = update_powers(A, y, old, sigma2)
-            sigma2 = residual_noise(A, y, gamma, circular)
+            sigma2 = residual_noise(A, y, gamma, circular, joined)
             total = gamma.sum(axis=-1)
             change = np.abs(gamma - old).sum(axis=-1) / np.where(total > 0, total, 1.0)
             better = change < smallest[active]
@@ -153,7 +155,9 @@ def update_powers(A: Complex, Y: Complex, gamma: Float, noise: Float) -> Float:
     return np.asarray(gamma * numerator / np.einsum("bim,im->bi", filters, A).real)
 
 
-def residual_noise(A: Complex, Y: Complex, gamma: Float, circular: bool) -> Float:
+def residual_noise(
+    A: Complex, Y: Complex, gamma: Float, circular: bool, joined: bool = False
+) -> Float:
     """Return σ² = tr[(I - A_M A_M⁺) S] / (M - K), A_M the K = ⌈M/2⌉ highest peaks of γ.
 
     Parameters
@@ -164,8 +168,8 @@ def residual_noise(A: Complex, Y: Complex, gamma: Float, circular: bool) -> Floa
         Snapshots of covariance S.
     gamma : ndarray, shape (B, n_directions)
         Powers.
-    circular : bool
-        True if the first direction follows the last.
+    circular, joined : bool
+        As in `find_peaks`.
 
     Returns
     -------
@@ -174,7 +178,7 @@ def residual_noise(A: Complex, Y: Complex, gamma: Float, circular: bool) -> Floa
     """
     n_sensors, n_snapshots = Y.shape[-2:]
     K = min(-(-n_sensors // 2), n_sensors - 1)
-    peaks, exists = highest_peaks(gamma, K, circular)
+    peaks, exists = highest_peaks(gamma, K, circular, joined)
     columns = np.swapaxes(np.where(exists[..., None], A[peaks], 0), -1, -2)  # missing peaks last
     Q = np.linalg.qr(columns)[0]
     projection = np.swapaxes(Q.conj(), -1, -2) @ Y
@@ -184,7 +188,7 @@ def residual_noise(A: Complex, Y: Complex, gamma: Float, circular: bool) -> Floa
     return np.asarray(np.maximum(residual, NOISE_FLOOR * power / (n_snapshots * n_sensors)))
 
 
-def highest_peaks(gamma: Float, n: int, circular: bool) -> tuple[Int, Bool]:
+def highest_peaks(gamma: Float, n: int, circular: bool, joined: bool = False) -> tuple[Int, Bool]:
     """Return the indices of the n highest local maxima.
 
     Parameters
@@ -193,8 +197,8 @@ def highest_peaks(gamma: Float, n: int, circular: bool) -> tuple[Int, Bool]:
         Powers.
     n : int
         Number of peaks.
-    circular : bool
-        True if the first direction follows the last.
+    circular, joined : bool
+        As in `find_peaks`.
 
     Returns
     -------
@@ -208,11 +212,9 @@ def highest_peaks(gamma: Float, n: int, circular: bool) -> tuple[Int, Bool]:
     >>> gamma = np.array([9.0, 1.0, 3.0, 2.0, 4.0, 0.0])
     >>> peaks, exists = highest_peaks(gamma, 3, circular=False)
     >>> peaks[exists]
-    array([4, 2])
+    array([0, 4, 2])
     """
-    is_peak = (gamma > np.roll(gamma, 1, axis=-1)) & (gamma >= np.roll(gamma, -1, axis=-1))
-    if not circular:
-        is_peak[..., [0, -1]] = False
+    is_peak = local_maxima(gamma, circular=circular, joined=joined)
     order = np.argsort(-np.where(is_peak, gamma, -1), axis=-1, kind="stable")[..., :n]
     return order, np.take_along_axis(is_peak, order, axis=-1)
 

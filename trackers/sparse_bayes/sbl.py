@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurements import numbers
-from arrivals.trackers.beamforming.spectrum import scan_directions
-from arrivals.trackers.direction_tracker import BatchDirectionTracker
+from arrivals.trackers.beamforming.spectrum import ends_coincide, scan_directions
+from arrivals.trackers.direction_tracker import BatchDirectionTracker, warn_of_ambiguity
 from arrivals.trackers.registry import register
 from arrivals.trackers.sparse_bayes.fixed_point import (
     FixedPointSolver,
@@ -113,6 +113,7 @@ class SBL(BatchDirectionTracker):
         if max_sources is not None:
             count("max_sources", max_sources)
         self.solver = instance("solver", solver, FixedPointSolver)
+        warn_of_ambiguity(measurement)
         self.reset()
 
     def reset(self) -> None:
@@ -192,7 +193,10 @@ class SBL(BatchDirectionTracker):
         """Report the peaks of one solution of a batch."""
         self.gamma = gamma = powers.gamma[index]
         self.doa_grid = grid = scan_directions(self.measurement.array, self.n_directions)
-        peaks, exists = highest_peaks(gamma, min(self.n_slots, len(grid)), self.circular)
+        ends = self._steering_matrix(grid[[0, -1]], block.valid_sensors)
+        joined = not self.circular and ends_coincide(*ends)
+        n_peaks = min(self.n_slots, len(grid))
+        peaks, exists = highest_peaks(gamma, n_peaks, self.circular, joined)
         doa = grid[peaks[exists & (gamma[peaks] > self.threshold * gamma[peaks[0]])]]
         A = self._steering_matrix(doa, block.valid_sensors)
         self.report(

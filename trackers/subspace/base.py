@@ -12,7 +12,7 @@ from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.manifolds.uniform_line import UniformLineManifold
 from arrivals.trackers.beamforming.covariance import has_enough_data
 from arrivals.trackers.beamforming.source_number import number_of_sources
-from arrivals.trackers.direction_tracker import DirectionTracker
+from arrivals.trackers.direction_tracker import DirectionTracker, warn_of_ambiguity
 from arrivals.typing import Bool, Complex, Float
 from arrivals.validation import count, instance, no_control, one_of, probability, time_step
 
@@ -145,6 +145,7 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
         elif n_sources is not None:
             self.n_sources = count("n_sources", n_sources)
         self._check_number_of_sources()
+        warn_of_ambiguity(measurement)
         self.reset()
 
     def _check_number_of_sources(self) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from typing import Any, ClassVar, Literal, Self
 
@@ -12,7 +11,7 @@ from numpy.typing import ArrayLike
 from arrivals.measurement_models.direction_measurement import DirectionMeasurement
 from arrivals.measurement_models.manifolds.manifold import Manifold, Reference
 from arrivals.measurement_models.observed import ObservedSnapshots, merge_noise
-from arrivals.trackers.direction_tracker import BatchDirectionTracker
+from arrivals.trackers.direction_tracker import BatchDirectionTracker, warn_of_ambiguity
 from arrivals.trackers.registry import register
 from arrivals.trackers.svalse.components import (
     ComponentPosterior,
@@ -107,8 +106,7 @@ class VALSE(BatchDirectionTracker):
         self.reference = one_of("reference", reference, ("middle", "first"))
         manifold = measurement.manifold(self.reference)
         self.solver.check(manifold, getattr(measurement, "n_snapshots", 1), self.n_moments)
-        if manifold.coefficients is not None:
-            warn_of_ambiguity(measurement)
+        warn_of_ambiguity(measurement)
         self.bin_noise = np.full(manifold.n_bins, np.nan)
         self.reset()
 
@@ -227,18 +225,6 @@ def selected_solver(
             'pass engine="coordinate"'
         )
     return solver.replace(posterior=posterior)
-
-
-def warn_of_ambiguity(measurement: DirectionMeasurement) -> None:
-    """Warn if two directions have the same response at every frequency."""
-    if (pair := measurement.ambiguity()) is not None:
-        one, other = np.rad2deg(pair)
-        warnings.warn(
-            f"directions {one:.1f} and {other:.1f} degrees are ambiguous: they have the same "
-            "response at every frequency, so sources may be reported at either. Several "
-            "frequencies, or a smaller spacing of the sensors, resolve them",
-            stacklevel=4,
-        )
 
 
 def detected(manifold: Manifold, posterior: ComponentPosterior) -> Bool:
