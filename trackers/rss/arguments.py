@@ -168,5 +168,13 @@ def warn_unsupported_sources(log_evidence: list[float], K: int) -> None:
         _warn(f"the readings support {best} sources, not {K}")
 
 
+def warn_mirror() -> None:
+    """Warn that sensors on a line determine a position up to its mirror image."""
+    _warn(
+        "all sensors are on a line: the mirror image of a position explains the readings as well; "
+        "the covariance contains both"
+    )
+
+
 def _warn(message: str) -> None:
     warnings.warn(message, stacklevel=6)

@@ -25,6 +25,7 @@ from arrivals.trackers.rss.batch import BatchStart, run_in_chunks
 from arrivals.trackers.rss.belief import SourceBeliefs, keep_finite
 from arrivals.trackers.rss.inference.joint_posterior import JointPosterior
 from arrivals.trackers.rss.inference.solution import Diagnostics, Solution, WeightedReadings
+from arrivals.trackers.rss.mirror import Line
 from arrivals.trackers.rss.model_order.track_table import TrackTable
 from arrivals.trackers.rss.pooled_readings import PooledReadings
 from arrivals.trackers.rss.settings import AmplitudePrior, BirthDeath, GridSearch
@@ -91,6 +92,8 @@ class RSSTracker(Tracker):
         self.label, self.existence = self.tracks.padded(0)
         self.elapsed = np.inf
         self.pool = PooledReadings.none(model.dim_z)
+        self.settling = 0  # steps in which the places of detected sources are checked
+        self.line: Line | None = None  # of all sensors with readings
         self.set_belief(sources, self.tracks)
         self.record_missed()
         warn_initial(sources.x[:, self.position], self.measurement.sensors)
@@ -154,7 +157,7 @@ class RSSTracker(Tracker):
         predicted = self.predict_sources(sources, dt)
         self.set_belief(predicted, self.current_tracks(len(sources.u)))
         self.elapsed = self.elapsed + dt
-        if self.births or sources.u.size == 0:
+        if self.births or self.settling or sources.u.size == 0:
             self.pool = self.pool.later(dt)
 
     def predict_sources(self, sources: SourceBeliefs, dt: float) -> SourceBeliefs:
@@ -229,13 +232,20 @@ class RSSTracker(Tracker):
 
     @property
     def estimate(self) -> PositionEstimate:
-        """The confirmed sources."""
+        """The confirmed sources.
+
+        If all sensors are on a line, the covariances of detected sources contain their mirror
+        images, which `P` does not.
+        """
         sources = self.source_beliefs()
         tracks = self.current_tracks(len(sources.u))
         xy, shown = self.position, tracks.confirmed
+        position, covariance = sources.x[shown][:, xy], sources.P[shown][:, xy, :][..., xy]
+        if self.line is not None:
+            covariance = self.line.with_mirror(covariance, position)
         return PositionEstimate(
-            sources.x[shown][:, xy],
-            sources.P[shown][:, xy, :][..., xy],
+            position,
+            covariance,
             sources.u[shown],
             tracks.existence[shown],
             tracks.label[shown],
@@ -248,8 +258,8 @@ class RSSTracker(Tracker):
         """Run independent sequences, each from the present state.
 
         A step of all sequences is one array call, except for sequences of unequal lengths and
-        where sources are detected or may appear and disappear. The tracker itself does not
-        change.
+        where sources are or have just been detected, or may appear and disappear. The tracker
+        itself does not change.
 
         Parameters
         ----------
@@ -267,7 +277,8 @@ class RSSTracker(Tracker):
         sequences = [list(rows("measurements", one)) for one in rows("measurements", measurements)]
         sources = self.source_beliefs()
         equal = len({len(sequence) for sequence in sequences}) == 1 and len(sequences[0]) > 0
-        if self.births or not equal or sources.u.size == 0:
+        detected = sources.u.size == 0 or self.settling or self.line is not None
+        if self.births or not equal or detected:
             return super().run_batch(sequences, dt)
         z = np.array([[self._vector(one) for one in sequence] for sequence in sequences])
         tracks = self.current_tracks(len(sources.u))

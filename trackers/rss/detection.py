@@ -10,12 +10,14 @@ from numpy.typing import ArrayLike
 from arrivals.motion_models.base import MotionModel
 from arrivals.trackers.rss.arguments import (
     warn_few_readings,
+    warn_mirror,
     warn_unsupported_sources,
     without_position,
 )
 from arrivals.trackers.rss.belief import Entries, SourceBeliefs
 from arrivals.trackers.rss.inference.joint_posterior import JointPosterior
 from arrivals.trackers.rss.inference.solution import Marginals, WeightedReadings
+from arrivals.trackers.rss.mirror import Line
 from arrivals.trackers.rss.model_order.birth_death import (
     BirthDeathUpdate,
     carried_sources,
@@ -30,6 +32,7 @@ from arrivals.trackers.rss.model_order.model_selection import (
 )
 from arrivals.trackers.rss.model_order.track_table import TrackTable
 from arrivals.trackers.rss.pooled_readings import PooledReadings, displacement_variance
+from arrivals.trackers.rss.relocation import SETTLING_STEPS, better_places
 from arrivals.trackers.rss.settings import AmplitudePrior, GridSearch
 from arrivals.typing import Float
 
@@ -59,14 +62,15 @@ def detect_sources(tracker: RSSTracker, readings: WeightedReadings) -> None:
     if tracker.births:
         steps = tracker.births.confirm_steps
         result = update_with_births(
-            step, together, tracks, new, tracker.solve, steps, max_sources
+            step, together, pool.is_complete(len(step.problem.W)), tracks, new,
+            tracker.solve, steps, max_sources,
         )  # fmt: skip
         candidate, searched, tracks = result.candidate, result.searched, result.tracks
         sources = update_supported(sources, result, tracker.position, tracker.motion)
         n_known = len(result.supported)
     else:
-        grown = int(pool.seen.sum()) > int(tracker.pool.seen.sum())
-        chosen = sufficient(step, together, tracker.n_sources or 1, grown)
+        complete = pool.is_complete(len(step.problem.W))
+        chosen = sufficient(step, together, tracker.n_sources or 1, complete)
         if chosen is None:
             tracker.pool = pool
             tracker.record_missed()
@@ -81,6 +85,38 @@ def detect_sources(tracker: RSSTracker, readings: WeightedReadings) -> None:
     diagnostics = problem.select(None).diagnose(solution)
     tracker.store(sources.select(active), solution, diagnostics, tracks.select(active))
     tracker.pool = pool
+    if len(detected.u) > n_known:
+        tracker.settling = SETTLING_STEPS
+    elif tracker.settling:
+        settle(tracker, weights, new)
+    line = None
+    if tracker.x0 is None and active.any():
+        line = Line.through(pool.sensors[pool.seen])
+    if line is not None and tracker.line is None:
+        warn_mirror()
+    tracker.line = line
+
+
+def keep_settling(tracker: RSSTracker, readings: WeightedReadings) -> None:
+    """Check the places of detected sources after an update of a constant number of them."""
+    xi, W = readings.xi[0], readings.W[0]
+    if tracker.line is not None and not tracker.line.contains(tracker.measurement.sensors[W > 0]):
+        tracker.line = None
+    if tracker.settling:
+        tracker.pool, weights, new = pool_readings(tracker, xi, W)
+        settle(tracker, weights, new)
+
+
+def settle(tracker: RSSTracker, weights: Float, new: NewSourcePrior) -> None:
+    """Move the sources that have a better place in the pooled readings."""
+    tracker.settling -= 1
+    better = better_places(tracker, weights, new)
+    if better is not None:
+        moved, candidate = better
+        found = new_beliefs(candidate, tracker.P0, tracker.motion.dim_x, tracker.position)
+        sources = tracker.source_beliefs()
+        sources = sources.replaced(moved, found.select(slice(-len(moved), None)))
+        tracker.set_belief(sources, tracker.current_tracks(len(sources.u)))
 
 
 def pool_readings(
@@ -106,7 +142,7 @@ def pool_readings(
 
 
 def sufficient(
-    step: Candidate, together: Candidate, n_sources: int, grown: bool
+    step: Candidate, together: Candidate, n_sources: int, complete: bool
 ) -> Candidate | None:
     """Return the readings that sources are detected in; None to wait for more.
 
@@ -115,13 +151,13 @@ def sufficient(
     step, together : Candidate
         Without a source: readings of the step, and pooled with those before.
     n_sources : int
-    grown : bool
-        Whether a sensor has its first reading.
+    complete : bool
+        Whether other sensors are not expected to follow.
     """
     n, n_together = len(step.problem.W), len(together.problem.W)
     if n >= 3 * n_sources:
         return step
-    if n_together >= 3 * n_sources or not grown:
+    if complete or n_together >= 6 * n_sources:
         return together
     return step if n >= max(3, 2 * n_sources) else None
 

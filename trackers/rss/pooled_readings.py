@@ -16,7 +16,7 @@ MAX_SQUARED_CHANGE = (
 
 
 class PooledReadings(NamedTuple):
-    """Weighted mean of the latest readings of each sensor; all arrays (n_sensors,) but `sensors`.
+    """Weighted mean of the latest readings of each sensor; most arrays (n_sensors,).
 
     Parameters
     ----------
@@ -28,12 +28,15 @@ class PooledReadings(NamedTuple):
         Time since the last reading.
     sensors : ndarray, shape (n_sensors, 2)
         Positions of the sensors at that time, m.
+    n_repeated : int
+        Steps with readings since a sensor had its first one.
     """
 
     xi: Float
     W: Float
     age: Float
     sensors: Float
+    n_repeated: int = 0
 
     @classmethod
     def none(cls, n: int) -> PooledReadings:
@@ -50,8 +53,9 @@ class PooledReadings(NamedTuple):
         return self._replace(age=self.age + dt)
 
     def aged(self, spread: Float) -> Float:
-        """Return the weights, given the variances, Np², by which the levels changed since."""
-        return np.asarray(self.W / (1 + self.W * spread))
+        """Return the weights, given the variances, Np², of the levels' changes since; inf: 0."""
+        valid = np.isfinite(spread)
+        return np.where(valid, self.W / (1 + self.W * np.where(valid, spread, 0.0)), 0.0)
 
     def joined(self, xi: Float, W: Float, sensors: Float, spread: Float) -> PooledReadings:
         """Return the means with the readings of a step, W = 0 where missing.
@@ -75,7 +79,19 @@ class PooledReadings(NamedTuple):
             np.where(valid, total, self.W),
             np.where(valid, 0.0, self.age),
             np.where(valid[:, None], sensors, self.sensors),
+            0 if (valid & ~self.seen).any() else self.n_repeated + 1,
         )
+
+    def is_complete(self, n_readings: int) -> bool:
+        """Return True if no sensor is likely to follow that has had no reading.
+
+        Parameters
+        ----------
+        n_readings : int
+            Number of readings of the last step.
+        """
+        n = int(self.seen.sum())
+        return self.n_repeated >= (1 if n_readings == n else n)
 
 
 def displacement_variance(motion: MotionModel, P0: Float, position: Entries, age: Float) -> Float:

@@ -9,7 +9,7 @@ from arrivals.measurement_models.signal_strength.log_normal import LogNormalRSS
 from arrivals.motion_models.base import MotionModel
 from arrivals.trackers.registry import register
 from arrivals.trackers.rss.base import RSSTracker
-from arrivals.trackers.rss.detection import detect_sources
+from arrivals.trackers.rss.detection import detect_sources, keep_settling
 from arrivals.trackers.rss.inference.joint_posterior import JointPosterior, marginals
 from arrivals.trackers.rss.inference.map_search import maximize
 from arrivals.trackers.rss.inference.solution import Solution
@@ -124,6 +124,7 @@ class RSSML(RSSTracker):
         solution = self.solve(problem, problem.prior.mu, problem.prior.theta)
         updated, diagnostics = self.update_sources(sources, readings, problem, solution)
         self.store(updated.select(0), solution, diagnostics)
+        keep_settling(self, readings)
 
     def solve(self, problem: JointPosterior, u: Float, theta: Float) -> Solution:
         """Maximize a batch of problems one by one; return the maxima and their marginals.

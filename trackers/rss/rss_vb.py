@@ -10,7 +10,7 @@ from arrivals.motion_models.base import MotionModel
 from arrivals.trackers.gaussian.linalg import inverse_2x2
 from arrivals.trackers.registry import register
 from arrivals.trackers.rss.base import RSSTracker
-from arrivals.trackers.rss.detection import detect_sources
+from arrivals.trackers.rss.detection import detect_sources, keep_settling
 from arrivals.trackers.rss.inference.factors import update_amplitudes, update_positions
 from arrivals.trackers.rss.inference.joint_posterior import (
     ExpansionPoint,
@@ -138,6 +138,7 @@ class RSSVB(RSSTracker):
         solution = self.solve(problem, problem.prior.mu, problem.prior.theta)
         updated, diagnostics = self.update_sources(sources, readings, problem, solution)
         self.store(updated.select(0), solution, diagnostics)
+        keep_settling(self, readings)
 
     def solve(self, problem: JointPosterior, u: Float, theta: Float) -> Solution:
         """Fit the factors of a batch of problems from starting points; return their moments.

@@ -42,6 +42,7 @@ class BirthDeathUpdate(NamedTuple):
 def update_with_births(
     predicted: Candidate,
     together: Candidate,
+    complete: bool,
     tracks: TrackTable,
     new: NewSourcePrior,
     solve: Solve,
@@ -62,6 +63,8 @@ def update_with_births(
         Predicted sources.
     together : Candidate
         The same in the readings of the step and those before it.
+    complete : bool
+        Whether no other sensors are expected to follow; else twice as many readings are required.
     tracks : TrackTable
         Their labels and existence.
     new : NewSourcePrior
@@ -81,7 +84,10 @@ def update_with_births(
     if is_short:
         known = together.part(supported)
         searched = replace(known, u=candidate.u, theta=candidate.theta)
-    n_free = carried_sources(len(known.problem.W)) - n_known
+    n_readings = len(known.problem.W)
+    if is_short and not complete:
+        n_readings //= 2
+    n_free = carried_sources(n_readings) - n_known
     n_free = min(n_free, max_sources - len(predicted.u))
     if is_short and n_free > 0:
         searched = searched.refitted()
