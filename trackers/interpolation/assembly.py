@@ -56,6 +56,11 @@ class FilterAssembly(FrozenModel):
         return self.final.source
 
     @property
+    def largest_variance(self) -> float:
+        """Variance of a delay of which nothing is known: uniform within ±κ."""
+        return self.kappa**2 / 3
+
+    @property
     def n_delay(self) -> int:
         """Number of elements of the state before those of the source."""
         return self.motion.dim_x - (0 if self.source is None else self.source.dim_source)

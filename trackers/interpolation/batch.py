@@ -91,9 +91,9 @@ def trajectory(
     n_steps = snapshots.shape[-2]
     xs, Ps = np.empty((*lead, n_steps, len(F))), np.empty((*lead, n_steps, *F.shape))
     for k in range(n_steps):
-        channels, buffer = receive(self, channels, buffer, snapshots[..., k, :])
         x, P = predict(x, P, F, Q)
-        P = widened(P, buffer.missing, self.largest_variance)
+        P = widened(P, buffer.missing, assembly.largest_variance)
+        channels, buffer = receive(self, channels, buffer, snapshots[..., k, :])
         samples = buffer.scaled(self.measurement)
         x, P, misfit = assembly.update(x, P, samples, buffer.n_snapshots, buffer.misfit)
         buffer = buffer.with_misfit(misfit)

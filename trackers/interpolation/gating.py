@@ -67,7 +67,7 @@ def updated_misfit(misfit: Float, e: Float, used: Bool) -> Float:
 
 
 def widened(P: Float, missing: Bool, largest: float) -> Float:
-    """Return covariances with a wider delay where a snapshot is missing, (...).
+    """Return covariances with a wider delay where the last snapshot was missing, (...).
 
     Its variance grows up to `largest`.
 

@@ -89,8 +89,8 @@ class InterpolationEKF(GaussianFilter):
     Notes
     -----
     A measurement is one real sample of every sensor, (n_sensors,), NaN where it is missing; None
-    if the snapshot is missing. Snapshots are one unit of time apart. In every missing snapshot the
-    variance of the direction grows by 1 %, up to the initial one.
+    if the snapshot is missing. Snapshots are one unit of time apart. After a missing snapshot, the
+    variance of the direction grows by 1 %, until it may be any.
 
     Where the model has a `band`, samples are filtered to it, and missing until the filter settles:
     at the start, after a gap or a click. The filter delays the estimate too.
@@ -156,7 +156,6 @@ class InterpolationEKF(GaussianFilter):
         std = initial_std(assembly, self.doa, self.std)
         self.x, self.P = assembly.initial_belief(delay, std**2, self.rate_std)
         self.initialize_record()
-        self.largest_variance = float(self.P[0, 0])
         self.buffer = SampleBuffer.empty(assembly.span, assembly.n_grid_points)
         self.channels = ChannelFilters.start(self.measurement)
 
@@ -171,11 +170,13 @@ class InterpolationEKF(GaussianFilter):
     ) -> None:
         """Predict mean and covariance; parameters as in `GaussianFilter.predict`."""
         x, P = self.belief()
-        own_F, own_Q = transition(self.state_motion, time_step(dt))
+        assembly = self.assembly
+        own_F, own_Q = transition(assembly.motion, time_step(dt))
         F = own_F if F is None else shaped("F", F, len(x), len(x))
         Q = own_Q if Q is None else covariance_matrix("Q", Q, len(x))
         # x = F x (18) + B u,   P = F P F' + Q   (19)
         x, P = predict(x, P, F, Q)
+        P = widened(P, self.buffer.missing, assembly.largest_variance)
         self.record_prediction(self.add_control(x, u, B), P, dt)
 
     def update(
@@ -199,7 +200,6 @@ class InterpolationEKF(GaussianFilter):
         snapshot = to_snapshot(z, self.dim_z)
         noise = None if R is None else covariance_matrix("R", R, len(snapshot))
         channels, buffer = receive(self, self.channels, self.buffer, snapshot)
-        P = widened(P, buffer.missing, self.largest_variance)
         samples = buffer.scaled(self.measurement)
         # y = y_j - c'X (11), H = m c''X, R, one residual a sensor
         y, H, variance = self._observe(x, P, samples, buffer)

@@ -34,7 +34,7 @@ class SampleBuffer:
     misfit : ndarray, shape (...)
         That of `gating.updated_misfit`; infinite until there are samples enough for a gate.
     missing : ndarray of bool, shape (...)
-        True if no sample of the newest snapshot is left.
+        True if no sample of the newest snapshot is left, and of an earlier one is.
     n_snapshots : int
         Number of snapshots so far.
 
@@ -56,7 +56,7 @@ class SampleBuffer:
     def empty(cls, span: int, n_grid_points: int) -> SampleBuffer:
         """Return the buffer before the first snapshot."""
         zero, frames = np.zeros(()), np.full((span, n_grid_points), np.nan)
-        return cls(frames, zero, zero, zero + np.inf, zero == 0)
+        return cls(frames, zero, zero, zero + np.inf, zero > 0)
 
     def broadcast(self, shape: tuple[int, ...]) -> SampleBuffer:
         """Return the same buffer for recordings of leading axes `shape`."""
@@ -97,8 +97,8 @@ class SampleBuffer:
             misfit = np.where(enough & np.isinf(misfit), 1.0, misfit)
         return SampleBuffer(
             np.concatenate([self.frames[..., 1:, :], frame[..., None, :]], axis=-2),
-            energy + np.nansum(square, axis=-1), n_samples, misfit, n_valid == 0,
-            self.n_snapshots + 1,
+            energy + np.nansum(square, axis=-1), n_samples, misfit,
+            (n_valid == 0) & (n_samples > 0), self.n_snapshots + 1,
         )  # fmt: skip
 
     def _level(self, power: float | None) -> Float:

@@ -25,11 +25,11 @@ class ZeroRuns:
     length : ndarray, shape (..., n_channels)
         Zeros up to the newest sample; 0 where that is no zero.
     missing : ndarray of bool, shape (..., n_channels)
-        Channels whose run is missing.
+        Channels whose run is missing; all of them before their first sample that is not zero.
     zeros, repeated : ndarray, shape (...)
         Zeros in runs that ended and were samples, and those of them that follow a zero.
     active : bool
-        True if a run goes on.
+        True if a run goes on, or a channel has had no sample.
     reported : bool
         True once the warning was given.
 
@@ -46,14 +46,14 @@ class ZeroRuns:
     missing: Bool
     zeros: Float
     repeated: Float
-    active: bool = False
+    active: bool = True
     reported: bool = False
 
     @classmethod
     def start(cls, n_channels: int) -> ZeroRuns:
         """Return the state before the first sample."""
         nothing = np.zeros(n_channels)
-        return cls(nothing, nothing > 0, np.zeros(()), np.zeros(()))
+        return cls(nothing, nothing == 0, np.zeros(()), np.zeros(()))
 
     def broadcast(self, shape: tuple[int, ...]) -> ZeroRuns:
         """Return the same state for recordings of leading axes `shape`."""
@@ -71,7 +71,7 @@ class ZeroRuns:
             Once, if a channel is missing while another one is not.
         """
         zero = z == 0
-        if not self.active and not zero.any():
+        if not zero.any() and not self.active:
             return self, z  # the usual case
         length = np.where(zero, self.length + 1, 0.0)
         ended = np.where((length == 0) & ~self.missing, self.length, 0.0)
@@ -80,18 +80,19 @@ class ZeroRuns:
         # P(n or more zeros follow a zero) = qⁿ
         q = (repeated + 2) / (zeros + 8)
         longest = 1 + np.log(PROBABILITY) / np.log(q)
-        missing = zero & (self.missing | (length > longest[..., None]))
+        long = length > longest[..., None]
+        missing = (self.missing | long) & (zero | np.isnan(z))
         state = ZeroRuns(
-            length, missing, zeros, repeated, bool(zero.any()),
-            self.reported or _report(missing & ~self.missing, z),
+            length, missing, zeros, repeated, bool(zero.any() | missing.any()),
+            self.reported or _report(long, z),
         )  # fmt: skip
         return state, np.where(missing, np.nan, z)
 
 
-def _report(started: Bool, z: Float) -> bool:
-    """Warn of channels that became missing while another one has data; return True if any did."""
+def _report(long: Bool, z: Float) -> bool:
+    """Warn of channels with long runs while another one has data; return True if there are any."""
     others = (np.nan_to_num(z) != 0).any(axis=-1, keepdims=True)
-    channels = np.unique(np.nonzero(started & others)[-1])
+    channels = np.unique(np.nonzero(long & others)[-1])
     if not len(channels):
         return False
     warnings.warn(
