@@ -79,11 +79,12 @@ def test_device_is_written_through(tmp_path: Path) -> None:
 
 @posix
 def test_link_to_an_open_file_of_the_process_is_written_through(tmp_path: Path) -> None:
-    with open(tmp_path / "log", "w+") as log:
+    (tmp_path / "log").write_text("old, ")
+    with open(tmp_path / "log", "a") as log:
         (tmp_path / "out.csv").symlink_to(f"/proc/self/fd/{log.fileno()}")
         inode = (tmp_path / "log").stat().st_ino
         write(tmp_path / "out.csv")
-    assert (tmp_path / "log").read_text() == "new"
+    assert (tmp_path / "log").read_text() == "old, new"
     assert (tmp_path / "log").stat().st_ino == inode
 
 

@@ -251,7 +251,7 @@ def _open_special(path: str) -> BinaryIO:
             client.connect(path)
             return client.makefile("wb")
     if not stat.S_ISFIFO(mode):
-        return open(path, "wb")
+        return open(path, "ab")  # not emptied if it is an open file: `>> file`
     last = time.monotonic() + WAIT_FOR_READER
     while True:
         try:

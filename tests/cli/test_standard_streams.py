@@ -56,7 +56,8 @@ def test_closed_standard_input_is_an_empty_stream(
 def test_any_terminal_shows_lists_and_help(
     encoding: str, arguments: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    stdout = io.TextIOWrapper(io.BytesIO(), encoding=encoding)
+    errors = "surrogateescape" if encoding == "ascii" else "strict"  # as in the locale C
+    stdout = io.TextIOWrapper(io.BytesIO(), encoding=encoding, errors=errors)
     monkeypatch.setattr("sys.stdout", stdout)
     assert main(arguments) == 0
     assert len(stdout.buffer.getvalue()) > 100
