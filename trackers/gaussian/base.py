@@ -31,7 +31,12 @@ from arrivals.trackers.gaussian.equations import GaussianUpdate, likelihood
 from arrivals.trackers.gaussian.filterpy_names.attributes import DeclaredAttributes
 from arrivals.trackers.gaussian.filterpy_names.matrices import ModelMatrices
 from arrivals.trackers.gaussian.linalg import Inverse, inverse
-from arrivals.trackers.gaussian.linearization import Linearization, predict_belief, update_belief
+from arrivals.trackers.gaussian.linearization import (
+    Linearization,
+    predict_belief,
+    update_belief,
+    warn_if_far_from_linear,
+)
 from arrivals.trackers.gaussian.smoothing import batch_filter, rts_smoother, run_batch
 from arrivals.typing import Bool, Float
 from arrivals.validation import real, shaped, time_step
@@ -88,6 +93,7 @@ class GaussianFilter(ModelMatrices, DeclaredAttributes, Tracker):
     """
 
     former_names = ("KalmanType",)
+    iterations, warned = 1, False  # linearizations of a measurement; that it is far from linear
 
     def __init__(
         self, motion: MotionModel, measurement: MeasurementModel, x: ArrayLike, P: ArrayLike
@@ -172,7 +178,10 @@ class GaussianFilter(ModelMatrices, DeclaredAttributes, Tracker):
             self.record_missed()
         else:
             z, missing, R = measured
-            self.record_update(z, self.update_belief(x, P, z, missing, R, H))
+            update = self.update_belief(x, P, z, missing, R, H)
+            self.record_update(z, update)
+            if H is None:
+                warn_if_far_from_linear(self, z, missing, R, update.S)
 
     def add_control(self, x: Float, u: ArrayLike | None, B: ArrayLike | None) -> Float:
         """Return x + B u, angles in [-π, π)."""
@@ -216,8 +225,8 @@ class GaussianFilter(ModelMatrices, DeclaredAttributes, Tracker):
             values, missing = z.copy(), None  # type: ignore[union-attr]
         else:
             values, missing = measurement_and_mask(z, m)
-            if missing is not None and missing.all():
-                return None
+        if missing is not None and missing.all():
+            return None
         R = self.held_measurement.R if R is None else covariance_matrix("R", R, m)
         return values, missing, R if H is None else shaped("R", R, m, m)
 
@@ -238,7 +247,6 @@ class GaussianFilter(ModelMatrices, DeclaredAttributes, Tracker):
             check_finite(x, P)
         if type(self.x) is not np.ndarray or self.x.ndim > 1:
             x = x.reshape(np.shape(self.x))
-        # faster than assignments, which are checked
         vars(self).update(x=x, P=P, _known_x=x, _known_P=P, x_prior=x.copy(), P_prior=P.copy())
         if dt != self.last_dt:
             self.read_again(dt)

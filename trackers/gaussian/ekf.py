@@ -6,6 +6,8 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
+from arrivals.measurement_models.base import MeasurementModel
+from arrivals.motion_models.base import MotionModel
 from arrivals.trackers.gaussian.base import GaussianFilter
 from arrivals.trackers.gaussian.filterpy_names.function_updates import (
     has_functions,
@@ -17,6 +19,7 @@ from arrivals.trackers.gaussian.filterpy_names.queries import FadingMemory, Quer
 from arrivals.trackers.gaussian.linearization import Linearization, at_each
 from arrivals.trackers.registry import register
 from arrivals.typing import Float
+from arrivals.validation import count
 
 
 @register("ekf")
@@ -33,6 +36,10 @@ class EKF(FadingMemory, Queries, GaussianFilter):
         Initial mean.
     P : array_like, shape (n, n)
         Initial covariance.
+    iterations : int
+        Largest number of linearizations of the measurement in an update, each at the mean of the
+        one before: a damped Gauss-Newton search, for measurements that are far from linear over
+        the prior. It ends where the mean has settled.
 
     Notes
     -----
@@ -40,7 +47,8 @@ class EKF(FadingMemory, Queries, GaussianFilter):
 
     References
     ----------
-    Särkkä, *Bayesian Filtering and Smoothing*, 2013, algorithm 5.4.
+    Särkkä, *Bayesian Filtering and Smoothing*, 2013, algorithm 5.4; Bell and Cathey, "The iterated
+    Kalman filter update as a Gauss-Newton method", IEEE TAC 38(2), 1993.
 
     Examples
     --------
@@ -53,6 +61,17 @@ class EKF(FadingMemory, Queries, GaussianFilter):
     >>> tracker.x.round(1)
     array([5., 5.])
     """
+
+    def __init__(
+        self,
+        motion: MotionModel,
+        measurement: MeasurementModel,
+        x: ArrayLike,
+        P: ArrayLike,
+        iterations: int = 1,
+    ) -> None:
+        super().__init__(motion, measurement, x, P)
+        self.iterations = count("iterations", iterations)
 
     predict_update = predict_update
     predict_x = predict_x

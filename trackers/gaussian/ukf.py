@@ -18,7 +18,7 @@ from arrivals.trackers.gaussian.linalg import apply, cholesky
 from arrivals.trackers.gaussian.linearization import Linearization
 from arrivals.trackers.registry import register
 from arrivals.typing import Float
-from arrivals.validation import number, positive
+from arrivals.validation import count, number, positive
 
 
 def merwe_weights(n: int, alpha: float, beta: float, kappa: float) -> tuple[Float, Float, float]:
@@ -58,6 +58,11 @@ class UKF(Queries, GaussianFilter):
         Weight of the mean's sigma point in covariances; 2 is best for Gaussian beliefs.
     kappa : float
         Second scale of the sigma points, above -n.
+    iterations : int
+        Largest number of regressions of the measurement in an update: a damped Gauss-Newton search
+        for the mean with close sigma points, then one regression over the sigma points of the
+        belief that it has found (posterior linearization), for measurements that are far from
+        linear over the prior.
 
     Raises
     ------
@@ -111,12 +116,14 @@ class UKF(Queries, GaussianFilter):
         alpha: float = 0.5,
         beta: float = 2.0,
         kappa: float = 0.0,
+        iterations: int = 1,
     ) -> None:
         super().__init__(motion, measurement, x, P)
         self.alpha, self.beta = positive("alpha", alpha), number("beta", beta)
         self.kappa = number("kappa", kappa)
         if not kappa > -self.dim_x:
             raise ValueError(f"kappa must be above -{self.dim_x}; got {kappa}")
+        self.iterations = count("iterations", iterations)
 
     def batch_filter(self, zs: Any, *arguments: Any, **named: Any) -> Any:
         """Filter a sequence; arguments by name, as in `GaussianFilter.batch_filter`."""
