@@ -112,7 +112,7 @@ class UniformLineManifold:
         inside = np.clip(np.asarray(theta, dtype=np.float64), -self.step, self.step)
         ends = (inside + np.multiply.outer([-1.0, 1.0], np.asarray(std))) / self.step
         low, high = np.arcsin(np.clip(ends, -1, 1))
-        return np.minimum((high - low) / 2, UNIFORM_STD_OF_LINE)
+        return np.asarray(np.minimum((high - low) / 2, UNIFORM_STD_OF_LINE))
 
     def slope(self, theta: ArrayLike) -> Float:
         """Return dθ/dβ = 2π d/λ cos β, with a cosine of at least 0.1."""

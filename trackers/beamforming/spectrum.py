@@ -268,4 +268,4 @@ def parabolic_peak(doa_grid: Float, level: Float, peaks: Int) -> Float:
     bend = 2 * middle - left - right
     shift = (right - left) / (2 * np.where(bend > 0, bend, np.inf))
     doa = doa_grid[peaks] + step * np.maximum(np.minimum(shift, 0.5), -0.5)
-    return np.where(is_circle & (doa < -np.pi), doa + 2 * np.pi, doa)
+    return np.asarray(np.where(is_circle & (doa < -np.pi), doa + 2 * np.pi, doa))

@@ -19,61 +19,18 @@ from arrivals.trackers.subspace.base import (
 )
 from arrivals.trackers.subspace.esprit import ShiftInvariance
 from arrivals.trackers.subspace.music import SpectrumSearch
+from arrivals.trackers.subspace.past_steps import (
+    SensorInverses,
+    incomplete_step,
+    limited_trace,
+    past_step,
+)
 from arrivals.trackers.subspace.root_music import PolynomialRooting
 from arrivals.typing import Bool, Complex, Float
 from arrivals.validation import count, one_of
 
 MIN_FORGETTING = 1e-6  # bounds P after a long gap: the weight of older data is at least this
 MAX_RELATIVE_TRACE = 1e12  # of P relative to the power: bounds wind-up along unexcited directions
-
-
-def past_step(W: Complex, P: Complex, y: Complex, beta: ArrayLike) -> tuple[Complex, Complex]:
-    """Return W and P after one snapshot: algorithm PAST, Table I.
-
-    Parameters
-    ----------
-    W : ndarray, shape (..., n_sensors, n_sources)
-        Basis of the signal subspace, nearly orthonormal.
-    P : ndarray, shape (..., n_sources, n_sources)
-        Inverse of the weighted sum of z zᴴ, z = Wᴴy.
-    y : ndarray, shape (..., n_sensors)
-        Snapshot.
-    beta : float or array_like, shape (...)
-        Weight of the past.
-
-    Returns
-    -------
-    W : ndarray, shape (..., n_sensors, n_sources)
-        Updated basis.
-    P : ndarray, shape (..., n_sources, n_sources)
-        Updated inverse.
-
-    References
-    ----------
-    Yang, table I.
-
-    Examples
-    --------
-    >>> W, P = np.array([[1.0], [0.0]]), np.eye(1)
-    >>> for _ in range(20):
-    ...     W, P = past_step(W, P, np.array([3.0, 4.0]), 0.9)
-    >>> W.round(3).ravel()
-    array([0.6, 0.8])
-    """
-    beta = np.asarray(beta)[..., None, None]
-    y = y[..., None]
-    # z = Wᴴ y
-    z = W.conj().swapaxes(-1, -2) @ y
-    # h = P z
-    h = P @ z
-    hH = h.conj().swapaxes(-1, -2)
-    # g = h / (β + zᴴh)
-    gH = hH / (beta + (hH @ z).real)
-    # P = Tri{P - g hᴴ} / β; the Hermitian part, since rounding would grow as β⁻ⁿ
-    P = (P - h * gH) / (2 * beta)
-    P = P + P.conj().swapaxes(-1, -2)
-    # W = W + (y - W z) gᴴ
-    return W + (y - W @ z) * gH, P
 
 
 @register("past")
@@ -125,8 +82,9 @@ class PAST(SubspaceTracker[DirectionFinder]):
     Notes
     -----
     Labels are -1, `std` and `existence` NaN. Directions are in ascending order. A sensor that is
-    missing is imputed: its expected value given the others, by W P⁻¹Wᴴ plus white noise. P starts
-    at the inverse power of the first snapshot, so that the unit of the samples does not matter.
+    missing does not change its row of W: once one was missing, each has a P of its own (PETRELS).
+    P starts at the inverse power of the first snapshot, so that the unit of the samples does not
+    matter.
 
     References
     ----------
@@ -168,10 +126,12 @@ class PAST(SubspaceTracker[DirectionFinder]):
         self._reset_subspace()
         super().reset()
 
+    rows: SensorInverses | None
+
     def _reset_subspace(self) -> None:
         n = self.measurement.array.n_sensors
         self.age, self.weight, self.n_tracked = 0.0, np.zeros(n), 0
-        self.energy, self.prior = 0.0, 0.0
+        self.energy, self.prior, self.rows = 0.0, 0.0, None
         self.W = np.zeros((n, self.n_slots), dtype=np.complex128)
         self.inverse = np.eye(self.n_slots, dtype=np.complex128)
 
@@ -194,48 +154,54 @@ class PAST(SubspaceTracker[DirectionFinder]):
         self.age = self.age + dt
 
     def update_subspace(self, z: Complex) -> None:
-        """Make one step of PAST; missing sensors are imputed from the subspace."""
+        """Make one step of PAST, or of PETRELS once a sensor was missing."""
         if self.W.shape[1] != self.n_slots:  # the number of sources was changed
             self._reset_subspace()
         valid = ~np.isnan(z)
-        y, unexplained = (z, 0.0) if valid.all() else self._imputed(z)
+        y = np.where(valid, z, 0)
         power = float(np.vdot(y, y).real)
-        self._track_new_sensors(valid, power)
+        known = self.weight > 0
+        new = valid & ~known
+        self._track_new_sensors(new, power / np.count_nonzero(valid))
         self.weight = self.weight + valid
         beta, L = max(self.forgetting**self.age, MIN_FORGETTING), self.n_tracked
-        W, P = past_step(self.W[:, :L], self.inverse[:L, :L], y, beta)
-        self.energy, self.age = beta * self.energy + power + unexplained, 0.0
+        W, P = self.W[:, :L], self.inverse[:L, :L]
+        if self.rows is None and (not known.any() or (valid == known).all()):
+            W, P = past_step(W, P, y, beta)
+        else:
+            rows = SensorInverses(np.stack([P] * len(y))) if self.rows is None else self.rows
+            rows = rows.restarted(new, np.count_nonzero(valid) / power)
+            noise = max(self._noise_outside(), self.prior)
+            W, P, self.rows, z = incomplete_step(W, P, rows, y, valid, beta, noise)
+            expected = (W @ z)[known & ~valid]
+            power += float(np.vdot(expected, expected).real)
+            power += len(expected) * noise / self.total_weight
+        self.energy, self.age = beta * self.energy + power, 0.0
         self.prior = beta * self.prior
-        trace = self.energy * float(P.trace().real)
-        P = P if trace < MAX_RELATIVE_TRACE else P * (MAX_RELATIVE_TRACE / trace)
+        P = limited_trace(P, MAX_RELATIVE_TRACE / self.energy)
         if self.n_slots > L:  # some sensors have had no data
             rest = self.n_slots - L
             W, P = np.pad(W, ((0, 0), (0, rest))), np.pad(P, (0, rest))
         self.W, self.inverse = W, P
 
-    def _track_new_sensors(self, valid: Bool, power: float) -> None:
-        """Add dimensions for sensors with their first data."""
-        new = np.flatnonzero(valid & (self.weight == 0))
-        old, L = self.n_tracked, self._dimension(len(new) + int(np.count_nonzero(self.weight)))
+    def _noise_outside(self) -> float:
+        """Return the weighted sum of a sensor's noise power, by the power outside the subspace."""
+        known = self.weight > 0
+        if self.energy == 0 or known.sum() <= self.n_tracked:
+            return 0.0
+        return float(self.eigendecomposition(known)[0][-1])
+
+    def _track_new_sensors(self, new: Bool, power: float) -> None:
+        """Add dimensions for sensors with their first data, of the power of a sensor."""
+        old, L = self.n_tracked, self._dimension(int(np.count_nonzero(new | (self.weight > 0))))
         if old < L:
             added = np.arange(old, L)
             self.W, self.inverse, self.n_tracked = self.W.copy(), self.inverse.copy(), L
-            self.W[new[: L - old], added] = 1.0
-            self.prior = max(self.prior, power / np.count_nonzero(valid))
-            self.inverse[added, added] = np.count_nonzero(valid) / power
-
-    def _imputed(self, z: Complex) -> tuple[Complex, float]:
-        """Return a snapshot with expected values of missing sensors, and their variance's sum."""
-        known = ~np.isnan(z) | (self.weight > 0)
-        y = np.where(np.isnan(z), 0, z)
-        if self.energy == 0:
-            return y, 0.0
-        values, vectors = self.eigendecomposition(known)
-        # the noise of few snapshots is not known
-        values = np.maximum(values, self.energy / (len(values) * self.total_weight))
-        R = (vectors * values) @ vectors.conj().T
-        y[known], variance = conditional_mean(R, z[known])
-        return y, variance / self.total_weight
+            self.W[np.flatnonzero(new)[: L - old], added] = 1.0
+            self.prior = max(self.prior, power)
+            self.inverse[added, added] = 1 / power
+            if self.rows is not None:
+                self.rows = self.rows.extended(L, 1 / power)
 
     def sensor_weights(self) -> Float:
         """Return the sum of weights of the valid data of each sensor, (n_sensors,)."""
@@ -265,35 +231,3 @@ class PAST(SubspaceTracker[DirectionFinder]):
             return SpectrumSearch(model.array, wavelength, self.n_directions)
         line = uniform_line(model)
         return PolynomialRooting(line) if self.method == "root_music" else ShiftInvariance(line)
-
-
-def conditional_mean(R: Complex, y: Complex) -> tuple[Complex, float]:
-    """Return a snapshot whose missing sensors have their expected values.
-
-    Parameters
-    ----------
-    R : ndarray, shape (n_sensors, n_sensors)
-        Covariance, positive definite.
-    y : ndarray, shape (n_sensors,)
-        Snapshot; NaN where a sensor has no valid data.
-
-    Returns
-    -------
-    completed : ndarray, shape (n_sensors,)
-        y, and R_mo R_oo⁻¹ y_o at the missing sensors.
-    variance : float
-        Sum of the variances of the missing sensors, given the others.
-
-    Examples
-    --------
-    >>> R = np.array([[1.0, 0.5], [0.5, 1.0]])
-    >>> conditional_mean(R, np.array([2.0, np.nan]))
-    (array([2., 1.]), 0.75)
-    """
-    missing = np.isnan(y)
-    R_oo, R_om = R[np.ix_(~missing, ~missing)], R[np.ix_(~missing, missing)]
-    K = np.linalg.solve(R_oo, R_om).conj().T
-    completed = y.copy()
-    completed[missing] = K @ y[~missing]
-    variance = float(R.diagonal()[missing].sum().real - np.trace(K @ R_om).real)
-    return completed, max(variance, 0.0)

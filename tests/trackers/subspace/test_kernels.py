@@ -11,7 +11,7 @@ from arrivals.trackers.beamforming import spatial_smoothing
 from arrivals.trackers.subspace.base import Subspaces, least_squares_amplitudes
 from arrivals.trackers.subspace.esprit import esprit_angles, shifted_pairs
 from arrivals.trackers.subspace.music import SpectrumSearch, music_spectrum
-from arrivals.trackers.subspace.past import conditional_mean, past_step
+from arrivals.trackers.subspace.past_steps import past_step
 from arrivals.trackers.subspace.root_music import null_polynomial, root_music_angles
 from arrivals.typing import Complex
 
@@ -125,16 +125,6 @@ def test_past_converges_to_the_eigenvectors() -> None:
     Q = np.linalg.qr(tracker.W)[0]
     cosines = np.linalg.svd(U.conj().T @ Q)[1]
     assert cosines.min() > 1 - 1e-5
-
-
-def test_conditional_mean_restores_a_missing_sensor() -> None:
-    A = LINE.array.steering_vector([0.3, -0.5], 1.0).T
-    y = LINE.wave([0.3, -0.5], [1.0, 2j])
-    damaged = y.copy()
-    damaged[[2, 6]] = np.nan
-    completed, variance = conditional_mean(A @ A.conj().T + 1e-12 * np.eye(8), damaged)
-    np.testing.assert_allclose(completed, y, atol=1e-9)
-    assert variance < 1e-11
 
 
 def test_past_stays_finite_after_zeros_and_without_excitation() -> None:
