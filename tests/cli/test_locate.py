@@ -149,3 +149,64 @@ def test_shipped_walk_is_tracked() -> None:
     result = track_transmitter(network.select(slice(0, 150)), known)
     assert np.median(result.error) < 250  # ten minutes calibrate the receivers poorly
     assert np.median(result.nees) < 5.991
+
+
+def long_table(folder: Path, n_readings: int, fill: str = "") -> list[str]:
+    """Write one reading a row of a walk, every fifth one missing; return arguments."""
+    places, _, levels = walk(n_readings)
+    (folder / "s.csv").write_text(
+        "name,x_m,y_m\n" + "".join(f"s{k},{x},{y}\n" for k, (x, y) in enumerate(places.tolist()))
+    )
+    order = [(7 * step) % len(places) for step in range(n_readings)]
+    (folder / "r.csv").write_text(
+        "time_s,sensor,rss_db\n"
+        + "".join(
+            f"{0.1 * step},s{k},{fill if step % 5 == 2 else levels[0, k]}\n"
+            for step, k in enumerate(order)
+        )
+    )
+    return ["locate", str(folder / "r.csv"), "--sensors", str(folder / "s.csv"), "--quiet"]
+
+
+@pytest.mark.parametrize("options", [[], ["--sources", "1"]])
+def test_locate_finds_a_source_in_single_readings(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], options: list[str]
+) -> None:
+    arguments = long_table(tmp_path, 60)
+    assert main([*arguments, "--sigma", "2", *options]) == 0
+    rows = list(csv.DictReader(capsys.readouterr().out.splitlines()))
+    assert {row["label"] for row in rows} == {"0"}
+    last = np.array([float(rows[-1]["x_m"]), float(rows[-1]["y_m"])])
+    assert np.linalg.norm(last - [60.0, 90.0]) < 10
+
+
+def test_locate_missing_names_a_fill_value(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = long_table(tmp_path, 60, fill="100")
+    assert main([*arguments, "--missing", "100", "--missing", "-200"]) == 0
+    named = capsys.readouterr()
+    assert named.err == ""
+    assert main(long_table(tmp_path, 60)) == 0
+    assert capsys.readouterr().out == named.out
+    assert main(long_table(tmp_path, 60, fill="100")) == 0
+    assert "100 dB repeats far from all other readings" in capsys.readouterr().err
+
+
+def test_locate_refuses_more_sources_than_sensors_with_readings(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    readings, sensors = written(tmp_path)
+    command = ["locate", str(readings), "--sensors", str(sensors), "--sources", "40", "--quiet"]
+    assert main(command) == 2
+    assert "n_sources must be at most 25, the number of sensors" in capsys.readouterr().err
+
+
+def test_locate_warns_if_no_source_was_found(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = long_table(tmp_path, 2)
+    assert main(arguments) == 0
+    result = capsys.readouterr()
+    assert result.out.count("\n") == 1
+    assert "no source was found" in result.err

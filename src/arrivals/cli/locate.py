@@ -15,6 +15,7 @@ from arrivals.cli.outputs import check_different
 from arrivals.files import check_output
 from arrivals.measurement_models import LogNormalRSS, db_to_neper
 from arrivals.motion_models import ConstantVelocity
+from arrivals.recordings.fill_values import warn_fill_values
 from arrivals.recordings.networks import Network, read_network
 from arrivals.trackers import RSSML, RSSVB, AmplitudePrior, PositionEstimate, find
 from arrivals.trackers.run import Run, RunRecorder, header, text
@@ -49,7 +50,7 @@ class PathLossSettings:
 
     def model(self, network: Network) -> LogNormalRSS:
         """Return the model of the readings of a network."""
-        r_min = extent(network) / 100 if self.r_min is None else self.r_min
+        r_min = network.extent / 100 if self.r_min is None else self.r_min
         return LogNormalRSS(
             np.zeros((len(network.name), 2)),
             float(db_to_neper(self.sigma_db)),
@@ -137,12 +138,19 @@ def locate_sources(
     if (np.diff(network.time) <= 0).any():
         raise ValueError("time must increase from row to row")
     kind: Any = find(one_of("tracker", tracker, ("rss_vb", "rss_ml")))
+    n_valid = int(np.isfinite(network.rss_db).any(axis=0).sum())
+    if n_sources is not None and n_sources > n_valid:
+        raise ValueError(
+            f"n_sources must be at most {n_valid}, the number of sensors with readings; "
+            f"got {n_sources}"
+        )
+    warn_fill_values(network.rss_db)
     model = path_loss.model(network)
-    return _track(
+    run = _track(
         kind(
             ConstantVelocity(source.q),
             network.readings_at(0, model)[0],
-            P0=np.diag([extent(network), source.speed] * 2) ** 2,
+            P0=np.diag([network.extent, source.speed] * 2) ** 2,
             n_sources=n_sources,
             amplitude=source.amplitude(network, path_loss.alpha),
             births=n_sources is None and len(network) > 1,
@@ -152,6 +160,12 @@ def locate_sources(
         model,
         progress,
     )
+    if not (run.label >= 0).any():
+        warnings.warn(
+            "no source was found: the readings are noise, too few at a time, or of sources "
+            "unlike --floor, --power and --sigma", stacklevel=2
+        )  # fmt: skip
+    return run
 
 
 def _track(
@@ -167,25 +181,22 @@ def _track(
             tracker.predict(dt=now - before)
         before = now
         tracker.measurement = model_now
-        with warnings.catch_warnings():
-            if step:
-                warnings.simplefilter("ignore")  # the warnings of the first step are enough
-            tracker.update(z)
+        tracker.update(z)
         recorder.add(tracker.estimate, tracker.x)
     return recorder.run(dt=1.0, elapsed=np.nan).at(network.time)
 
 
-def extent(network: Network) -> float:
-    """Return the extent of the sensors, the larger of x and y, m; 1 m if they share a position."""
-    positions = network.sensors.reshape(-1, 2)
-    known = positions[np.isfinite(positions).all(axis=1)]
-    return float(np.ptp(known, axis=0).max()) or 1.0
-
-
 def _source_level(network: Network, alpha: float) -> float:
     """Return the level at 1 m of a source at half the mean sensor spacing from the nearest one."""
-    distance = extent(network) / (2 * np.sqrt(len(network.name)))
-    largest = float(np.nanmedian(np.nanmax(network.readings, axis=1)))
+    n = len(network.name)
+    distance = network.extent / (2 * np.sqrt(n))
+    valid = np.isfinite(network.rss_db)
+    filled = np.where(valid, network.readings, -np.inf).max(axis=1)
+    rows = np.flatnonzero(valid.any(axis=1))
+    # the largest reading of as many rows as hold one reading a sensor
+    block = (np.cumsum(valid.sum(axis=1))[rows] - 1) // n
+    first = np.flatnonzero(np.diff(block, prepend=-1))
+    largest = float(np.median(np.maximum.reduceat(filled[rows], first)))
     return largest + 0.5 * alpha * float(np.log(distance))
 
 
@@ -202,6 +213,8 @@ def add_locate(commands: Any, bar: Callable[[bool], Callable[..., Any]]) -> None
     option("file", metavar="READINGS", help="file with levels in dB or dBm")
     option("--sensors", metavar="CSV", help="table of sensors: name, x_m, y_m")
     option("--sources", type=int, metavar="K", help="number of sources (estimated)")
+    option("--missing", type=float, action="append", default=[], metavar="DB",
+           help="level that stands for a missing reading, such as 100; repeatable")  # fmt: skip
     option("--tracker", default="rss_vb", choices=("rss_vb", "rss_ml"), help="(rss_vb)")
     option("--alpha", type=float, default=2.0, metavar="A", help="loss exponent (2)")
     option("--sigma", type=float, default=6.0, metavar="DB", help="shadowing (6)")
@@ -233,7 +246,7 @@ def locate(arguments: argparse.Namespace, bar: Callable[..., Any]) -> None:
         If the arguments or the files are invalid; nothing has been written then.
     """
     _check_outputs(arguments)
-    network = read_network(arguments.file, arguments.sensors)
+    network = read_network(arguments.file, arguments.sensors, arguments.missing)
     if (np.diff(network.time) <= 0).any():
         raise ValueError(f"{arguments.file}: time must increase from row to row")
     path_loss = PathLossSettings(

@@ -7,11 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from arrivals.measurement_models import LogGains, LogNormalRSS, db_to_neper
+from arrivals.recordings.fill_values import warn_fill_values
 from arrivals.recordings.networks import Network
 from arrivals.typing import Float, Int
 from arrivals.validation import positive
 
 N_ITERATIONS = 3  # of scale and fit
+MIN_SIGMA = 1e-3  # Np, of readings without noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +77,7 @@ class Calibration:
 def calibrate(
     network: Network,
     *,
-    r_min: float = 20.0,
+    r_min: float | None = None,
     offset_std_db: float = 7.0,
     floor_db: float | None = None,
 ) -> Calibration:
@@ -87,8 +89,8 @@ def calibrate(
     ----------
     network : Network
         With the true positions of one transmitter.
-    r_min : float
-        Floor of the range, m.
+    r_min : float, optional
+        Floor of the range, m; a hundredth of the extent of the sensors if None, at most 20 m.
     offset_std_db : float
         Prior standard deviation of an offset, dB: the ridge.
     floor_db : float, optional
@@ -118,9 +120,11 @@ def calibrate(
     """
     if network.truth is None or network.truth.shape[1] != 1:
         raise ValueError("network must have the true positions of one transmitter")
+    warn_fill_values(network.rss_db)
+    r_min = min(20.0, network.extent / 100) if r_min is None else positive("r_min", r_min)
     ridge = float(db_to_neper(positive("offset_std_db", offset_std_db)))
     distance = np.linalg.norm(network.truth - network.sensors, axis=-1)
-    log_range = np.log(np.maximum(distance, positive("r_min", r_min)))
+    log_range = np.log(np.maximum(distance, r_min))
     valid = np.isfinite(network.rss_db) & np.isfinite(log_range)
     if floor_db is not None:
         valid &= network.rss_db > floor_db + 3.0
@@ -161,5 +165,6 @@ def _regression(
             raise ValueError(f"network must have readings that determine the fit: {fit.message}")
         x = fit.x
         residual = xi - A @ x
-        sigma = float(np.median(np.abs(residual - np.median(residual)))) / 0.6745
-    return x, float(np.std(residual))
+        scale = float(np.median(np.abs(residual - np.median(residual)))) / 0.6745
+        sigma = max(scale, MIN_SIGMA)
+    return x, max(float(np.std(residual)), MIN_SIGMA)

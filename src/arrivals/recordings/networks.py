@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from arrivals.recordings.file_contents import MAX_BYTES, check_size
 from arrivals.recordings.numpy_files import numpy_arrays
 from arrivals.tables import TableRow, named_rows
 from arrivals.typing import Float
+from arrivals.validation import real
 
 TIMES = ("time_s", "time", "t")
 ARRAYS = ("rss_db", "sensor_xy", "sensor_name", "time", "tx_xy")  # of an npz file
@@ -107,8 +108,20 @@ class Network:
         """Levels as log amplitudes, Np, (n_steps, n_sensors)."""
         return db_to_neper(self.rss_db)
 
+    @property
+    def extent(self) -> float:
+        """Extent of the sensors, the larger of x and y, m; 1 m if they share a position."""
+        positions = self.sensors[np.isfinite(self.sensors).all(axis=-1)]
+        return float(np.ptp(positions, axis=0).max()) or 1.0
+
     def __len__(self) -> int:
         return len(self.time)
+
+    def without(self, missing: Sequence[float]) -> Network:
+        """Return the network without the readings that equal a value of `missing`, dB."""
+        values = np.atleast_1d(real("missing", missing))
+        rss_db = np.where(np.isin(self.rss_db, values), np.nan, self.rss_db)
+        return replace(self, rss_db=rss_db)
 
     def select(self, steps: Any) -> Network:
         """Return the network at some of the steps."""
@@ -137,7 +150,9 @@ class Network:
 
 
 def read_network(
-    readings: str | PathLike[str], sensors: str | PathLike[str] | None = None
+    readings: str | PathLike[str],
+    sensors: str | PathLike[str] | None = None,
+    missing: Sequence[float] = (),
 ) -> Network:
     """Read a measured network from files.
 
@@ -150,6 +165,8 @@ def read_network(
         ``time_s, sensor, rss_db``. Levels in dB or dBm; empty where missing.
     sensors : path, optional
         Table of the sensors for a CSV file, with the columns ``name, x_m, y_m``.
+    missing : sequence of float
+        Levels, dB, that stand for a missing reading, such as 100 or -200.
 
     Returns
     -------
@@ -167,13 +184,13 @@ def read_network(
     ValueError: readings.csv requires a table of sensors, with the columns name, x_m, y_m
     """
     if Path(readings).suffix.lower() == ".npz":
-        return _from_npz(readings)
+        return _from_npz(readings).without(missing)
     if sensors is None:
         raise ValueError(f"{readings} requires a table of sensors, with the columns name, x_m, y_m")
     name, positions = read_sensors(sensors)
     with _named(readings):
         time, rss_db = _levels(_table(readings), name)
-        return Network.fixed(name, positions, rss_db, time)
+        return Network.fixed(name, positions, rss_db, time).without(missing)
 
 
 def read_sensors(path: str | PathLike[str]) -> tuple[list[str], Float]:
