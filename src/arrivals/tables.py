@@ -164,8 +164,8 @@ def table_lines(data: bytes, comments: tuple[str, ...] = COMMENTS) -> Iterator[T
 
 
 def _is_data(line: str, comments: tuple[str, ...]) -> bool:
-    line = line.strip(" \r\n").lower()
-    return bool(line) and (line.startswith(ERRORS) or not line.startswith(comments))
+    line = line.strip(" \r\n")
+    return bool(line) and (not line.startswith(comments) or line.lower().startswith(ERRORS))
 
 
 def _decoded(data: bytes) -> str:

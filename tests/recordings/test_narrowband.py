@@ -188,3 +188,11 @@ def test_recording_of_text_is_refused() -> None:
         TypeError, match="samples must hold numbers, NaN for a missing one; got <U1"
     ):
         Recording(np.array(["a", "b"]))
+
+
+def test_default_window_that_no_recording_fills_is_refused() -> None:
+    for rate, frequency in ((1e30, 1000.0), (8000.0, 1e-30)):
+        with pytest.raises(
+            ValueError, match=r"rate must be at most 1\.34e\+08 times the frequency"
+        ):
+            default_window(rate, frequency)

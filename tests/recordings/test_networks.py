@@ -90,6 +90,7 @@ def test_tables_of_any_spreadsheet_are_read(tmp_path: Path, readings: str, senso
         ("readings.csv", b'time_s,a\n0,-60\n0,"-61\n', "line 3: unexpected end of data"),
         ("readings.csv", b"time_s,a\nNA,-60\n", "time must be finite; got NaN in step 0"),
         ("readings.csv", b"time_s,a\n0,1e999\n", "rss_db must have a valid reading"),
+        ("readings.csv", b"time_s,a\n0,-6000\n", r"rss_db must lie within ±340 dB; got -6000"),
         ("readings.csv", b"\0" * 100, "the sensor .* is not in the table|no row below"),
     ],
 )

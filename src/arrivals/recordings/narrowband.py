@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from arrivals.typing import Complex
 from arrivals.validation import count, positive
 
+MAX_WINDOW = 2**30  # samples
 MAX_BLOCK = 2**21  # complex numbers of one result of the STFT: 32 MB
 
 
@@ -33,7 +34,11 @@ def default_window(rate: float, frequency: float) -> int:
     >>> default_window(48000.0, 5000.0), default_window(48000.0, 100.0)
     (256, 4096)
     """
-    return int(2 ** math.ceil(math.log2(max(256.0, 8 * rate / frequency))))
+    eight_periods = 8 * positive("rate", rate) / positive("frequency", frequency)
+    if eight_periods > MAX_WINDOW:
+        most = f"{MAX_WINDOW / 8:.3g} times the frequency, {frequency:g} Hz"
+        raise ValueError(f"rate must be at most {most}; got {rate:g} Hz")
+    return int(2 ** math.ceil(math.log2(max(256.0, eight_periods))))
 
 
 def narrowband(

@@ -23,6 +23,7 @@ from arrivals.validation import real
 
 TIMES = ("time_s", "time", "t")
 ARRAYS = ("rss_db", "sensor_xy", "sensor_name", "time", "tx_xy")  # of an npz file
+MAX_LEVEL_DB = 340.0  # 39 Np: levels beyond are no measurements
 LEVELS = ("rss_db", "rss_dbm", "level_db", "rss")
 
 
@@ -80,6 +81,9 @@ class Network:
         if len(got) != 3 or got[::2] != (len(self), 2):
             raise ValueError(f"truth must have shape ({len(self)}, n_sources, 2); got {got}")
         valid = np.isfinite(self.rss_db)
+        if (np.abs(self.rss_db[valid]) > MAX_LEVEL_DB).any():
+            worst = self.rss_db[valid][np.abs(self.rss_db[valid]).argmax()]
+            raise ValueError(f"rss_db must lie within ±{MAX_LEVEL_DB:g} dB; got {worst:g}")
         if not valid.any():
             raise ValueError("rss_db must have a valid reading; all are missing")
         unplaced = valid & ~np.isfinite(self.sensors).all(axis=-1)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arrivals.measurements import is_missing
-from arrivals.recordings.narrowband import default_window, narrowband
+from arrivals.recordings.narrowband import MAX_WINDOW, default_window, narrowband
 from arrivals.trackers import Tracker
 from arrivals.trackers.run import header, text
 from arrivals.typing import Complex
@@ -90,6 +90,8 @@ def live_snapshots(
             narrowband(np.empty((0, 1)), rate, each, 2, 1)  # checks both before the first read
         window = default_window(rate, lowest) if window is None else count("window", window, 2)
         hop, half = window if hop is None else count("hop", hop), window / 2
+    if max(window, hop) > MAX_WINDOW:
+        raise ValueError(f"window and hop must be at most {MAX_WINDOW}; got {window} and {hop}")
     any_finite = False
     for step, block in enumerate(_windows(source, frame, window, hop)):
         samples = np.frombuffer(block, kind).reshape(window, n_channels)

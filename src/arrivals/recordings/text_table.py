@@ -26,13 +26,22 @@ def read_text(file: BinaryIO) -> FileContents:
         n = len(line.cells)
         if rows and n != len(rows[0]):
             raise ValueError(f"line {line.number} must have {len(rows[0])} values; got {n}")
-        rows.append(np.array([_number(line, column) for column in range(n)]))
+        rows.append(np.array(_numbers(line)))
     if not rows:
         raise ValueError("the file contains no numbers")
     table = np.array(rows)
     if heading and heading[0].strip().lower() in TIME_HEADINGS and table.shape[1] > 1:
         return FileContents(table[:, 1:], time=table[:, 0].real)
     return FileContents(table)
+
+
+def _numbers(line: TableLine) -> list[float] | list[float | complex]:
+    try:
+        if "_" not in "".join(line.cells):
+            return list(map(float, line.cells))  # the usual case
+    except ValueError:
+        pass
+    return [_number(line, column) for column in range(len(line.cells))]
 
 
 def _is_heading(line: TableLine) -> bool:
