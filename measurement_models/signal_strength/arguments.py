@@ -10,6 +10,8 @@ from arrivals.messages import shown
 from arrivals.typing import Float
 from arrivals.validation import count, items, number, real
 
+MOST_NEPER = 300.0  # its exponential, squared, is finite
+
 
 def per_sensor(name: str, value: ArrayLike, n: int) -> float | Float:
     """Return a finite number, or one for each sensor that cannot be written to.
@@ -20,16 +22,13 @@ def per_sensor(name: str, value: ArrayLike, n: int) -> float | Float:
     Traceback (most recent call last):
     ValueError: sigma must be a number or have shape (3,); got (2,)
     """
-    if np.ndim(value) == 0:
-        value = number(name, value)
-        if not np.isfinite(value):
-            raise ValueError(f"{name} must be finite; got {value}")
-        return value
     array = np.array(real(name, value))
+    if not (np.abs(array) < MOST_NEPER).all():
+        raise ValueError(f"{name} must be finite, at most {MOST_NEPER} Np; got {shown(value)}")
+    if array.ndim == 0:
+        return number(name, value)
     if array.shape != (n,):
         raise ValueError(f"{name} must be a number or have shape ({n},); got {array.shape}")
-    if not np.isfinite(array).all():
-        raise ValueError(f"{name} must be finite; got {array.tolist()}")
     array.setflags(write=False)
     return array
 
