@@ -26,8 +26,9 @@ from arrivals.measurement_models.snapshot_likelihood import (
     log_marginal,
     of_state,
 )
+from arrivals.measurements import numbers
 from arrivals.typing import Complex, Float
-from arrivals.validation import count, instance, one_of, positive
+from arrivals.validation import count, instance, one_of, positive, real
 
 
 @dataclass(frozen=True)
@@ -144,7 +145,7 @@ class ArraySnapshot(SnapshotGate, SingleSourceSnapshot):
 
         The waves are horizontal and of the nominal slowness.
         """
-        doa = np.asarray(doa, dtype=np.float64)
+        doa = real("doa", doa)
         a = self.array.steering_vector(doa[..., None], np.asarray(self.wavelengths))
         if self.response is not None:
             a = a * np.moveaxis(self.response(doa), 0, -2)
@@ -202,7 +203,7 @@ class ArraySnapshot(SnapshotGate, SingleSourceSnapshot):
         ndarray, shape (...)
         """
         z = from_composite(z, self.shape)
-        doa = np.asarray(doa, dtype=np.float64)
+        doa = real("doa", doa)
         if amplitude is not None:
             return log_known(self.snapshot(z), self.wave(doa, amplitude), self.noise)
         a = self.waves.steering(doa.ravel())
@@ -211,7 +212,7 @@ class ArraySnapshot(SnapshotGate, SingleSourceSnapshot):
 
     def wave(self, doa: ArrayLike, amplitude: ArrayLike) -> Complex:
         """Return noiseless measurements of sources at `doa` (..., n_sources), as in `simulate`."""
-        doa = np.asarray(doa, dtype=np.float64)
+        doa, amplitude = np.atleast_1d(real("doa", doa)), numbers("amplitude", amplitude)
         active = ~np.isnan(doa)
         A = self.steering_vector(np.where(active, doa, 0.0))  # (..., K, [F], M)
         if self.n_bins > 1:
@@ -219,8 +220,12 @@ class ArraySnapshot(SnapshotGate, SingleSourceSnapshot):
         axes = tuple(range(doa.ndim - 1, doa.ndim + len(self.shape) - 2))  # bins, snapshots
         if self.n_snapshots > 1:
             A = np.expand_dims(A, -3)
-        w = np.where(np.expand_dims(active, axes), amplitude, 0.0)
-        return np.asarray((w[..., None, :] @ A)[..., 0, :])
+        try:
+            w = np.where(np.expand_dims(active, axes), amplitude, 0.0)
+            return np.asarray((w[..., None, :] @ A)[..., 0, :])
+        except (ValueError, RuntimeError):
+            shapes = f"{doa.shape} and {amplitude.shape}"
+            raise ValueError(f"doa and amplitude must have shapes that fit; got {shapes}") from None
 
     def simulate(self, doa: ArrayLike, amplitude: ArrayLike, rng: np.random.Generator) -> Complex:
         """Draw measurements (..., *shape) of sources at `doa` (..., n_sources), rad.
@@ -228,6 +233,7 @@ class ArraySnapshot(SnapshotGate, SingleSourceSnapshot):
         Amplitudes are complex, at the origin of coordinates, and are broadcast to
         (..., bins and snapshots as in `shape`, n_sources); a source of NaN direction is inactive.
         """
+        instance("rng", rng, np.random.Generator)
         wave = self.wave(doa, amplitude)
         shape = np.broadcast_shapes(wave.shape, self.shape)
         u = rng.standard_normal((*shape, 2)) @ np.array([1, 1j]) * np.sqrt(self.noise / 2)

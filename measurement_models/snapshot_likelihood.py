@@ -30,8 +30,8 @@ def composite(z: ArrayLike) -> Float:
     >>> composite([1 + 2j, 3 - 4j])
     array([ 1.,  3.,  2., -4.])
     """
-    z = np.asarray(z)
-    return np.concatenate([z.real, z.imag], axis=-1).astype(np.float64)
+    z = np.atleast_1d(numbers("z", z))
+    return np.concatenate([z.real, z.imag], axis=-1)
 
 
 def from_composite(z: ArrayLike, shape: tuple[int, ...]) -> Complex | Float:

@@ -171,7 +171,7 @@ CLASSES: dict[str, tuple[Any, list[Arguments]]] = {
     "InterpolationDelay": (
         mm.InterpolationDelay,
         [{"interpolator": mm.DelayInterpolator(TONE), "n_sensors": 4, "noise_ratio": 0.1,
-          "baseline": 1, "inflation": 1.0, "regressors": np.ones((3, 2))}],
+          "baseline": 1, "inflation": 1.0}],
     ),
     "DelayLine": (
         mm.DelayLine,

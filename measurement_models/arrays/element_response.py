@@ -41,7 +41,10 @@ class ElementResponse(FrozenModel):
     gains: Complex
 
     def __post_init__(self) -> None:
-        gains = np.array(self.gains)
+        try:
+            gains = np.array(self.gains)
+        except ValueError:
+            raise ValueError("gains must have rows of one length; got a ragged list") from None
         if gains.dtype.kind not in "biufc":
             gains = _of_texts(gains)
         gains = gains.astype(np.complex128)
@@ -121,5 +124,5 @@ def _of_texts(gains: Float | Complex) -> Complex:
     """Read what `_texts` wrote."""
     try:
         return np.asarray(np.vectorize(complex, otypes=[np.complex128])(gains))
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise TypeError(f"gains must be numbers; got {gains.dtype}") from None

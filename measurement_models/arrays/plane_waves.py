@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.arrays.element_response import ElementResponse
 from arrivals.measurement_models.arrays.sensor_array import SensorArray
+from arrivals.messages import shown
 from arrivals.parameters import FrozenModel
 from arrivals.typing import Complex, Float, Int
 from arrivals.validation import positive, real
@@ -131,9 +132,9 @@ def frequency_bins(wavelength: float | Sequence[float]) -> float | tuple[float, 
     >>> frequency_bins([2.0]), frequency_bins([2.0, 1.0])
     (2.0, (2.0, 1.0))
     """
-    if not isinstance(wavelength, Sequence | np.ndarray) or isinstance(wavelength, str):
-        positive("wavelength", wavelength)
-        return wavelength
+    is_list = isinstance(wavelength, Sequence) and not isinstance(wavelength, str)
+    if not is_list and not (isinstance(wavelength, np.ndarray) and wavelength.ndim):
+        return positive("wavelength", wavelength)
     bins = tuple(positive("wavelength", each) for each in wavelength)
     if not bins:
         raise ValueError("wavelength must name at least one bin; got none")
@@ -152,7 +153,7 @@ def grid_of(name: str, values: Sequence[float] | None) -> tuple[float, ...] | No
         return None
     grid = real(name, values)
     if grid.ndim != 1 or len(grid) == 0 or not np.isfinite(grid).all():
-        raise ValueError(f"{name} must be a list of finite numbers; got {grid}")
+        raise ValueError(f"{name} must be a list of finite numbers; got {shown(values)}")
     return tuple(grid.tolist())
 
 

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.arrays.uniform_grid import grid_spacing
+from arrivals.messages import shown
 from arrivals.parameters import FrozenModel
 from arrivals.typing import Complex, Float, Int
-from arrivals.validation import count, positive, real
+from arrivals.validation import count, items, positive, real
 
 
 def direction(doa: ArrayLike, dim: int) -> Float:
@@ -27,7 +28,7 @@ def direction(doa: ArrayLike, dim: int) -> Float:
     >>> direction(np.pi / 6, 1).round(3), direction(np.pi / 2, 2).round(3)
     (array([0.5]), array([0., 1.]))
     """
-    doa = np.asarray(doa, dtype=np.float64)
+    doa = real("doa", doa)
     if dim == 1:
         return np.asarray(np.sin(doa)[..., None])
     level = [np.zeros_like(doa)] * (dim - 2)
@@ -60,9 +61,15 @@ def steering_vector(positions: ArrayLike, doa: ArrayLike, wavelength: ArrayLike)
     >>> steering_vector([[0.0], [0.25]], np.pi / 2, wavelength=1.0).round(6)
     array([1.+0.j, 0.+1.j])
     """
-    positions = np.asarray(positions, dtype=np.float64)
+    positions, wavelength = real("positions", positions), real("wavelength", wavelength)
+    if not (wavelength > 0).all():
+        raise ValueError(f"wavelength must be positive; got {shown(wavelength)}")
     path = direction(doa, positions.shape[1]) @ positions.T
-    waves = path / np.asarray(wavelength, dtype=np.float64)[..., None]
+    try:
+        waves = path / wavelength[..., None]
+    except ValueError:
+        shapes = f"{path.shape[:-1]} and {wavelength.shape}"
+        raise ValueError(f"doa and wavelength must have shapes that fit; got {shapes}") from None
     return np.asarray(np.exp(2j * np.pi * waves))
 
 
@@ -120,7 +127,8 @@ class SensorArray(FrozenModel):
         if self.speed is not None:
             object.__setattr__(self, "speed", positive("speed", self.speed))
         if self.channels is not None:
-            channels = tuple(count("channels", channel, minimum=0) for channel in self.channels)
+            given = items("channels", self.channels)
+            channels = tuple(count("channels", channel, minimum=0) for channel in given)
             if len(channels) != len(positions):
                 raise ValueError(
                     f"channels must name one channel for each of the {len(positions)} sensors; "
@@ -202,9 +210,11 @@ class SensorArray(FrozenModel):
         speed: float | None = None,
     ) -> SensorArray:
         """Make a line with a sensor in the centre and one at each distance, m, on either side."""
-        d = np.sort(real("distances", distances)).astype(np.float64)
+        d = np.sort(np.atleast_1d(real("distances", distances)))
         if d.ndim != 1 or len(d) == 0 or not (d > 0).all():
-            raise ValueError(f"distances must be a list of positive numbers; got {distances!r}")
+            raise ValueError(
+                f"distances must be a list of positive numbers; got {shown(distances)}"
+            )
         return cls(np.concatenate([-d[::-1], [0.0], d]), speed).without(missing)
 
     if TYPE_CHECKING:  # functions of `arrays.files`, which the package `arrays` attaches
@@ -219,7 +229,7 @@ class SensorArray(FrozenModel):
 
     def without(self, sensors: Iterable[int]) -> SensorArray:
         """Return the array without some sensors, named by index; the others keep their channels."""
-        gone = sorted({count("sensor", sensor, minimum=0) for sensor in sensors})
+        gone = sorted({count("sensor", sensor, minimum=0) for sensor in items("sensors", sensors)})
         if not gone:
             return self
         if gone[-1] >= self.n_sensors:

@@ -19,6 +19,8 @@ from arrivals.validation import instance, number, positive
 
 MARGIN = 1.1  # of the edges of a filter, so that it does not change the spectrum in the band
 
+MOST_DB = 300  # of a signal-to-noise ratio
+
 
 @dataclass(frozen=True)
 class ArraySamples(FrozenModel):
@@ -96,7 +98,8 @@ class ArraySamples(FrozenModel):
         instance("array", self.array, SensorArray)
         instance("correlation", self.correlation, SourceCorrelation)  # type: ignore[type-abstract]  # any
         positive("rate", self.rate)
-        number("snr_db", self.snr_db)
+        if not abs(number("snr_db", self.snr_db)) <= MOST_DB:
+            raise ValueError(f"snr_db must be from -{MOST_DB} to {MOST_DB}; got {self.snr_db}")
         if self.power is not None:
             positive("power", self.power)
         band = None if self.band is None else checked_band(self.band, self.rate)
@@ -128,7 +131,7 @@ class ArraySamples(FrozenModel):
     @property
     def noise_ratio(self) -> float:
         """ε, noise power over source power."""
-        return float(10 ** (-self.snr_db / 10))
+        return 10 ** (-float(self.snr_db) / 10)
 
     @property
     def n_grid_points(self) -> int:

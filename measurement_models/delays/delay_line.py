@@ -12,6 +12,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from arrivals.entry_names import checked_names
 from arrivals.measurement_models.base import MeasurementModel
 from arrivals.measurement_models.delays.interpolation import DelayInterpolator
 from arrivals.measurement_models.delays.source_correlation import SourceCorrelation
@@ -79,8 +80,8 @@ class SourceAtCentre(MeasurementModel):
 
     def for_state(self, names: Sequence[str]) -> MeasurementModel:
         """Return this model; itself if the delay comes first and the source's elements last."""
-        in_place = (*names[:1], *names[-self.dim_source :]) == self.needs
-        return self if in_place else super().for_state(names)
+        n, names = self.dim_source, checked_names(names)
+        return self if (*names[:1], *names[-n:]) == self.needs else super().for_state(names)
 
     def h(self, x: ArrayLike) -> Float:
         """Return the samples expected of states: (..., dim_x) -> (..., n_sensors)."""
@@ -98,10 +99,8 @@ class SourceAtCentre(MeasurementModel):
     def _states(self, x: ArrayLike) -> Float:
         x = real("x", x)
         if x.ndim == 0 or x.shape[-1] <= self.dim_source:
-            raise ValueError(
-                f"states must have shape (..., n), n > {self.dim_source}: the delay, then the "
-                f"source; got {x.shape}"
-            )
+            wanted = f"(..., n), n > {self.dim_source}: the delay, then the source"
+            raise ValueError(f"states must have shape {wanted}; got {x.shape}")
         return x
 
 

@@ -9,12 +9,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
+from arrivals.entry_names import checked_names
 from arrivals.measurement_models.base import MeasurementModel
 from arrivals.measurement_models.delays.band_filter import BandFilter
 from arrivals.measurement_models.delays.source_correlation import SourceCorrelation
 from arrivals.parameters import FrozenModel
 from arrivals.typing import Float
-from arrivals.validation import count, instance, not_negative, positive, real
+from arrivals.validation import count, instance, items, not_negative, positive, real
 
 
 def window(reach: float) -> tuple[int, ...]:
@@ -83,7 +84,7 @@ class DelayInterpolator(FrozenModel):
     def __post_init__(self) -> None:
         instance("correlation", self.correlation, SourceCorrelation)  # type: ignore[type-abstract]  # any
         not_negative("loading", self.loading)
-        offsets = tuple(count("offsets", offset, minimum=-10_000) for offset in self.offsets)
+        offsets = tuple(count("offsets", o, -10_000) for o in items("offsets", self.offsets))
         if not offsets or len(set(offsets)) < len(offsets):
             raise ValueError(f"offsets must be different whole numbers; got {self.offsets}")
         object.__setattr__(self, "offsets", offsets)
@@ -199,11 +200,10 @@ class InterpolationDelay(MeasurementModel):
         instance("interpolator", self.interpolator, DelayInterpolator)
         not_negative("noise_ratio", self.noise_ratio)
         positive("inflation", self.inflation)
-        if not 1 <= abs(self.baseline) < count("n_sensors", self.n_sensors, minimum=2):
-            raise ValueError(
-                f"baseline must be a number of steps from 1 to {self.n_sensors - 1}, or its "
-                f"negative; got {self.baseline}"
-            )
+        n_sensors = count("n_sensors", self.n_sensors, minimum=2, maximum=10_000)
+        if not 1 <= abs(count("baseline", self.baseline, minimum=-n_sensors)) < n_sensors:
+            wanted = f"a number of steps from 1 to {n_sensors - 1}, or its negative"
+            raise ValueError(f"baseline must be {wanted}; got {self.baseline}")
 
     @property
     def dim_z(self) -> int:
@@ -229,7 +229,7 @@ class InterpolationDelay(MeasurementModel):
         k : int, optional
             Number of a snapshot; the last one with all taps if None.
         """
-        frames = np.asarray(frames, dtype=np.float64)
+        frames = np.atleast_2d(real("frames", frames))
         k = frames.shape[-2] - 1 - self.latency if k is None else k
         if not self.memory <= k < frames.shape[-2] - self.latency:
             raise ValueError(
@@ -258,7 +258,7 @@ class InterpolationDelay(MeasurementModel):
 
     def for_state(self, names: Sequence[str]) -> MeasurementModel:
         """Return this model for states with these names; itself where the delay comes first."""
-        return self if tuple(names[:1]) == self.needs else super().for_state(names)
+        return self if checked_names(names)[:1] == self.needs else super().for_state(names)
 
     def h(self, x: ArrayLike, regressors: ArrayLike | None = None) -> Float:
         """Return the samples predicted for states: X c(mΔ), (..., dim_x) -> (..., dim_z)."""
@@ -282,10 +282,10 @@ class InterpolationDelay(MeasurementModel):
         return float(self.variance(np.zeros(1))) * np.eye(self.dim_z)
 
     def _inputs(self, regressors: ArrayLike | None) -> Float:
-        X = self.regressors if regressors is None else np.asarray(regressors, dtype=np.float64)
+        X = self.regressors if regressors is None else regressors
         if X is None:
             raise ValueError("regressors must be set, samples of the neighbours; got None")
-        m, n = self.dim_z, self.interpolator.n_taps
+        X, m, n = real("regressors", X), self.dim_z, self.interpolator.n_taps
         if X.shape[-2:] != (m, n):
             raise ValueError(f"regressors must have shape (..., {m}, {n}); got {X.shape}")
         return X
@@ -294,6 +294,6 @@ class InterpolationDelay(MeasurementModel):
 def _delay(x: ArrayLike) -> Float:
     """Return element 0 of states (..., dim_x)."""
     x = real("x", x)
-    if x.ndim == 0:
-        raise ValueError("states must have shape (..., dim_x); got a number")
+    if x.ndim == 0 or x.shape[-1] == 0:
+        raise ValueError(f"states must have shape (..., dim_x); got {x.shape}")
     return x[..., 0]

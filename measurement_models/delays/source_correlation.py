@@ -9,9 +9,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
+from arrivals.messages import shown
 from arrivals.parameters import FrozenModel
 from arrivals.typing import Float
-from arrivals.validation import number, positive, real
+from arrivals.validation import items, number, positive, real
 
 N_GRID = 1024  # cells of the band, for spectra without a closed form
 
@@ -154,15 +155,15 @@ class Tones(SourceCorrelation):
     shares: Float = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        frequencies = tuple(np.atleast_1d(real("frequencies", self.frequencies)).tolist())
-        if not all(0 < f < 0.5 for f in frequencies):
+        frequencies = tuple(np.ravel(real("frequencies", self.frequencies)).tolist())
+        if not frequencies or not all(0 < f < 0.5 for f in frequencies):
             raise ValueError(
                 "frequencies must lie above 0 and below half the sampling rate, 0.5 cycles per "
                 f"sample, where a tone is singular; got {list(frequencies)}"
             )
         object.__setattr__(self, "frequencies", frequencies)
         if self.powers is not None:
-            powers = tuple(positive("powers", power) for power in self.powers)
+            powers = tuple(positive("powers", power) for power in items("powers", self.powers))
             if len(powers) != len(frequencies):
                 raise ValueError(
                     f"powers must be {len(frequencies)}, one for each tone; got {len(powers)}"
@@ -219,9 +220,12 @@ class Autoregressive(SourceCorrelation):
     coefficients: Sequence[float]
 
     def __post_init__(self) -> None:
-        a = tuple(np.atleast_1d(real("coefficients", self.coefficients)).tolist())
-        if np.abs(np.roots([1.0, *np.negative(a)])).max(initial=0.0) >= 1:
-            raise ValueError(f"coefficients must be those of a stable process; got {list(a)}")
+        a = tuple(np.ravel(real("coefficients", self.coefficients)).tolist())
+        if (
+            not np.abs(a).max(initial=0.0) < 1e6
+            or np.abs(np.roots([1.0, *np.negative(a)])).max(initial=0.0) >= 1
+        ):
+            raise ValueError(f"coefficients must be those of a stable process; got {shown(a)}")
         object.__setattr__(self, "coefficients", a)
 
     @property

@@ -64,8 +64,8 @@ class ArrayManifold(SingleSourceSnapshot):
 
     def __post_init__(self) -> None:
         instance("array", self.array, SensorArray)
-        positive("wavelength", self.wavelength)
-        positive("noise", self.noise)
+        for name in ("wavelength", "noise"):
+            object.__setattr__(self, name, positive(name, getattr(self, name)))
         _pairs(self.array)
         inner = self.distances[0]
         if inner > 0.5 * (1 + 1e-6):

@@ -6,8 +6,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.signal_strength.envelope import AveragedEnvelope
+from arrivals.messages import shown
 from arrivals.typing import Float
-from arrivals.validation import count, number, real
+from arrivals.validation import count, items, number, real
+
+MOST_NEPER = 300.0  # its exponential, squared, is finite
 
 
 def per_sensor(name: str, value: ArrayLike, n: int) -> float | Float:
@@ -19,16 +22,13 @@ def per_sensor(name: str, value: ArrayLike, n: int) -> float | Float:
     Traceback (most recent call last):
     ValueError: sigma must be a number or have shape (3,); got (2,)
     """
-    if np.ndim(value) == 0:
-        value = number(name, value)
-        if not np.isfinite(value):
-            raise ValueError(f"{name} must be finite; got {value}")
-        return value
     array = np.array(real(name, value))
+    if not (np.abs(array) < MOST_NEPER).all():
+        raise ValueError(f"{name} must be finite, at most {MOST_NEPER} Np; got {shown(value)}")
+    if array.ndim == 0:
+        return number(name, value)
     if array.shape != (n,):
         raise ValueError(f"{name} must be a number or have shape ({n},); got {array.shape}")
-    if not np.isfinite(array).all():
-        raise ValueError(f"{name} must be finite; got {array.tolist()}")
     array.setflags(write=False)
     return array
 
@@ -48,9 +48,9 @@ def entries(
         amplitude = count("amplitude", amplitude, minimum=0)
     if position is None:
         return None, amplitude
-    entries = tuple(count("position", entry, minimum=0) for entry in position)
+    entries = tuple(count("position", entry, minimum=0) for entry in items("position", position))
     if len(entries) != 2:
-        raise ValueError(f"position must name two entries of the state; got {position}")
+        raise ValueError(f"position must name two entries of the state; got {shown(position)}")
     if len({*entries, amplitude}) != 3:
         raise ValueError(
             f"position and amplitude must be different entries; got {position}, {amplitude}"
@@ -69,7 +69,7 @@ def reading_error(
     else:
         checked = per_sensor("sigma", sigma, n)
         if not np.all(np.asarray(checked) > 0):
-            raise ValueError(f"sigma must be positive; got {sigma!r}")
+            raise ValueError(f"sigma must be positive; got {shown(sigma)}")
         variance[:] = np.square(checked)
     variance.setflags(write=False)
     return checked, bias, variance

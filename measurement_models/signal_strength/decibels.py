@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.typing import Float
+from arrivals.validation import real
 
 NEPER_PER_DB = math.log(10) / 20
 
@@ -34,7 +35,7 @@ def db_to_neper(level_db: ArrayLike) -> Float:
     >>> db_to_neper([80.0, 3.0]).round(6)
     array([9.21034 , 0.345388])
     """
-    return np.asarray(np.multiply(level_db, NEPER_PER_DB, dtype=np.float64))
+    return np.asarray(real("level_db", level_db) * NEPER_PER_DB)
 
 
 def neper_to_db(level: ArrayLike) -> Float:
@@ -55,7 +56,7 @@ def neper_to_db(level: ArrayLike) -> Float:
     >>> float(neper_to_db(np.log(100.0)))
     40.0
     """
-    return np.asarray(np.divide(level, NEPER_PER_DB, dtype=np.float64))
+    return np.asarray(real("level", level) / NEPER_PER_DB)
 
 
 def dbm_to_neper(level_dbm: ArrayLike) -> Float:
@@ -101,4 +102,4 @@ def watt_to_neper(power: ArrayLike) -> Float:
     30.0
     """
     with np.errstate(divide="ignore"):
-        return np.asarray(0.5 * np.log(np.multiply(power, 1e3, dtype=np.float64)))
+        return np.asarray(0.5 * np.log(real("power", power) * 1e3))

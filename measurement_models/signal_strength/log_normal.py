@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from arrivals.entry_names import checked_names
 from arrivals.measurement_models.base import MeasurementModel, default_position, locate
 from arrivals.measurement_models.signal_strength.arguments import (
     entries,
@@ -28,7 +29,7 @@ from arrivals.measurement_models.signal_strength.path_loss import (
 )
 from arrivals.measurements import real_numbers
 from arrivals.typing import Float
-from arrivals.validation import constant, count, instance, number, positive, real
+from arrivals.validation import LARGEST, constant, count, instance, number, positive, real
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -136,6 +137,8 @@ class LogNormalRSS(MeasurementModel):
             "log_amplitude": number("log_amplitude", log_amplitude),
             "n_sources": count("n_sources", n_sources),
         }
+        if not abs(own["log_amplitude"]) < LARGEST:
+            raise ValueError(f"log_amplitude must be finite; got {log_amplitude}")
         own["position"], own["amplitude"] = entries(position, amplitude)
         own["_noise"] = -np.inf if own["log_noise"] is None else own["log_noise"]
         own["sigma"], own["_bias"], own["_variance"] = reading_error(sigma, n)
@@ -164,6 +167,7 @@ class LogNormalRSS(MeasurementModel):
         -------
         LogNormalRSS
         """
+        names = checked_names(names)
         if not names or self.position is not None:
             return self
         x, y = locate(self, names)
@@ -219,6 +223,7 @@ class LogNormalRSS(MeasurementModel):
 
     def draw(self, u: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Float:
         """Draw readings of sources (..., n_sources), (..., n_sources, 2), as `sample` does."""
+        instance("rng", rng, np.random.Generator)
         level = self.levels(u, theta).log_sigma + self.gains.offsets
         if isinstance(self.sigma, AveragedEnvelope):
             N = self.sigma.n_snapshots

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.signal_strength.decibels import NEPER_PER_DB
+from arrivals.messages import shown
 from arrivals.parameters import FrozenModel
 from arrivals.validation import count, not_negative, number, one_of, positive, real
 
@@ -228,5 +229,5 @@ def _frozen(name: str, value: ArrayLike) -> Any:
     """Return a finite number or a tuple of finite numbers."""
     array = real(name, value)
     if array.ndim > 1 or not np.isfinite(array).all():
-        raise ValueError(f"{name} must be a finite number or a list of them; got {value!r}")
+        raise ValueError(f"{name} must be a finite number or a list of them; got {shown(value)}")
     return tuple(array.tolist()) if array.ndim else float(array)

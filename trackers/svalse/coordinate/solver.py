@@ -71,6 +71,7 @@ class CoordinateSolver(SolverSettings):
     def __post_init__(self) -> None:
         super().__post_init__()
         one_of("posterior", self.posterior, ("quadrature", "mixture"))
+        one_of("descending", self.descending, (None, True, False))
 
     @classmethod
     def paper(cls) -> Self:
