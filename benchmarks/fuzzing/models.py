@@ -15,7 +15,8 @@ from fuzzing.model_cases import CLASSES, FUNCTIONS, Arguments, state_of
 from fuzzing.values import malformed, value_of
 
 MAY_BE_NAN = (  # as documented
-    "numbers", "real_numbers", "rows", "bootstrap_interval", "circular_nees", "coverage", "position_nees",
+    "numbers", "real_numbers", "rows", "bootstrap_interval", "circular_nees", "coverage",
+    "position_nees",
     "position_coverage", "sdr",
 )  # fmt: skip
 MODEST = 1e100  # of arguments from which a result has to be finite

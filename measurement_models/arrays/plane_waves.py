@@ -135,7 +135,7 @@ def frequency_bins(wavelength: float | Sequence[float]) -> float | tuple[float, 
     is_list = isinstance(wavelength, Sequence) and not isinstance(wavelength, str)
     if not is_list and not (isinstance(wavelength, np.ndarray) and wavelength.ndim):
         return positive("wavelength", wavelength)
-    bins = tuple(positive("wavelength", each) for each in wavelength)
+    bins = tuple(positive("wavelength", each) for each in iter(wavelength))  # type: ignore[arg-type]
     if not bins:
         raise ValueError("wavelength must name at least one bin; got none")
     return bins if len(bins) > 1 else bins[0]

@@ -20,7 +20,7 @@ SOURCE = np.array([11.0, 19.0])
 def levels(n_steps: int = 6, seed: int = 0) -> Float:
     distance = np.linalg.norm(PLACES - SOURCE, axis=-1)
     noise = np.random.default_rng(seed).standard_normal((n_steps, len(PLACES)))
-    return -40.0 - 20 * np.log10(distance) + noise
+    return np.asarray(-40.0 - 20 * np.log10(distance) + noise)
 
 
 def network(rss_db: Float) -> Network:
