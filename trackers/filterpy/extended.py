@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from arrivals.measurement_models.linear import LinearMeasurement
 from arrivals.trackers.filterpy.dimensions import ConstructedByDimensions, unit_models
 from arrivals.trackers.gaussian.ekf import EKF
 from arrivals.trackers.gaussian.filterpy_names.function_updates import has_functions
@@ -42,7 +43,6 @@ class ExtendedKalmanFilter(ConstructedByDimensions, EKF):
         motion, measurement = unit_models(dim_x, dim_z)
         super().__init__(motion, measurement, np.zeros((dim_x, 1)), np.eye(dim_x))
         self.unused_controls = count("dim_u", dim_u, minimum=0)
-        self.no_measurement = measurement
 
     def predict(self, u: ArrayLike | None = None, **step: Any) -> None:
         """Predict mean and covariance; parameters as in `GaussianFilter.predict`."""
@@ -74,7 +74,8 @@ class ExtendedKalmanFilter(ConstructedByDimensions, EKF):
         TypeError
             If there is no measurement function.
         """
-        unknown = self.measurement is self.no_measurement
-        if unknown and not has_functions(arguments, named) and named.get("H") is None:
+        model = self.measurement
+        without = isinstance(model, LinearMeasurement) and not model.matrix.any()
+        if without and not has_functions(arguments, named) and named.get("H") is None:
             raise TypeError("update must be called with HJacobian and Hx, or assign measurement")
         super().update(z, *arguments, **named)

@@ -213,7 +213,9 @@ class GaussianFilter(ModelMatrices, DeclaredAttributes, Tracker):
         """Set a belief, shapes (n,) and (n, n), without the checks of an assigned one."""
         if type(self.x) is not np.ndarray or self.x.ndim > 1:
             x = x.reshape(np.shape(self.x))
-        vars(self).update(x=x, P=P, _known_x=x, _known_P=P)  # faster than assignments
+        own = vars(self)
+        own["x"] = own["_known_x"] = x
+        own["P"] = own["_known_P"] = P
 
     def check_measurement(
         self, z: ArrayLike | None, R: ArrayLike | None, H: Float | None
@@ -247,7 +249,10 @@ class GaussianFilter(ModelMatrices, DeclaredAttributes, Tracker):
             check_finite(x, P)
         if type(self.x) is not np.ndarray or self.x.ndim > 1:
             x = x.reshape(np.shape(self.x))
-        vars(self).update(x=x, P=P, _known_x=x, _known_P=P, x_prior=x.copy(), P_prior=P.copy())
+        own = vars(self)  # faster than assignments, which are checked
+        own["x"] = own["_known_x"] = x
+        own["P"] = own["_known_P"] = P
+        own["x_prior"], own["P_prior"] = x.copy(), P.copy()
         if dt != self.last_dt:
             self.read_again(dt)
 
@@ -260,22 +265,15 @@ class GaussianFilter(ModelMatrices, DeclaredAttributes, Tracker):
         x, P, column = wrapped(update.x, angles) if angles else update.x, update.P, False
         if type(self.x) is not np.ndarray or self.x.ndim > 1:
             x, column = x.reshape(np.shape(self.x)), np.ndim(self.x) > 1
-        vars(self).update(
-            x=x,
-            P=P,
-            _known_x=x,
-            _known_P=P,
-            z=z[:, None] if column else z,
-            y=update.y[:, None] if column else update.y,
-            K=update.K,
-            S=update.S,
-            SI=update.SI,
-            log_likelihood=log_likelihood,
-            mahalanobis=math.sqrt(max(float(update.square), 0.0)),
-            jitter_count=self.jitter_count + update.jittered,
-            x_post=x.copy(),
-            P_post=P.copy(),
-        )
+        own = vars(self)
+        own["x"] = own["_known_x"] = x
+        own["P"] = own["_known_P"] = P
+        own["x_post"], own["P_post"] = x.copy(), P.copy()
+        own["z"], own["y"] = (z[:, None], update.y[:, None]) if column else (z, update.y)
+        own["K"], own["S"], own["SI"] = update.K, update.S, update.SI
+        own["log_likelihood"] = log_likelihood
+        own["mahalanobis"] = math.sqrt(max(float(update.square), 0.0))
+        own["jitter_count"] += update.jittered
 
     def record_missed(self) -> None:
         """Set the attributes of the last measurement to those of a missing one."""

@@ -10,9 +10,15 @@ import pytest
 from filterpy.common import Saver
 from filterpy_twins import BEARING, WALK, P, X, assert_twins, plain, twins
 
-from arrivals.measurement_models import FunctionMeasurement, LinearMeasurement
+from arrivals.measurement_models import (
+    ArraySamples,
+    FunctionMeasurement,
+    LinearMeasurement,
+    SensorArray,
+    Tones,
+)
 from arrivals.motion_models import CoordinatedTurn, LinearMotion, RandomWalk, VonMisesWalk
-from arrivals.trackers import EKF, IMM, UKF, GaussianFilter, Kalman, Particle
+from arrivals.trackers import EKF, IMM, UKF, GaussianFilter, InterpolationEKF, Kalman, Particle
 
 KINDS: list[type[GaussianFilter]] = [Kalman, EKF, UKF]
 ZS = np.random.default_rng(5).normal(size=(4, 2))
@@ -130,6 +136,33 @@ def test_assigned_noise_keeps_a_nonlinear_model(kind: type[GaussianFilter]) -> N
     assert isinstance(tracker.motion, LinearMotion)
     with pytest.raises(ValueError, match="dt must be 1"):
         tracker.predict(dt=0.5)
+
+
+def test_written_transition_keeps_the_noise_of_the_last_step() -> None:
+    tracker = plain()
+    tracker.predict(dt=0.5)
+    assert (WALK.Q(0.5) == tracker.Q).all()
+    tracker.F[0, 1] = 0.7
+    assert tracker.motion == LinearMotion(tracker.F, WALK.Q(0.5), names=WALK.state_names)
+
+
+def test_matrices_read_at_another_step_length_are_read_again() -> None:
+    tracker = plain()
+    for dt in (1.0, 0.5, 0.5, 2.0):
+        tracker.predict(dt=dt)
+        assert (WALK.F(dt=dt) == tracker.F).all()
+        assert (WALK.Q(dt) == tracker.Q).all()
+
+
+def test_filter_with_a_longer_state_refuses_matrices_with_the_cure() -> None:
+    array = ArraySamples(SensorArray.ula(4, 0.1, speed=340.0), rate=4000.0, correlation=Tones(0.25))
+    joint = InterpolationEKF(array, variant="E", std=0.01)
+    for name in ("F", "Q", "H", "R"):
+        with pytest.raises(AttributeError, match=f"{name} of InterpolationEKF cannot be assigned"):
+            setattr(joint, name, np.eye(2))
+    with pytest.raises(ValueError, match="follow the state"):
+        joint.F[0, 0] = 2.0
+    assert joint.alpha == 1.0
 
 
 def test_assigned_matrices_keep_angles() -> None:

@@ -144,6 +144,13 @@ def test_other_name_of_filterpy_raises() -> None:
 def test_filter_without_measurement_function_raises() -> None:
     with pytest.raises(TypeError, match="HJacobian and Hx, or assign measurement"):
         ours.ExtendedKalmanFilter(2, 1).update(1.0)
+    ekf = ours.ExtendedKalmanFilter(2, 1)
+    ekf.R *= 2
+    with pytest.raises(TypeError, match="HJacobian and Hx, or assign measurement"):
+        ekf.update(1.0)
+    ekf.H[0, 0] = 1.0
+    ekf.update(1.0)
+    assert ekf.x[0] == pytest.approx(1 / 3)
 
 
 def test_control_input_without_matrix_raises() -> None:

@@ -189,3 +189,31 @@ def test_invalid_parameters_raise(
 
 def test_imm_probabilities_are_normalized() -> None:
     np.testing.assert_allclose(two(mu=[1, 3]).mu, [0.25, 0.75])
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda bank: bank.predict(np.nan), "u must be finite; got nan"),
+        (lambda bank: bank.predict(dt=np.inf), "dt must be finite and not negative; got inf"),
+        (lambda bank: bank.predict(1.0), "u must be None or 0|control matrix"),
+        (lambda bank: bank.update([1.0, 2.0]), r"z must have shape \(1,\)"),
+    ],
+)
+@pytest.mark.parametrize("first", [0, 1])
+def test_error_leaves_members_and_their_random_numbers_unchanged(
+    call: Any, message: str, first: int
+) -> None:
+    def bank() -> IMM:
+        particle = Particle(RandomWalk(0.1, 1), POSITION, [0.0], [[1.0]], n_particles=30, rng=3)
+        return two(filters=[particle, member(0.1)] if first else [member(0.1), particle])
+
+    tracker, untouched = bank(), bank()
+    with pytest.raises(ValueError, match=message):
+        call(tracker)
+    for each in (tracker, untouched):
+        each.predict()
+        each.update([0.3])
+    np.testing.assert_array_equal(tracker.x, untouched.x)
+    np.testing.assert_array_equal(tracker.P, untouched.P)
+    np.testing.assert_array_equal(tracker.mu, untouched.mu)

@@ -161,6 +161,9 @@ def test_invalid_calls_leave_the_filter_unchanged() -> None:
     tracker = Particle(WALK, POSITION, [0.0, 0.0], np.eye(2), 30, rng=0)
     calls: list[tuple[Callable[[], object], type[Exception], str]] = [
         (lambda: tracker.predict(1.0), ValueError, "u must be None or 0 for a method"),
+        (lambda: tracker.predict(np.nan), ValueError, "u must be None or 0 for a method"),
+        (lambda: tracker.predict(dt=-1.0), ValueError, "dt must be finite and not negative"),
+        (lambda: tracker.predict(dt=np.nan), ValueError, "dt must be finite and not negative"),
         (lambda: tracker.update([1.0]), ValueError, r"z must have shape \(2,\)"),
         (
             lambda: tracker.update([1j, 1j]),
@@ -169,10 +172,36 @@ def test_invalid_calls_leave_the_filter_unchanged() -> None:
         ),
     ]
     for call, error, message in calls:
-        before = copy.deepcopy(vars(tracker))
+        before, state = copy.deepcopy(vars(tracker)), tracker.generator_state
         with pytest.raises(error, match=message):
             call()
         assert difference(before, vars(tracker)) is None
+        assert tracker.generator_state == state
+
+
+class Bursting(RandomWalk):
+    """Fails after it has drawn random numbers."""
+
+    def sample(self, x: Any, rng: np.random.Generator, dt: float = 1.0) -> Float:
+        return np.where(rng.random(np.shape(x)) < 2, np.inf, x)
+
+
+def test_error_after_random_numbers_were_drawn_restores_the_generator() -> None:
+    tracker = Particle(Bursting(0.1, 2), POSITION, [0.0, 0.0], 1.0, 30, rng=0)
+    state, x = tracker.generator_state, tracker.x
+    with np.errstate(invalid="ignore"), pytest.raises(ValueError, match="belief must stay finite"):
+        tracker.predict()
+    assert tracker.generator_state == state
+    assert tracker.x is x
+
+
+def test_particle_masked_and_infinite_numbers_are_missing() -> None:
+    a, b = (Particle(WALK, POSITION, [0.0, 0.0], np.eye(2), 50, rng=0) for _ in range(2))
+    a.update([np.nan, 1.0])
+    b.update(np.ma.array([7.0, 1.0], mask=[True, False]))
+    np.testing.assert_array_equal(a.x, b.x)
+    b.update(np.array([np.inf, None]))
+    np.testing.assert_array_equal(a.x, b.x)
 
 
 def test_particle_invalid_snapshot_leaves_it_unchanged() -> None:

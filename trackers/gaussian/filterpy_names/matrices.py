@@ -242,7 +242,7 @@ class ModelMatrices:
         of_measurement = {name: checked[name] for name in OF_MEASUREMENT if name in checked}
         motion, measurement = self.held_motion, self.held_measurement
         if of_motion:
-            motion = replace_motion(motion, of_motion)
+            motion = replace_motion(motion, of_motion, self.last_dt)
         if of_measurement:
             measurement = replace_measurement(measurement, of_measurement)
         self.hold_motion(motion)

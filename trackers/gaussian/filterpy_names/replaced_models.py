@@ -144,7 +144,7 @@ class ReplacedNoise(MeasurementModel):
         return self.measurement.residual(z, z_pred)
 
 
-def replace_motion(motion: MotionModel, changes: dict[str, Any]) -> MotionModel:
+def replace_motion(motion: MotionModel, changes: dict[str, Any], dt: float = 1.0) -> MotionModel:
     """Return a motion model with other matrices: a `LinearMotion` where nothing else is needed.
 
     Parameters
@@ -153,6 +153,8 @@ def replace_motion(motion: MotionModel, changes: dict[str, Any]) -> MotionModel:
         The model.
     changes : dict of str to ndarray
         New matrices by the names F, Q and B.
+    dt : float
+        Length of the step that an old Q is taken of, where F is new.
 
     Returns
     -------
@@ -176,7 +178,7 @@ def replace_motion(motion: MotionModel, changes: dict[str, Any]) -> MotionModel:
     new = old | changes
     F, Q, B = new.get("F"), new.get("Q"), new["B"]
     if F is not None and not motion.angles:
-        return LinearMotion(F, motion.Q() if Q is None else Q, B, motion.state_names)
+        return LinearMotion(F, motion.Q(dt) if Q is None else Q, B, motion.state_names)
     return ReplacedMotion(motion, F, Q, B)
 
 
