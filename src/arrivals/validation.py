@@ -65,7 +65,7 @@ def not_negative(name: str, value: Any) -> float:
         raise ValueError(f"{name} must be finite and not negative; got {value}")
     if not size < LARGEST:
         raise ValueError(f"{name} must be at most {LARGEST}; got {value}")
-    return size + 0.0  # no -0.0
+    return abs(size) if size == 0 else size  # no -0.0
 
 
 def time_step(dt: Any) -> float:

@@ -25,11 +25,10 @@ every_tracker = pytest.mark.parametrize(("name", "make", "measurements"), TRACKE
 # checks that a family does not pass yet
 GAUSSIAN_NAMES = "kalman ekf ukf imm particle"
 NOT_YET = {
-    "masked_and_huge_numbers_are_missing": f"{GAUSSIAN_NAMES} rss_vb rss_ml ar_kalman_qrd_rls",
-    "channel_of_zeros_is_missing": "ar_kalman_qrd_rls",
+    "masked_and_huge_numbers_are_missing": f"{GAUSSIAN_NAMES} rss_vb rss_ml",
     "missing_channel_equals_array_without_it": "interpolation_ekf",
     "invalid_time_step_changes_nothing": f"{GAUSSIAN_NAMES}",
-    "invalid_control_changes_nothing": "kalman ar_kalman_qrd_rls",
+    "invalid_control_changes_nothing": "kalman",
 }
 
 

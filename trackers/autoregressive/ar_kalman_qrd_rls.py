@@ -24,7 +24,7 @@ from arrivals.trackers.estimates import SourceEstimate
 from arrivals.trackers.gaussian.linalg import transposed
 from arrivals.trackers.registry import register
 from arrivals.typing import Float
-from arrivals.validation import count, instance, not_negative, positive
+from arrivals.validation import count, instance, no_control, not_negative, positive, time_step
 
 
 @register("ar_kalman_qrd_rls")
@@ -52,7 +52,8 @@ class ARKalmanQRDRLS(BlockProcessor):
     inner : int
         Iterations of each interval.
     gate : float
-        γ: a source below this fraction of its long-term power is inactive and keeps its direction.
+        γ: a source below this fraction of its long-term power is inactive and keeps its direction
+        and its AR model.
     memory : float
         Intervals over which the long-term power of a source is averaged, pauses included.
     regression : RegressionSettings
@@ -82,7 +83,8 @@ class ARKalmanQRDRLS(BlockProcessor):
     Labels are the indices of the sources in `motion`. `std` is NaN. `existence` is 1 for a source
     active in the last interval and 0 for an inactive one if there is a gate, else NaN.
 
-    A pair of sensors one of which is missing is left out of that snapshot.
+    A pair of sensors one of which is missing is left out of that snapshot; so is a snapshot 25 dB
+    above the expected power and most others of its interval, such as a click.
 
     References
     ----------
@@ -126,7 +128,7 @@ class ARKalmanQRDRLS(BlockProcessor):
         doa: Sequence[float] | Float | None = None,
         interval: int = 30,
         inner: int = 1,
-        gate: float = 0.0,
+        gate: float = 0.01,
         memory: float = 1000.0,
         regression: RegressionSettings = RegressionSettings(),  # noqa: B008
         noise: NoiseSettings = NoiseSettings(),  # noqa: B008
@@ -158,8 +160,10 @@ class ARKalmanQRDRLS(BlockProcessor):
         dt : float
             Time between snapshots.
         """
+        if u is not None:
+            no_control(u)
         if dt != 1.0:
-            positive("dt", dt)
+            time_step(dt)
         self.process_if_full()
 
     def update(self, z: ArrayLike | None) -> None:
@@ -170,7 +174,7 @@ class ARKalmanQRDRLS(BlockProcessor):
         z : array_like of complex, shape (n_sensors,)
             NaN where a sensor has no data, None if all of it is missing.
         """
-        snapshot = to_snapshot(z, self.measurement.array.n_sensors)
+        snapshot = to_snapshot(z, self.measurement)
         self.process_if_full()
         self.append(snapshot)
         if completes_interval(snapshot):

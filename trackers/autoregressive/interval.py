@@ -28,7 +28,7 @@ def finish_interval(
     gate: float,
     memory: float,
 ) -> SourceBelief:
-    """Return the belief after an interval: inactive sources keep their directions.
+    """Return the belief after an interval: inactive sources keep directions and AR models.
 
     Parameters
     ----------
@@ -47,6 +47,11 @@ def finish_interval(
     any_active = np.asarray(active.any(axis=-1))[..., None, None]
     power = np.where(has_data, update_power(belief, current, memory), belief.power)
     scaled_q = belief.q * power / belief.power
+    # AR models of inactive sources, their factors in proportion to the weight
+    weight = np.where(any_active[..., 0, 0], new.ar_weight, belief.ar_weight)
+    scale = np.sqrt(weight / np.where(belief.ar_weight > 0, belief.ar_weight, 1.0))
+    kept_factor = scale[..., None, None, None] * belief.ar_factor
+    learning = active if noise.adapt_process_noise else np.ones_like(active)
     return replace(
         new,
         x=filtered.X[..., -belief.x.shape[-2] :, :],
@@ -55,7 +60,10 @@ def finish_interval(
         manifold_factor=np.where(any_active, new.manifold_factor, belief.manifold_factor),
         r=update_noise(belief, filtered) if noise.adapt_measurement_noise else belief.r,
         power=power,
-        q=new.q if noise.adapt_process_noise else scaled_q,
+        q=np.where(active, new.q, belief.q) if noise.adapt_process_noise else scaled_q,
+        a=np.where(learning[..., None], new.a, belief.a),
+        ar_factor=np.where(learning[..., None, None], new.ar_factor, kept_factor),
+        ar_weight=np.where(learning.any(axis=-1), new.ar_weight, belief.ar_weight),
         active=active,
         n=belief.n + 1,
     )

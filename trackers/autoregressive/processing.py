@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.manifolds.symmetric_line import ArrayManifold
+from arrivals.measurements import rows
 from arrivals.motion_models.autoregressive import AutoregressiveSources
 from arrivals.motion_models.companion_form import CompanionLayout, companion_layout
 from arrivals.trackers.autoregressive.belief import (
@@ -32,6 +33,7 @@ from arrivals.trackers.autoregressive.snapshots import (
     completes_interval,
     to_real_rows,
     to_snapshots,
+    without_clicks,
 )
 from arrivals.trackers.base import Tracker
 from arrivals.trackers.run import Run
@@ -174,7 +176,7 @@ class BlockProcessor(Tracker):
         self, belief: SourceBelief | None, z: Complex, end: int, history: History
     ) -> SourceBelief | None:
         """Process a block of intervals; the first block once it contains usable data."""
-        y = self._rows(z)
+        y = self._rows(z, belief)
         belief = self.initial_belief(y) if belief is None else belief
         if belief is None:
             history.signals.append(self._no_signals(z))
@@ -189,14 +191,19 @@ class BlockProcessor(Tracker):
         """Return the signals in snapshots that do not fill an interval yet."""
         if belief is None or z.shape[1] == 0:
             return self._no_signals(z)
-        X = self.filter_states(belief, self._rows(z))
+        X = self.filter_states(belief, self._rows(z, belief))
         return to_signals(X, self.motion.n_parts, self.motion.n_sources)
 
     def _no_signals(self, z: Complex) -> Complex:
         return np.full((*z.shape[:2], self.motion.n_sources), MISSING)
 
-    def _rows(self, z: Complex) -> Float:
-        return to_real_rows(z, self.manifold, self.motion.n_parts)
+    def _rows(self, z: Complex, belief: SourceBelief | None) -> Float:
+        n_parts = self.motion.n_parts
+        if belief is None:
+            power = np.full(len(z), self.motion.power.sum() + self.measurement.noise)
+        else:
+            power = belief.power.sum(axis=-1) + belief.r
+        return without_clicks(to_real_rows(z, self.manifold, n_parts), n_parts, power)
 
     # Acquisition
 
@@ -219,10 +226,10 @@ class BlockProcessor(Tracker):
 
         With a gate, their mean power must exceed it.
         """
-        rows = [one[np.isfinite(one).all(axis=-1)] for one in y]
+        usable = [one[np.isfinite(one).all(axis=-1)] for one in y]
         minimum = self.gate * self.motion.power.sum() / self.motion.n_parts
-        if all(len(one) > 0 and np.mean(one**2) > minimum for one in rows):
-            return rows
+        if all(len(one) > 0 and np.mean(one**2) > minimum for one in usable):
+            return usable
         return None
 
     # Runs
@@ -245,7 +252,7 @@ class BlockProcessor(Tracker):
         """
         positive("dt", dt)
         started = time.perf_counter()
-        snapshots = to_snapshots(measurements, self.measurement.array.n_sensors)
+        snapshots = to_snapshots(measurements, self.measurement)
         history = self._process(np.concatenate([self._pending(), snapshots]), open_end=True)
         history.signals.append(self._provisional_signals(self.belief, self._pending()[None]))
         return history.run(0, dt, time.perf_counter() - started)
@@ -270,13 +277,15 @@ class BlockProcessor(Tracker):
         list of Run
         """
         positive("dt", dt)
-        sequences = [to_snapshots(each, self.measurement.array.n_sensors) for each in measurements]
+        sequences = [
+            to_snapshots(each, self.measurement) for each in rows("measurements", measurements)
+        ]
         if len({len(z) for z in sequences}) != 1:
             return super().run_batch(sequences, dt)
         started = time.perf_counter()
         z = np.array([np.concatenate([self._pending(), sequence]) for sequence in sequences])
         belief = self._present_belief()
-        first = self._rows(z[:, : samples_needed(belief, self.interval)])
+        first = self._rows(z[:, : samples_needed(belief, self.interval)], None)
         if belief is None and self.usable_rows(first) is None:
             return super().run_batch(sequences, dt)
         belief = None if belief is None else repeat_belief(belief, len(z))

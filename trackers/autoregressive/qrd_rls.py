@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from arrivals.measurements import numbers
 from arrivals.parameters import Configurable
-from arrivals.typing import Float
+from arrivals.typing import Bool, Float
 from arrivals.validation import count, positive, real
 
 # A factor [R | U] is triangular, (..., n_coef + n_rhs, n_coef + n_rhs): RᵀR is the Gram matrix of
@@ -161,7 +162,7 @@ class QRDRLS(Configurable):
         Parameters
         ----------
         X : array_like, shape (..., n_samples, n_coef)
-            Regressors.
+            Regressors. A sample with a missing number, here or in `Y`, has weight 0.
         Y : array_like, shape (..., n_samples, n_rhs)
             Right-hand sides.
         weights : array_like, shape (..., n_samples), optional
@@ -175,11 +176,18 @@ class QRDRLS(Configurable):
         ValueError
             If shapes do not fit or a weight is negative.
         """
+        X, Y = numbers("X", X), numbers("Y", Y)
         n_parts = 2 if np.iscomplexobj(X) or np.iscomplexobj(Y) else 1
         X, Y = self._rows("X", X, self.n_coef, n_parts), self._rows("Y", Y, self.n_rhs, n_parts)
         if X.shape[:-1] != Y.shape[:-1]:
             raise ValueError(f"X and Y must have as many samples; got {X.shape} and {Y.shape}")
+        valid: Bool | None = None
+        if not np.isfinite(X.sum() + Y.sum()):  # a number is missing, or the sum is too large
+            valid = np.isfinite(X).all(axis=-1) & np.isfinite(Y).all(axis=-1)
+            X, Y = np.where(valid[..., None], X, 0.0), np.where(valid[..., None], Y, 0.0)
         w, n = self._weights(weights, X, Y, n_parts), X.shape[-2] // n_parts
+        if valid is not None:
+            w = w * valid
         # [√λ^n [R | U]; √(w λ^age) [x | y]; √(μ (1 - λ^n)) [I | target]]   (3.2)
         age = np.repeat(self.forgetting ** np.arange(n - 1, -1, -1.0), n_parts)
         decay = self.forgetting**n
@@ -188,6 +196,8 @@ class QRDRLS(Configurable):
         rows = [data, ridge_rows(np.full(goal.shape[:-1], self.ridge * (1 - decay)), goal)]
         if extra_rows is not None:
             extra = self._rows("extra_rows", extra_rows, self.n_coef + self.n_rhs, 1)
+            if not np.isfinite(extra).all():
+                raise ValueError("extra_rows must be finite; got NaN or infinite numbers")
             rows.append(np.broadcast_to(extra, (*X.shape[:-2], *extra.shape[-2:])))
         old = np.broadcast_to(self.factor, (*X.shape[:-2], *self.factor.shape[-2:]))
         self.factor = append_rows(np.sqrt(decay) * old, *rows)
@@ -220,14 +230,16 @@ class QRDRLS(Configurable):
         if goal.shape[-2:] != zeros.shape:
             raise ValueError(f"target must have shape (..., {self.n_coef}, {self.n_rhs}); "
                              f"got {goal.shape}")  # fmt: skip
+        if not np.isfinite(goal).all():
+            raise ValueError("target must be finite; got NaN or infinite numbers")
         return goal
 
     def _weights(self, weights: ArrayLike | None, X: Float, Y: Float, n_parts: int) -> Float:
         """Return the weights of the rows, (..., n_parts n_samples), with those of Huber."""
         n = X.shape[-2] // n_parts
         w = np.ones(n) if weights is None else real("weights", weights)
-        if w.shape[-1:] != (n,) or not (w >= 0).all():
-            raise ValueError(f"weights must be {n} numbers, not negative; got {weights!r}")
+        if w.shape[-1:] != (n,) or not ((w >= 0) & (w < np.inf)).all():
+            raise ValueError(f"weights must be {n} numbers, finite, not negative; got {weights!r}")
         w = np.repeat(w, n_parts, axis=-1)
         if self.huber is None:
             return w
@@ -236,7 +248,7 @@ class QRDRLS(Configurable):
 
     def _rows(self, name: str, value: ArrayLike, n: int, n_parts: int) -> Float:
         """Return samples as real rows, (..., n_parts n_samples, n)."""
-        array = np.asarray(value)
+        array = value if isinstance(value, np.ndarray) else numbers(name, value)
         if array.ndim < 2 or array.shape[-1] != n:
             raise ValueError(f"{name} must have shape (..., n_samples, {n}); got {array.shape}")
         if n_parts == 1:

@@ -214,8 +214,14 @@ WRONG: list[tuple[Callable[[], object], type[Exception], str]] = [
     (lambda: made(ridge=0.0), ValueError, "ridge"),
     (lambda: made(inner=0), ValueError, "inner"),
     (lambda: made(doa=DOA).update(np.zeros(4)), ValueError, r"shape \(3,\), one number a sensor"),
-    (lambda: made(doa=DOA).run(np.full((2, 3), "a")), TypeError, "must hold complex numbers"),
-    (lambda: made(doa=DOA).predict(dt=0.0), ValueError, "dt"),
+    (
+        lambda: made(doa=DOA).run(np.full((2, 3), "a")),
+        TypeError,
+        "must hold numbers, NaN for a missing",
+    ),
+    (lambda: made(doa=DOA).predict(dt=-1.0), ValueError, "dt must be finite and not negative"),
+    (lambda: made(doa=DOA).predict(dt=np.nan), ValueError, "dt must be finite"),
+    (lambda: made(doa=DOA).predict(1.0), ValueError, "u must be None or 0"),
 ]
 
 

@@ -133,3 +133,37 @@ WRONG: list[tuple[Callable[[], object], str]] = [
 def test_invalid_input_raises_with_message(call: Callable[[], object], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         call()
+
+
+@pytest.mark.parametrize(
+    "hidden",
+    [np.nan, np.inf, -1e200, None, np.ma.masked],
+    ids=["nan", "infinite", "huge", "None", "masked"],
+)
+def test_sample_with_a_missing_number_has_weight_zero(hidden: object) -> None:
+    weights = np.ones(40)
+    weights[[3, 20]] = 0
+    expected, found = QRDRLS(3, 2, target=GOAL), QRDRLS(3, 2, target=GOAL)
+    expected.update(X, Y, weights)
+    rows, sides = (np.ma.array(a).astype(object) for a in (X, Y))
+    rows[3, 1], sides[20, 0] = hidden, hidden
+    found.update(rows, sides)
+    np.testing.assert_allclose(found.solve(), expected.solve(), rtol=1e-12)
+    assert found.weight == pytest.approx(expected.weight)
+
+
+def test_complex_sample_with_a_missing_number_has_weight_zero() -> None:
+    Z = Y + 1j * Y[::-1]
+    part, whole = QRDRLS(3, 2), QRDRLS(3, 2)
+    part.update(X, Z, np.arange(40) != 39)
+    Z[39, 1] = np.nan
+    whole.update(X, Z)
+    np.testing.assert_allclose(whole.solve(), part.solve(), rtol=1e-12)
+
+
+def test_zeros_are_samples() -> None:
+    rls = QRDRLS(2, forgetting=0.9)
+    for _ in range(20):
+        rls.update(np.zeros((100, 2)), np.zeros((100, 1)))
+    rls.update(X[:30, :2], X[:30, :2] @ W[:2, :1])
+    np.testing.assert_allclose(rls.solve(), W[:2, :1], atol=0.01)
