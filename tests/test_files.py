@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from arrivals import files
-from arrivals.files import atomic_write, check_output, open_input, open_live, same_file
+from arrivals.cli.outputs import same_file
+from arrivals.files import atomic_write, check_output, open_input, open_live
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="pipes, links and modes are POSIX's")
 

@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from arrivals.files import open_input
+from arrivals.files import file_error, open_input
 from arrivals.measurement_models.arrays.sensor_array import SensorArray
 from arrivals.measurements import real_numbers
 from arrivals.tables import TableLine, table_lines
@@ -54,7 +54,7 @@ def from_toml(path: str | Path) -> SensorArray:
     try:
         return from_description(tomllib.loads(data.decode("utf-8-sig").replace("\r\n", "\n")))
     except (ValueError, TypeError) as error:
-        raise ValueError(f"{path}: {error}") from None
+        raise file_error(path, error) from None
     except (RecursionError, MemoryError):
         raise ValueError(f"{path}: the values are nested too deeply") from None
 
@@ -142,7 +142,7 @@ def from_csv(path: str | Path, *, speed: float | None = None) -> SensorArray:
                 raise ValueError(f"line {line.number} must have {n} numbers; got {line.cells}")
         return SensorArray(np.array(rows, dtype=np.float64), speed)
     except ValueError as error:
-        raise ValueError(f"{path}: {error}") from None
+        raise file_error(path, error) from None
 
 
 def _numbers(line: TableLine) -> list[float | None]:

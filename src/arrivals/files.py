@@ -16,6 +16,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import IO, Any, BinaryIO
 
+MAX_MESSAGE_LENGTH = 300  # characters: a parser may quote a whole file
 WAIT_FOR_READER = 5.0  # s, of a named pipe
 MAX_NAME_LENGTH = 200  # bytes of a name to which a prefix and a suffix can be added
 
@@ -96,18 +97,17 @@ def check_output(path: str | os.PathLike[str]) -> None:
             raise PermissionError(errno.EACCES, "the file may not be written to", target)
 
 
-def same_file(one: str | os.PathLike[str], other: str | os.PathLike[str]) -> bool:
-    """Return True if two names, of files that may not exist, are those of one file.
+def file_error(path: str | os.PathLike[str], error: Exception) -> ValueError:
+    """Return an error about a file: one line of limited length that begins with its name.
 
     Examples
     --------
-    >>> same_file("a.csv", "./a.csv"), same_file("a.csv", "b.csv")
-    (True, False)
+    >>> file_error("a.csv", ValueError("line 2" + "9" * 1000)).args[0][-8:]
+    '9999 ...'
     """
-    try:
-        return os.path.samefile(one, other)
-    except OSError:
-        return os.path.realpath(one) == os.path.realpath(other)
+    text = " ".join(str(error).split())
+    short = text if len(text) <= MAX_MESSAGE_LENGTH else f"{text[:MAX_MESSAGE_LENGTH]} ..."
+    return ValueError(f"{os.fspath(path)}: {short}")
 
 
 def open_input(path: str | os.PathLike[str]) -> BinaryIO:

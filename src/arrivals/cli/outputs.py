@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -11,7 +12,7 @@ from itertools import combinations
 from typing import Any, TypeAlias
 
 from arrivals.cli.separated_signals import check_suffix
-from arrivals.files import check_output, open_live, same_file
+from arrivals.files import check_output, open_live
 from arrivals.trackers.run import Run, header, text
 
 Bar: TypeAlias = Callable[..., Any]
@@ -37,6 +38,20 @@ def check_different(words: str, *names: str | None) -> None:
     files = [name for name in names if name and name != "-"]
     if any(same_file(one, other) for one, other in combinations(files, 2)):
         raise ValueError(f"{words} must be different files")
+
+
+def same_file(one: str | os.PathLike[str], other: str | os.PathLike[str]) -> bool:
+    """Return True if two names, of files that may not exist, are those of one file.
+
+    Examples
+    --------
+    >>> same_file("a.csv", "./a.csv"), same_file("a.csv", "b.csv")
+    (True, False)
+    """
+    try:
+        return os.path.samefile(one, other)
+    except OSError:
+        return os.path.realpath(one) == os.path.realpath(other)
 
 
 def refuse(arguments: argparse.Namespace, names: Iterable[str], reason: str) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from arrivals.files import open_input
+from arrivals.files import file_error, open_input
 from arrivals.measurement_models import LogNormalRSS, db_to_neper
 from arrivals.measurements import real_numbers
 from arrivals.recordings.file_contents import MAX_BYTES, check_size
@@ -289,4 +289,4 @@ def _named(path: str | PathLike[str]) -> Iterator[None]:
     try:
         yield
     except (ValueError, TypeError) as error:
-        raise ValueError(f"{path}: {error}") from error
+        raise file_error(path, error) from error

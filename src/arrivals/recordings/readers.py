@@ -11,7 +11,7 @@ from typing import BinaryIO, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.files import open_input
+from arrivals.files import file_error, open_input
 from arrivals.measurement_models import SensorArray
 from arrivals.measurements import numbers
 from arrivals.recordings.file_contents import MAX_BYTES, FileContents, StoredArray, check_size
@@ -102,7 +102,7 @@ def read(
         try:
             return _recording(_contents(file, path, demands), rate, transpose, demands, array)
         except Exception as error:  # parsers raise all kinds of errors on damaged files
-            raise ValueError(f"{path}: {' '.join(str(error).split())}") from error
+            raise file_error(path, error) from error
 
 
 class _Demands(NamedTuple):
