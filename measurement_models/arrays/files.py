@@ -28,6 +28,7 @@ import numpy as np
 from arrivals.files import open_input
 from arrivals.measurement_models.arrays.sensor_array import SensorArray
 from arrivals.measurements import real_numbers
+from arrivals.messages import in_line
 from arrivals.tables import TableLine, table_lines
 from arrivals.validation import count
 
@@ -54,7 +55,7 @@ def from_toml(path: str | Path) -> SensorArray:
     try:
         return from_description(tomllib.loads(data.decode("utf-8-sig").replace("\r\n", "\n")))
     except (ValueError, TypeError) as error:
-        raise ValueError(f"{path}: {error}") from None
+        raise ValueError(f"{path}: {in_line(error)}") from None
     except (RecursionError, MemoryError):
         raise ValueError(f"{path}: the values are nested too deeply") from None
 
@@ -142,7 +143,7 @@ def from_csv(path: str | Path, *, speed: float | None = None) -> SensorArray:
                 raise ValueError(f"line {line.number} must have {n} numbers; got {line.cells}")
         return SensorArray(np.array(rows, dtype=np.float64), speed)
     except ValueError as error:
-        raise ValueError(f"{path}: {error}") from None
+        raise ValueError(f"{path}: {in_line(error)}") from None
 
 
 def _numbers(line: TableLine) -> list[float | None]:

@@ -15,6 +15,7 @@ import numpy as np
 from arrivals.files import open_input
 from arrivals.measurement_models import LogNormalRSS, db_to_neper
 from arrivals.measurements import real_numbers
+from arrivals.messages import in_line
 from arrivals.recordings.file_contents import MAX_BYTES, check_size
 from arrivals.recordings.numpy_files import numpy_arrays
 from arrivals.tables import TableRow, named_rows
@@ -289,4 +290,4 @@ def _named(path: str | PathLike[str]) -> Iterator[None]:
     try:
         yield
     except (ValueError, TypeError) as error:
-        raise ValueError(f"{path}: {error}") from error
+        raise ValueError(f"{path}: {in_line(error)}") from error

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from arrivals.files import open_input
 from arrivals.measurement_models import SensorArray
 from arrivals.measurements import numbers
+from arrivals.messages import in_line
 from arrivals.recordings.file_contents import MAX_BYTES, FileContents, StoredArray, check_size
 from arrivals.recordings.matlab import matlab_arrays
 from arrivals.recordings.numpy_files import numpy_arrays
@@ -102,7 +103,7 @@ def read(
         try:
             return _recording(_contents(file, path, demands), rate, transpose, demands, array)
         except Exception as error:  # parsers raise all kinds of errors on damaged files
-            raise ValueError(f"{path}: {' '.join(str(error).split())}") from error
+            raise ValueError(f"{path}: {in_line(error)}") from error
 
 
 class _Demands(NamedTuple):
