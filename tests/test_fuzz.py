@@ -18,38 +18,10 @@ from arrivals.measurement_models import LinearMeasurement
 from arrivals.motion_models import RandomWalk
 from arrivals.trackers import Kalman, available
 
-OPEN = """
-Autoregressive
-CombinedMeasurement
-InterpolationDelay
-LogNormalRSS
-SensorArray
-Tones
-ar_kalman_qrd_rls
-array.steering_vector
-array.without
-composite
-db_to_neper
-ekf
-find_peaks
-imm
-interpolation_ekf
-kalman
-mat
-network
-network long
-network npz
-particle
-refine_peaks
-rss_ml
-rss_vb
-sensors
-snapshot.simulate
-snapshot.steering_vector
-ssbl
-symmetric
-ukf
-""".strip().split("\n")  # kinds that are worked on
+OPEN = [  # kinds that are worked on
+    "ar_kalman_qrd_rls", "ekf", "imm", "interpolation_ekf", "kalman", "particle", "rss_ml",
+    "rss_vb", "ukf",
+]  # fmt: skip
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 
 

@@ -16,8 +16,7 @@ from fuzzing.values import malformed, value_of
 
 MAY_BE_NAN = (  # as documented
     "numbers", "real_numbers", "rows", "bootstrap_interval", "circular_nees", "coverage",
-    "position_nees",
-    "position_coverage", "sdr",
+    "position_nees", "position_coverage", "sdr",
 )  # fmt: skip
 MODEST = 1e100  # of arguments from which a result has to be finite
 

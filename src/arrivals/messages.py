@@ -29,6 +29,18 @@ def shown(value: Any) -> str:
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."
 
 
+def in_line(error: Exception) -> str:
+    r"""Return the message of an error in one line, shortened.
+
+    Examples
+    --------
+    >>> in_line(ValueError("truncated:\n  no data"))
+    'truncated: no data'
+    """
+    text = " ".join(str(error).split())
+    return text if len(text) <= 2 * LONGEST else f"{text[: 2 * LONGEST - 3]}..."
+
+
 def with_article(noun: str) -> str:
     """Return a noun with its indefinite article.
 

@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.arrays.sensor_array import SensorArray
+from arrivals.messages import shown
 from arrivals.typing import Bool, Complex, Float, Int
+from arrivals.validation import one_of, real, shaped
 
 MAX_COHERENCE_OF_ENDS = 0.1  # of responses at ±90° of a line that count as two directions
 
@@ -151,6 +153,8 @@ def find_peaks(power: Float, *, circular: bool, joined: bool = False) -> Int:
     >>> find_peaks(power, circular=False), find_peaks(power, circular=False, joined=True)
     (array([0, 5, 2]), array([0, 2]))
     """
+    power = _spectrum("power", power)
+    one_of("circular", circular, (False, True))
     rise = 1e-9 * power.max()  # the ripple of a flat spectrum is rounding
     peaks = local_maxima(power, circular=circular, joined=joined, rise=rise).nonzero()[0]
     return np.asarray(peaks[np.argsort(-power[peaks], kind="stable")])
@@ -234,7 +238,21 @@ def refine_peaks(doa_grid: Float, power: Float, peaks: Int) -> Float:
     >>> refine_peaks(np.arange(4.0), np.exp(level), np.array([1]))
     array([1.5])
     """
-    return parabolic_peak(doa_grid, np.log(np.maximum(power, np.finfo(float).tiny)), peaks)
+    power, doa_grid = _spectrum("power", power), _spectrum("doa_grid", doa_grid)
+    shaped("doa_grid", doa_grid, len(power))
+    index = real("peaks", peaks)
+    if index.ndim != 1 or not np.isin(index, np.arange(len(power))).all():
+        raise ValueError(f"peaks must be indices below {len(power)}; got {shown(peaks)}")
+    level = np.log(np.maximum(power, np.finfo(float).tiny))
+    return parabolic_peak(doa_grid, level, index.astype(np.int64))
+
+
+def _spectrum(name: str, value: ArrayLike) -> Float:
+    """Return the values of a function on a scan grid."""
+    array = real(name, value)
+    if array.ndim != 1 or len(array) < 2:
+        raise ValueError(f"{name} must have shape (n_directions,), two or more; got {array.shape}")
+    return array
 
 
 def parabolic_peak(doa_grid: Float, level: Float, peaks: Int) -> Float:
