@@ -16,7 +16,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import IO, Any, BinaryIO
 
-MAX_MESSAGE_LENGTH = 300  # characters: a parser may quote a whole file
+from arrivals.messages import in_line
+
 WAIT_FOR_READER = 5.0  # s, of a named pipe
 MAX_NAME_LENGTH = 200  # bytes of a name to which a prefix and a suffix can be added
 
@@ -103,11 +104,9 @@ def file_error(path: str | os.PathLike[str], error: Exception) -> ValueError:
     Examples
     --------
     >>> file_error("a.csv", ValueError("line 2" + "9" * 1000)).args[0][-8:]
-    '9999 ...'
+    '99999...'
     """
-    text = " ".join(str(error).split())
-    short = text if len(text) <= MAX_MESSAGE_LENGTH else f"{text[:MAX_MESSAGE_LENGTH]} ..."
-    return ValueError(f"{os.fspath(path)}: {short}")
+    return ValueError(f"{os.fspath(path)}: {in_line(error)}")
 
 
 def open_input(path: str | os.PathLike[str]) -> BinaryIO:
