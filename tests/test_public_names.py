@@ -29,6 +29,7 @@ NAMES = {
         StateEstimate Tracker UKF VALSE VariationalSolver as_filterpy available create find
         find_peaks is_missing refine_peaks register
     """,
+    "trackers.filterpy": "ExtendedKalmanFilter IMMEstimator KalmanFilter UnscentedKalmanFilter",
     "scenarios": """
         Gospa Method Network Recording Scenario Study Trial ar_signals available
         best_assignment_rmse calibrate create exact_detection find gospa grid mean_gospa mean_rmse

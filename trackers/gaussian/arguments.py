@@ -11,12 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.base import MeasurementModel
-from arrivals.measurements import numbers, real_numbers
+from arrivals.measurements import LARGEST, numbers, real_numbers, rows
 from arrivals.motion_models.base import MotionModel
 from arrivals.typing import Bool, Float
 from arrivals.validation import covariance, instance, real, shaped
 
 PerStep = Sequence[Any] | Float | None
+
+LARGEST_ENTRY = 1e80  # of matrices; products with two of them and a covariance are finite
 
 
 def check_models(motion: Any, measurement: Any) -> tuple[MotionModel, MeasurementModel]:
@@ -66,13 +68,13 @@ def belief_arrays(x: ArrayLike, P: ArrayLike, n: int) -> tuple[Float, Float]:
     mean = real("x", x)
     if mean.shape not in ((n,), (n, 1)):
         raise ValueError(f"x must have shape ({n},) or ({n}, 1); got {mean.shape}")
-    if not np.isfinite(mean).all():
-        raise ValueError(f"x must be finite; got {mean.ravel().tolist()}")
+    if not (np.abs(mean) < LARGEST).all():
+        raise ValueError(f"x must be finite and below {LARGEST:g}; got {mean.ravel().tolist()}")
     return mean.reshape(n), covariance_matrix("P", P, n)
 
 
 def check_finite(x: Float, P: Float) -> None:
-    """Raise a ValueError if a belief is not finite, before it replaces the present one.
+    """Raise a ValueError if a belief overflows, before it replaces the present one.
 
     Examples
     --------
@@ -80,7 +82,7 @@ def check_finite(x: Float, P: Float) -> None:
     Traceback (most recent call last):
     ValueError: belief must stay finite; got an overflow: x, P, F, Q, R or dt has grown too far
     """
-    if not (np.isfinite(P).all() and np.isfinite(x).all()):
+    if not ((np.abs(P) < LARGEST).all() and (np.abs(x) < LARGEST).all()):
         cause = "x, P, F, Q, R or dt has grown too far"
         raise ValueError(f"belief must stay finite; got an overflow: {cause}")
 
@@ -137,7 +139,12 @@ def covariance_matrix(name: str, value: ArrayLike, n: int) -> Float:
     array([[2., 0.],
            [0., 2.]])
     """
-    return covariance(name, real(name, value) * np.eye(n) if np.ndim(value) == 0 else value, n)
+    if np.ndim(value) == 0:
+        value = finite_matrix(name, value) * np.eye(n)
+    matrix = covariance(name, value, n)
+    if not (np.abs(matrix) < LARGEST).all():
+        raise ValueError(f"{name} must be below {LARGEST:g}; got {matrix.tolist()}")
+    return matrix
 
 
 def finite_matrix(name: str, value: ArrayLike, *shape: int) -> Float:
@@ -147,11 +154,13 @@ def finite_matrix(name: str, value: ArrayLike, *shape: int) -> Float:
     --------
     >>> finite_matrix("F", [[np.inf]], 1, 1)
     Traceback (most recent call last):
-    ValueError: F must be finite; got [[inf]]
+    ValueError: F must be finite and below 1e+80; got [[inf]]
     """
     matrix = shaped(name, value, *shape)
-    if not np.isfinite(matrix).all():
-        raise ValueError(f"{name} must be finite; got {matrix.tolist()}")
+    if not (np.abs(matrix) < LARGEST_ENTRY).all():
+        raise ValueError(
+            f"{name} must be finite and below {LARGEST_ENTRY:g}; got {matrix.tolist()}"
+        )
     return matrix
 
 
@@ -198,13 +207,13 @@ def control_input(u: ArrayLike | None) -> Float | None:
     (None, array([2.]))
     >>> control_input(np.nan)
     Traceback (most recent call last):
-    ValueError: u must be finite; got nan
+    ValueError: u must be finite; got [nan]
     """
     if u is None:
         return None
     values = real_numbers("u", u).ravel()
     if np.isnan(values).any():
-        raise ValueError(f"u must be finite; got {u}")
+        raise ValueError(f"u must be finite; got {np.ravel(np.ma.getdata(u)).tolist()}")
     return values if values.any() else None
 
 
@@ -235,6 +244,7 @@ def per_step_values(name: str, values: PerStep, n_steps: int) -> Sequence[Any] |
     """
     if values is None:
         return [None] * n_steps
+    values = list(rows(name, values))
     if len(values) != n_steps:
         raise ValueError(
             f"{name} must have one entry for each of {n_steps} steps; got {len(values)}"

@@ -117,8 +117,10 @@ class GaussianFilter(ModelMatrices, DeclaredAttributes, Tracker):
         """Return the measurement, without R, linearized at beliefs x (..., n), P (..., n, n)."""
 
     def __setattr__(self, name: str, value: Any) -> None:
-        if name == "P" and np.ndim(value) == 0:  # a number: that variance in all directions
+        if name == "P" and np.ndim(value) == 0:
             value = covariance_matrix("P", value, self.dim_x)
+        if name == "inv" and not callable(value):
+            raise TypeError(f"inv must be callable; got {value!r}")
         super().__setattr__(name, value)
 
     # Predict and update; the functions of other modules take the filter as their first argument
@@ -190,7 +192,7 @@ class GaussianFilter(ModelMatrices, DeclaredAttributes, Tracker):
         control = control_input(u)
         if control is None:
             return x
-        B = self.B if B is None else control_matrix(B, len(x))
+        B = getattr(self.state_motion, "control", None) if B is None else control_matrix(B, len(x))
         return wrapped(x + control_effect(control, B), self.state_angles)
 
     def innovation(self, z: Float, z_pred: Float, missing: Bool | None, plain: bool) -> Float:
@@ -223,7 +225,7 @@ class GaussianFilter(ModelMatrices, DeclaredAttributes, Tracker):
         """Return a measurement (m,), its missing mask and its noise; None if all is missing."""
         m = self.held_measurement.dim_z if H is None else len(H)
         usual = type(z) is np.ndarray and z.shape == (m,) and z.dtype == np.float64
-        if usual and z.dot(z) < LARGEST**2:  # type: ignore[union-attr]  # an array
+        if usual and math.hypot(*z.tolist()) < LARGEST:  # type: ignore[union-attr]  # an array
             values, missing = z.copy(), None  # type: ignore[union-attr]
         else:
             values, missing = measurement_and_mask(z, m)
@@ -244,8 +246,7 @@ class GaussianFilter(ModelMatrices, DeclaredAttributes, Tracker):
 
     def record_prediction(self, x: Float, P: Float, dt: float) -> None:
         """Set the belief and the attributes of the last prediction."""
-        entries = P.ravel()
-        if not entries.dot(entries) < np.inf:  # faster than isfinite
+        if not math.hypot(*P.diagonal().tolist(), *x.tolist()) < LARGEST:
             check_finite(x, P)
         if type(self.x) is not np.ndarray or self.x.ndim > 1:
             x = x.reshape(np.shape(self.x))

@@ -6,7 +6,7 @@ import copy
 import math
 import sys
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol, Self, cast, runtime_checkable
+from typing import Any, Protocol, Self, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,7 +22,7 @@ from arrivals.trackers.gaussian.filterpy_names.attributes import DeclaredAttribu
 from arrivals.trackers.gaussian.particle import Particle
 from arrivals.trackers.registry import register
 from arrivals.typing import Float
-from arrivals.validation import shaped, time_step
+from arrivals.validation import items, shaped, time_step
 
 TINY = sys.float_info.min
 
@@ -128,17 +128,22 @@ class IMM(DeclaredAttributes, Tracker):
         M: ArrayLike,
         angles: Angles | None = None,
     ) -> None:
-        self.filters, self.N = filters, len(filters)
-        _check_filters(filters)
+        self.filters = filters
+        self.N = len(filters)
         self.mu = _probabilities("mu", shaped("mu", mu, self.N))
         self.M = _probabilities("M", shaped("M", M, self.N, self.N))
-        self.angles = angles
+        self.angles = None if angles is None else tuple(items("angles", angles))
         self.omega, self.cbar = np.zeros((self.N, self.N)), self.mu @ self.M
         self.likelihood = np.ones(self.N)
         self.log_likelihood = 0.0
         self.combine()
         self.x_prior, self.P_prior = self.x.copy(), self.P.copy()
         self.x_post, self.P_post = self.x.copy(), self.P.copy()
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name == "filters":
+            _check_filters(value)
+        super().__setattr__(name, value)
 
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
         """Mix the beliefs of the filters, and predict each from its mixed belief.
@@ -150,8 +155,7 @@ class IMM(DeclaredAttributes, Tracker):
         dt : float
             Length of the step, for the filters of this library; those of filterpy have their own.
         """
-        control_input(u)  # finite
-        dt = time_step(dt)
+        _, dt = control_input(u), time_step(dt)  # checked before anything changes
         # c_j = Σ_i M_ij mu_i   (11.6.6-8)
         cbar = self.mu.dot(self.M)
         # omega_ij = M_ij mu_i / c_j   (11.6.6-7)
@@ -216,7 +220,9 @@ class IMM(DeclaredAttributes, Tracker):
         if self.angles is not None:
             return self.angles
         motions = [getattr(member, "motion", None) for member in self.filters]
-        return tuple(sorted({entry for motion in motions for entry in _angles(motion)}))
+        return tuple(
+            sorted({entry for motion in motions for entry in getattr(motion, "angles", ())})
+        )
 
     @property
     def estimate(self) -> StateEstimate:
@@ -227,8 +233,8 @@ class IMM(DeclaredAttributes, Tracker):
         return copy.deepcopy(self)  # the filters' beliefs are among its parameters
 
 
-def _check_filters(filters: Sequence[Filter]) -> None:
-    if len(filters) < 2:
+def _check_filters(filters: Any) -> None:
+    if len(items("filters", filters)) < 2:
         raise ValueError(f"filters must have at least two entries; got {len(filters)}")
     for member in filters:
         if not isinstance(member, Filter):
@@ -292,7 +298,3 @@ def _predict(member: Filter, u: ArrayLike | None, dt: float) -> None:
 def _log_likelihood(member: Filter) -> float:
     log = getattr(member, "log_likelihood", None)
     return float(np.log(member.likelihood) if log is None else log)
-
-
-def _angles(motion: object) -> Angles:
-    return cast(Angles, getattr(motion, "angles", ()))

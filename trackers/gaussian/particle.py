@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.base import MeasurementModel
-from arrivals.measurements import is_missing, numbers
+from arrivals.measurements import LARGEST, is_missing, numbers
 from arrivals.motion_models.base import MotionModel, gaussian
 from arrivals.trackers.base import Tracker
 from arrivals.trackers.estimates import StateEstimate
@@ -164,7 +164,11 @@ class Particle(DeclaredAttributes, Tracker):
     @rng.setter
     def rng(self, rng: int | np.random.Generator) -> None:
         if rng is not getattr(self, "_rng", None):
-            self._generator = np.random.default_rng(rng)
+            try:
+                self._generator = np.random.default_rng(rng)
+            except (TypeError, ValueError):
+                wanted = "a numpy Generator or a whole number that is not negative"
+                raise TypeError(f"rng must be {wanted}; got {rng!r}") from None
             self._rng = rng
 
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
@@ -244,8 +248,8 @@ class Particle(DeclaredAttributes, Tracker):
     def _check_belief(self, x: ArrayLike, P: ArrayLike) -> tuple[Float, Float]:
         n = self.motion.dim_x
         mean = shaped("x", x, n)
-        if not np.isfinite(mean).all():
-            raise ValueError(f"x must be finite; got {mean.tolist()}")
+        if not (np.abs(mean) < LARGEST).all():
+            raise ValueError(f"x must be finite and below {LARGEST:g}; got {mean.tolist()}")
         return mean, covariance_matrix("P", P, n)
 
     def _set_particles(self, particles: Float, weights: Float) -> None:

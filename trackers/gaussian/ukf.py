@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from arrivals.typing import Float
 from arrivals.validation import count, number, positive
 
 
+@lru_cache(maxsize=64)
 def merwe_weights(n: int, alpha: float, beta: float, kappa: float) -> tuple[Float, Float, float]:
     """Return weights of mean and covariance of 2n+1 sigma points, and their scale n + λ.
 
@@ -121,8 +123,7 @@ class UKF(Queries, GaussianFilter):
         super().__init__(motion, measurement, x, P)
         self.alpha, self.beta = positive("alpha", alpha), number("beta", beta)
         self.kappa = number("kappa", kappa)
-        if not kappa > -self.dim_x:
-            raise ValueError(f"kappa must be above -{self.dim_x}; got {kappa}")
+        self.sigma_weights()
         self.iterations = count("iterations", iterations)
 
     def batch_filter(self, zs: Any, *arguments: Any, **named: Any) -> Any:
@@ -150,6 +151,14 @@ class UKF(Queries, GaussianFilter):
         """Return the regression of h over the sigma points."""
         return self._regression(x, P, self.held_measurement.h, self.held_measurement.residual)
 
+    def sigma_weights(self) -> tuple[Float, Float, float]:
+        """Return weights of mean and covariance of the sigma points, and their scale."""
+        alpha, beta = positive("alpha", self.alpha), number("beta", self.beta)
+        kappa, n = number("kappa", self.kappa), self.dim_x
+        if not -n < kappa < np.inf:
+            raise ValueError(f"kappa must be finite and above -{n}; got {kappa}")
+        return merwe_weights(n, alpha, beta, kappa)
+
     def _regression(
         self,
         x: Float,
@@ -157,7 +166,7 @@ class UKF(Queries, GaussianFilter):
         function: Callable[[Float], Float],
         subtract: Callable[[Float, Float], Float],
     ) -> Linearization:
-        mean_weights, weights, scale = merwe_weights(self.dim_x, self.alpha, self.beta, self.kappa)
+        mean_weights, weights, scale = self.sigma_weights()
         P, L, jittered = cholesky(P)
         # X_i = x + d_i,  d_i = 0, columns of sqrt(scale) L, and their negatives
         steps = _sigma_steps(np.sqrt(scale) * L)

@@ -66,7 +66,11 @@ BAD_PARTS: list[tuple[Any, type[Exception], str]] = [
     ),
     (lambda: Kalman(VonMisesWalk(9.0), ANGLE, [0.0], [[1.0]]), TypeError, "motion must be linear"),
     (lambda: UKF(WALK, POSITION, X, P, alpha=0.0), ValueError, "alpha must be finite and positive"),
-    (lambda: UKF(WALK, POSITION, X, P, kappa=-2.0), ValueError, "kappa must be above -2"),
+    (
+        lambda: UKF(WALK, POSITION, X, P, kappa=-2.0),
+        ValueError,
+        "kappa must be finite and above -2",
+    ),
     (lambda: IMM([], [], []), ValueError, "filters must have at least two entries; got 0"),
 ]
 
@@ -84,7 +88,7 @@ BAD_CALLS: list[tuple[Any, type[Exception], str]] = [
     (lambda f: f.update([[1.0, 2.0], [3.0, 4.0]]), ValueError, r"z must have shape"),
     (lambda f: f.update("text"), TypeError, "z must hold numbers, NaN for a missing one"),
     (lambda f: f.update([[1.0], [2.0, 3.0]]), ValueError, "z must have rows of one length"),
-    (lambda f: f.predict(np.nan), ValueError, "u must be finite; got nan"),
+    (lambda f: f.predict(np.nan), ValueError, r"u must be finite; got \[nan\]"),
     (lambda f: f.predict([1.0], B=[[np.inf], [0.0]]), ValueError, "B must be finite"),
     (lambda f: f.predict(F=[[np.inf, 0.0], [0.0, 1.0]]), ValueError, "F must be finite"),
     (lambda f: f.update([1.0, 2.0], H=np.full((2, 2), np.nan)), ValueError, "H must be finite"),
