@@ -139,7 +139,7 @@ def covariance_matrix(name: str, value: ArrayLike, n: int) -> Float:
     array([[2., 0.],
            [0., 2.]])
     """
-    if np.ndim(value) == 0:
+    if is_number(value):
         value = finite_matrix(name, value) * np.eye(n)
     matrix = covariance(name, value, n)
     if not (np.abs(matrix) < LARGEST).all():
@@ -179,6 +179,17 @@ def matrix_with_columns(name: str, value: ArrayLike, n: int) -> Float:
     return finite_matrix(name, matrix, *matrix.shape)
 
 
+def is_number(value: Any) -> bool:
+    """Return True of a number, also as an array without axes.
+
+    Examples
+    --------
+    >>> is_number(2.0), is_number(np.array(2.0)), is_number([2.0])
+    (True, True, False)
+    """
+    return np.isscalar(value) or getattr(value, "shape", None) == ()
+
+
 def control_matrix(B: ArrayLike | None, n: int) -> Float | None:
     """Return a control matrix (n, dim_u); None for none or 0, one column of a vector.
 
@@ -188,7 +199,7 @@ def control_matrix(B: ArrayLike | None, n: int) -> Float | None:
     array([[0.5],
            [1. ]])
     """
-    if B is None or (np.ndim(B) == 0 and not np.any(B)):
+    if B is None or (is_number(B) and not np.any(B)):
         return None
     matrix = real("B", B)
     if matrix.shape == (n,):

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.base import MeasurementModel
 from arrivals.measurements import LARGEST
+from arrivals.messages import shown
 from arrivals.motion_models.base import MotionModel
 from arrivals.trackers.base import Tracker
 from arrivals.trackers.estimates import StateEstimate
@@ -22,6 +23,7 @@ from arrivals.trackers.gaussian.arguments import (
     control_input,
     control_matrix,
     covariance_matrix,
+    is_number,
     matrix_with_columns,
     measurement_and_mask,
     overrides,
@@ -117,10 +119,10 @@ class GaussianFilter(ModelMatrices, DeclaredAttributes, Tracker):
         """Return the measurement, without R, linearized at beliefs x (..., n), P (..., n, n)."""
 
     def __setattr__(self, name: str, value: Any) -> None:
-        if name == "P" and np.ndim(value) == 0:
+        if name == "P" and is_number(value):
             value = covariance_matrix("P", value, self.dim_x)
         if name == "inv" and not callable(value):
-            raise TypeError(f"inv must be callable; got {value!r}")
+            raise TypeError(f"inv must be callable; got {shown(value)}")
         super().__setattr__(name, value)
 
     # Predict and update; the functions of other modules take the filter as their first argument
@@ -215,7 +217,7 @@ class GaussianFilter(ModelMatrices, DeclaredAttributes, Tracker):
         """Set a belief, shapes (n,) and (n, n), without the checks of an assigned one."""
         if type(self.x) is not np.ndarray or self.x.ndim > 1:
             x = x.reshape(np.shape(self.x))
-        own = vars(self)
+        own = vars(self)  # faster than assignments, which are checked
         own["x"] = own["_known_x"] = x
         own["P"] = own["_known_P"] = P
 
@@ -248,12 +250,9 @@ class GaussianFilter(ModelMatrices, DeclaredAttributes, Tracker):
         """Set the belief and the attributes of the last prediction."""
         if not math.hypot(*P.diagonal().tolist(), *x.tolist()) < LARGEST:
             check_finite(x, P)
-        if type(self.x) is not np.ndarray or self.x.ndim > 1:
-            x = x.reshape(np.shape(self.x))
-        own = vars(self)  # faster than assignments, which are checked
-        own["x"] = own["_known_x"] = x
-        own["P"] = own["_known_P"] = P
-        own["x_prior"], own["P_prior"] = x.copy(), P.copy()
+        self.set_belief(x, P)
+        own = vars(self)
+        own["x_prior"], own["P_prior"] = self.x.copy(), P.copy()
         if dt != self.last_dt:
             self.read_again(dt)
 

@@ -22,7 +22,7 @@ from arrivals.trackers.gaussian.filterpy_names.attributes import DeclaredAttribu
 from arrivals.trackers.gaussian.particle import Particle
 from arrivals.trackers.registry import register
 from arrivals.typing import Float
-from arrivals.validation import items, shaped, time_step
+from arrivals.validation import count, items, shaped, time_step
 
 TINY = sys.float_info.min
 
@@ -130,19 +130,22 @@ class IMM(DeclaredAttributes, Tracker):
     ) -> None:
         self.filters = filters
         self.N = len(filters)
-        self.mu = _probabilities("mu", shaped("mu", mu, self.N))
-        self.M = _probabilities("M", shaped("M", M, self.N, self.N))
-        self.angles = None if angles is None else tuple(items("angles", angles))
+        self.mu, self.M = shaped("mu", mu, self.N), shaped("M", M, self.N, self.N)
+        self.angles = angles
         self.omega, self.cbar = np.zeros((self.N, self.N)), self.mu @ self.M
         self.likelihood = np.ones(self.N)
         self.log_likelihood = 0.0
         self.combine()
-        self.x_prior, self.P_prior = self.x.copy(), self.P.copy()
-        self.x_post, self.P_post = self.x.copy(), self.P.copy()
+        self.x_prior, self.P_prior = self.x_post, self.P_post = self.x.copy(), self.P.copy()
 
     def __setattr__(self, name: str, value: Any) -> None:
         if name == "filters":
             _check_filters(value)
+        elif name in ("mu", "M"):
+            shape = (self.N,) if name == "mu" else (self.N, self.N)
+            value = _probabilities(name, shaped(name, value, *shape))
+        elif name == "angles" and value is not None:
+            value = tuple(count("angles", entry, minimum=0) for entry in items("angles", value))
         super().__setattr__(name, value)
 
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
@@ -168,7 +171,7 @@ class IMM(DeclaredAttributes, Tracker):
             _predict(member, u, dt)
 
         _for_all(self.filters, predict_member)
-        self.mu, self.cbar, self.omega = cbar, cbar, omega
+        vars(self).update(mu=cbar, cbar=cbar, omega=omega)  # without the checks of assignments
         self.combine()
         self.x_prior, self.P_prior = self.x.copy(), self.P.copy()
 
@@ -180,11 +183,11 @@ class IMM(DeclaredAttributes, Tracker):
         z : array_like
             Measurement; None or NaN where it is missing.
         """
-        if is_missing(z):
-            _for_all(self.filters, lambda j, member: member.update(None))
+        missing = is_missing(z)
+        _for_all(self.filters, lambda j, member: member.update(None if missing else z))
+        if missing:
             self.likelihood, self.log_likelihood = np.ones(self.N), 0.0
         else:
-            _for_all(self.filters, lambda j, member: member.update(z))
             self.update_probabilities()
             self.combine()
         self.x_post, self.P_post = self.x.copy(), self.P.copy()
@@ -198,10 +201,10 @@ class IMM(DeclaredAttributes, Tracker):
         odds = [log + prior for log, prior in zip(logs, priors, strict=True)]
         top = max(odds)
         weights = [math.exp(each - top) for each in odds]
-        total = sum(weights)
-        self.mu = np.array([weight / total for weight in weights])
-        self.log_likelihood = top + math.log(total)
-        self.likelihood = np.array([likelihood(log) for log in logs])
+        own, total = vars(self), sum(weights)
+        own["mu"] = np.array([weight / total for weight in weights])
+        own["log_likelihood"] = top + math.log(total)
+        own["likelihood"] = np.array([likelihood(log) for log in logs])
 
     def combine(self) -> None:
         """Set mean and covariance to those of the mixture of the filters."""
@@ -219,10 +222,8 @@ class IMM(DeclaredAttributes, Tracker):
         """Entries of the state that are angles: `angles`, or those of the filters' motions."""
         if self.angles is not None:
             return self.angles
-        motions = [getattr(member, "motion", None) for member in self.filters]
-        return tuple(
-            sorted({entry for motion in motions for entry in getattr(motion, "angles", ())})
-        )
+        motions = (getattr(member, "motion", None) for member in self.filters)
+        return tuple(sorted(set().union(*(getattr(each, "angles", ()) for each in motions))))
 
     @property
     def estimate(self) -> StateEstimate:
@@ -238,8 +239,7 @@ def _check_filters(filters: Any) -> None:
         raise ValueError(f"filters must have at least two entries; got {len(filters)}")
     for member in filters:
         if not isinstance(member, Filter):
-            names = ("x", "P", "predict", "update", "likelihood")
-            missing = [name for name in names if not hasattr(member, name)]
+            missing = [n for n in "x P predict update likelihood".split() if not hasattr(member, n)]
             raise TypeError(
                 "filters must have x, P, predict(u), update(z), likelihood; "
                 f"got {type(member).__name__} without {', '.join(missing)}"
@@ -252,7 +252,7 @@ def _check_filters(filters: Any) -> None:
 def _probabilities(name: str, values: Float) -> Float:
     """Return values normalized along the last axis, unchanged where their sum is 1."""
     totals = values.sum(axis=-1, keepdims=True)
-    if not ((values >= 0).all() and (totals > 0).all()):
+    if not ((values >= 0).all() and (totals > 0).all() and (totals < np.inf).all()):
         raise ValueError(f"{name} must hold probabilities; got {values.tolist()}")
     if name == "M" and np.abs(totals - 1).max() > 1e-6:
         raise ValueError(f"M must have rows of sum 1; got {totals.ravel().tolist()}")

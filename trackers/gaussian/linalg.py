@@ -138,7 +138,7 @@ def inverse(A: Float) -> Float:
         return np.asarray(np.linalg.inv(A), np.float64)
     _, _, solution, failed = lapack().dgesv(A, identity(len(A)))
     if failed:
-        raise np.linalg.LinAlgError("matrix to invert must not be singular")
+        raise ValueError("matrix to invert must not be singular: P, H or R has grown too far")
     return np.asarray(solution)
 
 

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.base import MeasurementModel
 from arrivals.measurements import LARGEST, is_missing, numbers
+from arrivals.messages import shown
 from arrivals.motion_models.base import MotionModel, gaussian
 from arrivals.trackers.base import Tracker
 from arrivals.trackers.estimates import StateEstimate
@@ -168,7 +169,7 @@ class Particle(DeclaredAttributes, Tracker):
                 self._generator = np.random.default_rng(rng)
             except (TypeError, ValueError):
                 wanted = "a numpy Generator or a whole number that is not negative"
-                raise TypeError(f"rng must be {wanted}; got {rng!r}") from None
+                raise TypeError(f"rng must be {wanted}; got {shown(rng)}") from None
             self._rng = rng
 
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:

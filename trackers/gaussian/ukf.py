@@ -157,6 +157,8 @@ class UKF(Queries, GaussianFilter):
         kappa, n = number("kappa", self.kappa), self.dim_x
         if not -n < kappa < np.inf:
             raise ValueError(f"kappa must be finite and above -{n}; got {kappa}")
+        if not -np.inf < beta < np.inf:
+            raise ValueError(f"beta must be finite; got {beta}")
         return merwe_weights(n, alpha, beta, kappa)
 
     def _regression(
