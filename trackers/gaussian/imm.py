@@ -239,10 +239,12 @@ def _check_filters(filters: Any) -> None:
         raise ValueError(f"filters must have at least two entries; got {len(filters)}")
     for member in filters:
         if not isinstance(member, Filter):
-            missing = [n for n in "x P predict update likelihood".split() if not hasattr(member, n)]
+            lacks = [
+                n for n in ("x", "P", "predict", "update", "likelihood") if not hasattr(member, n)
+            ]
             raise TypeError(
                 "filters must have x, P, predict(u), update(z), likelihood; "
-                f"got {type(member).__name__} without {', '.join(missing)}"
+                f"got {type(member).__name__} without {', '.join(lacks)}"
             )
     shapes = [np.shape(member.x) for member in filters]
     if len(set(shapes)) != 1:
