@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import math
-import sys
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol, Self, runtime_checkable
 
@@ -24,7 +23,8 @@ from arrivals.trackers.registry import register
 from arrivals.typing import Float
 from arrivals.validation import count, items, shaped, time_step
 
-TINY = sys.float_info.min
+TINY = float(np.finfo(np.float64).tiny)
+MEMBERS = ("x", "P", "predict", "update", "likelihood")
 
 
 @runtime_checkable
@@ -239,9 +239,7 @@ def _check_filters(filters: Any) -> None:
         raise ValueError(f"filters must have at least two entries; got {len(filters)}")
     for member in filters:
         if not isinstance(member, Filter):
-            lacks = [
-                n for n in ("x", "P", "predict", "update", "likelihood") if not hasattr(member, n)
-            ]
+            lacks = [name for name in MEMBERS if not hasattr(member, name)]
             raise TypeError(
                 "filters must have x, P, predict(u), update(z), likelihood; "
                 f"got {type(member).__name__} without {', '.join(lacks)}"
