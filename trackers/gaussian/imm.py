@@ -173,7 +173,7 @@ class IMM(DeclaredAttributes, Tracker):
         _for_all(self.filters, predict_member)
         vars(self).update(mu=cbar, cbar=cbar, omega=omega)  # without the checks of assignments
         self.combine()
-        self.x_prior, self.P_prior = self.x.copy(), self.P.copy()
+        vars(self).update(x_prior=self.x.copy(), P_prior=self.P.copy())
 
     def update(self, z: ArrayLike | None) -> None:
         """Update each filter, and its probability by the likelihood of the measurement.
@@ -190,7 +190,7 @@ class IMM(DeclaredAttributes, Tracker):
         else:
             self.update_probabilities()
             self.combine()
-        self.x_post, self.P_post = self.x.copy(), self.P.copy()
+        vars(self).update(x_post=self.x.copy(), P_post=self.P.copy())
 
     def update_probabilities(self) -> None:
         """Set the probabilities of the models to c_j Λ_j / Σ c Λ, in the log domain."""
@@ -210,7 +210,7 @@ class IMM(DeclaredAttributes, Tracker):
         """Set mean and covariance to those of the mixture of the filters."""
         # x = Σ mu_j x_j,  P = Σ mu_j (P_j + (x_j - x)(x_j - x)')   (11.6.6-16), (11.6.6-17)
         x, P = mixture(*self._beliefs(), self.mu, self.state_angles)
-        self.x, self.P = x.reshape(np.shape(self.filters[0].x)), P
+        vars(self).update(x=x.reshape(np.shape(self.filters[0].x)), P=P)
 
     def _beliefs(self) -> tuple[Float, Float]:
         means = np.array([member.x for member in self.filters], dtype=np.float64)

@@ -33,10 +33,10 @@ class DeclaredAttributes:
         if isinstance(declared, property) and declared.fset is None:
             kind = type(self).__name__
             raise AttributeError(f"{name} of {kind} cannot be assigned: {_cure(name)}")
-        known = declared is not UNDECLARED or name in vars(self) or annotated(type(self), name)
-        caller = inspect.currentframe().f_back  # type: ignore[union-attr]  # CPython has frames
-        if not known and not _assigned_by_own_method(self, caller):
-            raise AttributeError(unknown_attribute(self, name))
+        if not (name in vars(self) or declared is not UNDECLARED or annotated(type(self), name)):
+            caller = inspect.currentframe().f_back  # type: ignore[union-attr]  # CPython has frames
+            if not _assigned_by_own_method(self, caller):
+                raise AttributeError(unknown_attribute(self, name))
         super().__setattr__(name, value)
 
 
