@@ -16,6 +16,7 @@ from arrivals.trackers.beamforming.spectrum import (
     parabolic_peak,
     refine_peaks,
     scan_directions,
+    scan_is_joined,
     scan_steering_matrix,
 )
 
@@ -33,6 +34,7 @@ __all__ = [
     "parabolic_peak",
     "refine_peaks",
     "scan_directions",
+    "scan_is_joined",
     "scan_steering_matrix",
     "spatial_smoothing",
 ]

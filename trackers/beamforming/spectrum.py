@@ -180,7 +180,7 @@ def local_maxima(power: Float, *, circular: bool, joined: bool, rise: float = 0.
     if not circular:  # a line's spectrum is even about its ends
         around[..., 0], around[..., -1] = power[..., 1], power[..., -2]
     is_peak = (power > around[..., :-2] + rise) & (power >= around[..., 2:])
-    if joined and not circular:
+    if joined and not circular and is_peak[..., [0, -1]].any():
         first, last = power[..., 0], power[..., -1]
         inner = np.maximum(power[..., 1], power[..., -2]) + rise
         at_last = last > first + rise
@@ -213,6 +213,32 @@ def ends_coincide(first: Complex, last: Complex) -> bool:
     product = (first.conj() * last).sum(axis=-1)
     norms = (np.abs(first) ** 2).sum(axis=-1) * (np.abs(last) ** 2).sum(axis=-1)
     return bool((np.abs(product) ** 2 / norms).mean() > MAX_COHERENCE_OF_ENDS)
+
+
+@lru_cache(maxsize=64)
+def scan_is_joined(array: SensorArray, wavelengths: tuple[float, ...]) -> bool:
+    """Return True if the ends of a line's scan coincide, at several wavelengths on average.
+
+    Parameters
+    ----------
+    array : SensorArray
+        Array of isotropic sensors.
+    wavelengths : tuple of float
+        Wavelengths, m.
+
+    Returns
+    -------
+    bool
+        False for arrays in a plane or in space.
+
+    Examples
+    --------
+    >>> [scan_is_joined(SensorArray.ula(8, spacing), (1.0,)) for spacing in (0.5, 0.4)]
+    [True, False]
+    """
+    ends = np.array([-np.pi / 2, np.pi / 2])[:, None]
+    is_line = array.dim == 1
+    return is_line and ends_coincide(*array.steering_vector(ends, np.asarray(wavelengths)))
 
 
 def refine_peaks(doa_grid: Float, power: Float, peaks: Int) -> Float:
@@ -277,13 +303,14 @@ def parabolic_peak(doa_grid: Float, level: Float, peaks: Int) -> Float:
     >>> parabolic_peak(np.arange(4.0), np.array([3.0, 4.0, 4.0, 3.0]), np.array([1]))
     array([1.5])
     """
-    n, step = len(level), doa_grid[1] - doa_grid[0]
-    before, after = peaks - 1, (peaks + 1) % n
-    is_circle = doa_grid[-1] - doa_grid[0] + step > 2 * np.pi * (1 - 1e-9)
-    if not is_circle:  # even about the ends
-        before, after = np.where(peaks == 0, 1, before), np.where(peaks == n - 1, n - 2, after)
+    n, step = len(level), float(doa_grid[1] - doa_grid[0])
+    is_circle = float(doa_grid[-1] - doa_grid[0]) + step > 2 * np.pi * (1 - 1e-9)
+    if is_circle:
+        before, after = peaks - 1, (peaks + 1) % n
+    else:  # even about the ends
+        before, after = np.abs(peaks - 1), n - 1 - np.abs(n - 2 - peaks)
     left, middle, right = level[before], level[peaks], level[after]
     bend = 2 * middle - left - right
     shift = (right - left) / (2 * np.where(bend > 0, bend, np.inf))
     doa = doa_grid[peaks] + step * np.maximum(np.minimum(shift, 0.5), -0.5)
-    return np.asarray(np.where(is_circle & (doa < -np.pi), doa + 2 * np.pi, doa))
+    return np.asarray(np.where(doa < -np.pi, doa + 2 * np.pi, doa) if is_circle else doa)
