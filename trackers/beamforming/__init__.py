@@ -7,16 +7,15 @@ from arrivals.trackers.beamforming.covariance import (
     spatial_smoothing,
 )
 from arrivals.trackers.beamforming.mvdr import MVDR, capon_power
+from arrivals.trackers.beamforming.scan_ends import ends_coincide, scan_is_joined
 from arrivals.trackers.beamforming.spectrum import (
     bartlett_power,
-    ends_coincide,
     find_peaks,
     local_maxima,
     mean_beam_power,
     parabolic_peak,
     refine_peaks,
     scan_directions,
-    scan_is_joined,
     scan_steering_matrix,
 )
 

@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
+from arrivals.trackers.beamforming.scan_ends import scan_is_joined
 from arrivals.trackers.beamforming.spectrum import (
     bartlett_power,
     find_peaks,
     mean_beam_power,
     refine_peaks,
     scan_directions,
-    scan_is_joined,
 )
 from arrivals.trackers.direction_tracker import DirectionTracker, warn_of_ambiguity
 from arrivals.trackers.registry import register

@@ -12,8 +12,6 @@ from arrivals.messages import shown
 from arrivals.typing import Bool, Complex, Float, Int
 from arrivals.validation import one_of, real, shaped
 
-MAX_COHERENCE_OF_ENDS = 0.1  # of responses at ±90° of a line that count as two directions
-
 
 def scan_directions(array: SensorArray, n: int) -> Float:
     """Return n equally spaced directions: -π/2 to π/2 for a line, the full circle otherwise.
@@ -188,59 +186,6 @@ def local_maxima(power: Float, *, circular: bool, joined: bool, rise: float = 0.
     return np.asarray(is_peak)
 
 
-def ends_coincide(first: Complex, last: Complex) -> bool:
-    """Return True if an array does not resolve the two ends of a line's scan.
-
-    At a spacing of half a wavelength -90 and 90 degrees have one response; slightly below, the
-    main lobe of a source at one end reaches the other.
-
-    Parameters
-    ----------
-    first, last : ndarray, shape (..., n_sensors)
-        Steering vectors of the first and the last direction.
-
-    Returns
-    -------
-    bool
-        True if the mean of |aᴴb|² / ‖a‖²‖b‖² is above 0.1.
-
-    Examples
-    --------
-    >>> doa = [-np.pi / 2, np.pi / 2]
-    >>> [ends_coincide(*SensorArray.ula(8, d).steering_vector(doa, 1.0)) for d in (0.5, 0.4)]
-    [True, False]
-    """
-    product = (first.conj() * last).sum(axis=-1)
-    norms = (np.abs(first) ** 2).sum(axis=-1) * (np.abs(last) ** 2).sum(axis=-1)
-    return bool((np.abs(product) ** 2 / norms).mean() > MAX_COHERENCE_OF_ENDS)
-
-
-@lru_cache(maxsize=64)
-def scan_is_joined(array: SensorArray, wavelengths: tuple[float, ...]) -> bool:
-    """Return True if the ends of a line's scan coincide, at several wavelengths on average.
-
-    Parameters
-    ----------
-    array : SensorArray
-        Array of isotropic sensors.
-    wavelengths : tuple of float
-        Wavelengths, m.
-
-    Returns
-    -------
-    bool
-        False for arrays in a plane or in space.
-
-    Examples
-    --------
-    >>> [scan_is_joined(SensorArray.ula(8, spacing), (1.0,)) for spacing in (0.5, 0.4)]
-    [True, False]
-    """
-    ends = np.array([-np.pi / 2, np.pi / 2])[:, None]
-    is_line = array.dim == 1
-    return is_line and ends_coincide(*array.steering_vector(ends, np.asarray(wavelengths)))
-
-
 def refine_peaks(doa_grid: Float, power: Float, peaks: Int) -> Float:
     """Return directions between grid points: vertices of parabolas through the peaks in dB.
 
@@ -267,7 +212,8 @@ def refine_peaks(doa_grid: Float, power: Float, peaks: Int) -> Float:
     power, doa_grid = _spectrum("power", power), _spectrum("doa_grid", doa_grid)
     shaped("doa_grid", doa_grid, len(power))
     index = real("peaks", peaks)
-    if index.ndim != 1 or not np.isin(index, np.arange(len(power))).all():
+    is_index = (index >= 0) & (index < len(power)) & (index == np.floor(index))
+    if index.ndim != 1 or not is_index.all():
         raise ValueError(f"peaks must be indices below {len(power)}; got {shown(peaks)}")
     level = np.log(np.maximum(power, np.finfo(float).tiny))
     return parabolic_peak(doa_grid, level, index.astype(np.int64))

@@ -9,11 +9,11 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.arrays.sensor_array import SensorArray
+from arrivals.trackers.beamforming.scan_ends import scan_is_joined
 from arrivals.trackers.beamforming.spectrum import (
     find_peaks,
     parabolic_peak,
     scan_directions,
-    scan_is_joined,
     scan_steering_matrix,
 )
 from arrivals.trackers.registry import register
