@@ -72,10 +72,19 @@ class Tracker(Configurable, ABC):
     def update(self, z: ArrayLike | None) -> None:
         """Update the belief with a measurement.
 
+        A number is missing if it is NaN, None, masked, infinite, or so large that its square
+        overflows; a sensor of an array also if it has zeros alone in a step, with one warning.
+        The other numbers of the measurement are used.
+
+        A missing measurement does not change the belief. In a gap `predict` alone moves it: the
+        variances grow, and sources whose existence is tracked end. A method that estimates
+        neither reports nothing on a step without data; its memory, which `predict` weighs down,
+        remains, so that it resumes with the next measurement.
+
         Parameters
         ----------
         z : array_like or None
-            Measurement; None or NaN if it is missing, which does not change the belief.
+            Measurement; None or NaN if it is missing.
         """
 
     @property

@@ -7,9 +7,9 @@ from arrivals.trackers.beamforming.covariance import (
     spatial_smoothing,
 )
 from arrivals.trackers.beamforming.mvdr import MVDR, capon_power
+from arrivals.trackers.beamforming.scan_ends import ends_coincide, scan_is_joined
 from arrivals.trackers.beamforming.spectrum import (
     bartlett_power,
-    ends_coincide,
     find_peaks,
     local_maxima,
     mean_beam_power,
@@ -33,6 +33,7 @@ __all__ = [
     "parabolic_peak",
     "refine_peaks",
     "scan_directions",
+    "scan_is_joined",
     "scan_steering_matrix",
     "spatial_smoothing",
 ]

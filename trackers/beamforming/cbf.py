@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
+from arrivals.trackers.beamforming.scan_ends import scan_is_joined
 from arrivals.trackers.beamforming.spectrum import (
     bartlett_power,
-    ends_coincide,
     find_peaks,
     mean_beam_power,
     refine_peaks,
@@ -114,11 +114,10 @@ class CBF(DirectionTracker):
 
     def _has_joined_ends(self, z: Complex) -> bool:
         """Return True if the two ends of a line's scan are one direction."""
-        if self.measurement.array.dim > 1:
-            return False
-        sensors = self.scanned_sensors(z)
-        first, last = self.measurement.steering_vector(self.doa_grid[[0, -1]])[..., sensors]
-        return ends_coincide(first, last)
+        array, sensors = self.measurement.array, self.scanned_sensors(z)
+        if array.dim == 1 and not sensors.all():
+            array = array.without(np.flatnonzero(~sensors))
+        return scan_is_joined(array, self.measurement.wavelengths)
 
     def _scan(self, z: Complex) -> Float:
         model = self.measurement

@@ -12,8 +12,6 @@ from arrivals.messages import shown
 from arrivals.typing import Bool, Complex, Float, Int
 from arrivals.validation import one_of, real, shaped
 
-MAX_COHERENCE_OF_ENDS = 0.1  # of responses at ±90° of a line that count as two directions
-
 
 def scan_directions(array: SensorArray, n: int) -> Float:
     """Return n equally spaced directions: -π/2 to π/2 for a line, the full circle otherwise.
@@ -180,39 +178,12 @@ def local_maxima(power: Float, *, circular: bool, joined: bool, rise: float = 0.
     if not circular:  # a line's spectrum is even about its ends
         around[..., 0], around[..., -1] = power[..., 1], power[..., -2]
     is_peak = (power > around[..., :-2] + rise) & (power >= around[..., 2:])
-    if joined and not circular:
+    if joined and not circular and is_peak[..., [0, -1]].any():
         first, last = power[..., 0], power[..., -1]
         inner = np.maximum(power[..., 1], power[..., -2]) + rise
         at_last = last > first + rise
         is_peak[..., 0], is_peak[..., -1] = ~at_last & (first > inner), at_last & (last > inner)
     return np.asarray(is_peak)
-
-
-def ends_coincide(first: Complex, last: Complex) -> bool:
-    """Return True if an array does not resolve the two ends of a line's scan.
-
-    At a spacing of half a wavelength -90 and 90 degrees have one response; slightly below, the
-    main lobe of a source at one end reaches the other.
-
-    Parameters
-    ----------
-    first, last : ndarray, shape (..., n_sensors)
-        Steering vectors of the first and the last direction.
-
-    Returns
-    -------
-    bool
-        True if the mean of |aᴴb|² / ‖a‖²‖b‖² is above 0.1.
-
-    Examples
-    --------
-    >>> doa = [-np.pi / 2, np.pi / 2]
-    >>> [ends_coincide(*SensorArray.ula(8, d).steering_vector(doa, 1.0)) for d in (0.5, 0.4)]
-    [True, False]
-    """
-    product = (first.conj() * last).sum(axis=-1)
-    norms = (np.abs(first) ** 2).sum(axis=-1) * (np.abs(last) ** 2).sum(axis=-1)
-    return bool((np.abs(product) ** 2 / norms).mean() > MAX_COHERENCE_OF_ENDS)
 
 
 def refine_peaks(doa_grid: Float, power: Float, peaks: Int) -> Float:
@@ -241,7 +212,8 @@ def refine_peaks(doa_grid: Float, power: Float, peaks: Int) -> Float:
     power, doa_grid = _spectrum("power", power), _spectrum("doa_grid", doa_grid)
     shaped("doa_grid", doa_grid, len(power))
     index = real("peaks", peaks)
-    if index.ndim != 1 or not np.isin(index, np.arange(len(power))).all():
+    is_index = (index >= 0) & (index < len(power)) & (index == np.floor(index))
+    if index.ndim != 1 or not is_index.all():
         raise ValueError(f"peaks must be indices below {len(power)}; got {shown(peaks)}")
     level = np.log(np.maximum(power, np.finfo(float).tiny))
     return parabolic_peak(doa_grid, level, index.astype(np.int64))
@@ -277,13 +249,14 @@ def parabolic_peak(doa_grid: Float, level: Float, peaks: Int) -> Float:
     >>> parabolic_peak(np.arange(4.0), np.array([3.0, 4.0, 4.0, 3.0]), np.array([1]))
     array([1.5])
     """
-    n, step = len(level), doa_grid[1] - doa_grid[0]
-    before, after = peaks - 1, (peaks + 1) % n
-    is_circle = doa_grid[-1] - doa_grid[0] + step > 2 * np.pi * (1 - 1e-9)
-    if not is_circle:  # even about the ends
-        before, after = np.where(peaks == 0, 1, before), np.where(peaks == n - 1, n - 2, after)
+    n, step = len(level), float(doa_grid[1] - doa_grid[0])
+    is_circle = float(doa_grid[-1] - doa_grid[0]) + step > 2 * np.pi * (1 - 1e-9)
+    if is_circle:
+        before, after = peaks - 1, (peaks + 1) % n
+    else:  # even about the ends
+        before, after = np.abs(peaks - 1), n - 1 - np.abs(n - 2 - peaks)
     left, middle, right = level[before], level[peaks], level[after]
     bend = 2 * middle - left - right
     shift = (right - left) / (2 * np.where(bend > 0, bend, np.inf))
     doa = doa_grid[peaks] + step * np.maximum(np.minimum(shift, 0.5), -0.5)
-    return np.asarray(np.where(is_circle & (doa < -np.pi), doa + 2 * np.pi, doa))
+    return np.asarray(np.where(doa < -np.pi, doa + 2 * np.pi, doa) if is_circle else doa)

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from arrivals.parameters import FrozenModel
-from arrivals.trackers.beamforming.spectrum import ends_coincide, local_maxima
+from arrivals.trackers.beamforming.scan_ends import ends_coincide
+from arrivals.trackers.beamforming.spectrum import local_maxima
 from arrivals.typing import Bool, Complex, Float, Int
 from arrivals.validation import count, positive
 

@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurements import numbers
-from arrivals.trackers.beamforming.spectrum import ends_coincide, scan_directions
+from arrivals.trackers.beamforming.scan_ends import ends_coincide
+from arrivals.trackers.beamforming.spectrum import scan_directions
 from arrivals.trackers.direction_tracker import BatchDirectionTracker, warn_of_ambiguity
 from arrivals.trackers.registry import register
 from arrivals.trackers.sparse_bayes.fixed_point import (

@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.arrays.sensor_array import SensorArray
+from arrivals.trackers.beamforming.scan_ends import scan_is_joined
 from arrivals.trackers.beamforming.spectrum import (
-    ends_coincide,
     find_peaks,
     parabolic_peak,
     scan_directions,
@@ -95,22 +95,19 @@ class SpectrumSearch:
 
     def spectrum(self, subspaces: Subspaces) -> tuple[Float, Float]:
         """Return scan directions and `music_spectrum` there, by the smaller of the subspaces."""
-        doa_grid, A = self._scan()
+        doa_grid, A = scan_steering_matrix(self.array, self.wavelength, self.n_directions)
         n, K = subspaces.signal.shape
         if n < 2 * K:
             return doa_grid, music_spectrum(A, subspaces.noise)
         null = n - projected_power(A, subspaces.signal)  # ‖a‖² = n, null = ‖Eᴴa‖²
         return doa_grid, n / np.maximum(null, n / MAX_SPECTRUM)
 
-    def _scan(self) -> tuple[Float, Complex]:
-        return scan_steering_matrix(self.array, self.wavelength, self.n_directions)
-
     def directions(self, subspaces: Subspaces) -> Float:
         """Return the highest peaks, rad, each refined by a parabola through the null spectrum."""
         doa_grid, power = self.spectrum(subspaces)
-        A, circular = self._scan()[1], self.array.dim > 1
-        joined = not circular and ends_coincide(A[0], A[-1])
-        peaks = find_peaks(power, circular=circular, joined=joined)[: subspaces.signal.shape[-1]]
+        joined = scan_is_joined(self.array, (self.wavelength,))
+        peaks = find_peaks(power, circular=self.array.dim > 1, joined=joined)
+        peaks = peaks[: subspaces.signal.shape[-1]]
         return parabolic_peak(doa_grid, -1 / power, peaks)
 
 

@@ -142,9 +142,9 @@ def incomplete_step(
     updated = np.where(valid[:, None, None], R - H[:, :, None] * gain[:, None, :], R) / beta
     W = W + np.where(valid, y - W @ z, 0)[:, None] * gain
     limit = MAX_TRACE_RATIO * float(new_P.trace().real)
-    updated = np.asarray((updated + updated.conj().swapaxes(1, 2)) / 2, dtype=np.complex128)
+    of_sensors = np.asarray(updated + updated.conj().swapaxes(1, 2), dtype=np.complex128) / 2
     new_P = np.asarray((new_P + new_P.conj().T) / 2, dtype=np.complex128)
-    return W, new_P, SensorInverses(limited_trace(updated, limit)), np.asarray(z, np.complex128)
+    return W, new_P, SensorInverses(limited_trace(of_sensors, limit)), np.asarray(z, np.complex128)
 
 
 def limited_trace(P: Complex, limit: float) -> Complex:
