@@ -13,7 +13,7 @@ from arrivals.trackers.autoregressive.belief import SourceBelief
 from arrivals.trackers.autoregressive.interval_filter import FilteredInterval
 from arrivals.trackers.autoregressive.regressions import TINY
 from arrivals.trackers.autoregressive.settings import NoiseSettings
-from arrivals.typing import Float
+from arrivals.typing import Bool, Float
 
 MIN_NOISE = 1e-8  # measurement noise over the power of the strongest source
 MIN_GATED_POWER = 0.5  # of the noise: the gate of a source is a fraction of at least this power
@@ -47,11 +47,8 @@ def finish_interval(
     any_active = np.asarray(active.any(axis=-1))[..., None, None]
     power = np.where(has_data, update_power(belief, current, memory), belief.power)
     scaled_q = belief.q * power / belief.power
-    # AR models of inactive sources, their factors in proportion to the weight
-    weight = np.where(any_active[..., 0, 0], new.ar_weight, belief.ar_weight)
-    scale = np.sqrt(weight / np.where(belief.ar_weight > 0, belief.ar_weight, 1.0))
-    kept_factor = scale[..., None, None, None] * belief.ar_factor
-    learning = active if noise.adapt_process_noise else np.ones_like(active)
+    if noise.adapt_process_noise and not active.all():
+        new = _with_kept_models(belief, new, active)
     return replace(
         new,
         x=filtered.X[..., -belief.x.shape[-2] :, :],
@@ -60,12 +57,24 @@ def finish_interval(
         manifold_factor=np.where(any_active, new.manifold_factor, belief.manifold_factor),
         r=update_noise(belief, filtered) if noise.adapt_measurement_noise else belief.r,
         power=power,
-        q=np.where(active, new.q, belief.q) if noise.adapt_process_noise else scaled_q,
-        a=np.where(learning[..., None], new.a, belief.a),
-        ar_factor=np.where(learning[..., None, None], new.ar_factor, kept_factor),
-        ar_weight=np.where(learning.any(axis=-1), new.ar_weight, belief.ar_weight),
+        q=new.q if noise.adapt_process_noise else scaled_q,
         active=active,
         n=belief.n + 1,
+    )
+
+
+def _with_kept_models(belief: SourceBelief, new: SourceBelief, active: Bool) -> SourceBelief:
+    """Return a belief with the former AR models of inactive sources."""
+    weight = np.where(active.any(axis=-1), new.ar_weight, belief.ar_weight)
+    # their factors in proportion to the weight, which all sources share
+    scale = np.sqrt(weight / np.where(belief.ar_weight > 0, belief.ar_weight, 1.0))
+    kept_factor = scale[..., None, None, None] * belief.ar_factor
+    return replace(
+        new,
+        a=np.where(active[..., None], new.a, belief.a),
+        q=np.where(active, new.q, belief.q),
+        ar_factor=np.where(active[..., None, None], new.ar_factor, kept_factor),
+        ar_weight=weight,
     )
 
 
