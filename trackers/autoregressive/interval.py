@@ -16,6 +16,7 @@ from arrivals.trackers.autoregressive.settings import NoiseSettings
 from arrivals.typing import Bool, Float
 
 MIN_NOISE = 1e-8  # measurement noise over the power of the strongest source
+SILENCE = 0.01  # of the long-term powers of all sources: received power below which none is active
 MIN_GATED_POWER = 0.5  # of the noise: the gate of a source is a fraction of at least this power
 PRIOR_INTERVALS = 20.0  # intervals that the initial powers count for
 
@@ -39,11 +40,15 @@ def finish_interval(
     gate, memory : float
         As in `ARKalmanQRDRLS`.
     """
-    current = source_power(filtered.X, belief.doa.shape[-1], belief.x.shape[-2])
+    n_parts = belief.x.shape[-2]
+    current = source_power(filtered.X, belief.doa.shape[-1], n_parts)
     has_data = np.asarray(filtered.decay < 1)[..., None]
     # active_k: mean |s_k|² > γ times the long-term power   (sec. 5)
     minimum = gate * np.maximum(belief.power, MIN_GATED_POWER * belief.r[..., None])
-    active = np.logical_and((current > minimum) | (gate == 0), has_data)
+    # in silence there is no information on any source
+    received = n_parts * (filtered.y * filtered.y).mean(axis=(-2, -1))
+    audible = np.asarray(received > SILENCE * belief.power.sum(axis=-1))[..., None]
+    active = ((current > minimum) | (gate == 0)) & has_data & audible
     any_active = np.asarray(active.any(axis=-1))[..., None, None]
     power = np.where(has_data, update_power(belief, current, memory), belief.power)
     scaled_q = belief.q * power / belief.power
