@@ -53,6 +53,8 @@ class ArraySamples(FrozenModel):
         κ, the delay between neighbouring grid points at endfire, samples.
     grid_index : ndarray of int, shape (n_sensors,)
         Grid point of each sensor, counted from the largest coordinate.
+    n_grid_points : int
+        Number of grid points from the first sensor to the last.
     band_filter : BandFilter or None
         Filter to `band`; None if there is nothing to filter.
     received_noise_ratio : float
@@ -86,6 +88,7 @@ class ArraySamples(FrozenModel):
     band: Sequence[float] | None = None
     kappa: float = field(init=False, repr=False, compare=False)
     grid_index: Int = field(init=False, repr=False, compare=False)
+    n_grid_points: int = field(init=False, repr=False, compare=False)
     band_filter: BandFilter | None = field(init=False, repr=False, compare=False)
     received_noise_ratio: float = field(init=False, repr=False, compare=False)
 
@@ -121,6 +124,7 @@ class ArraySamples(FrozenModel):
         grid_index.setflags(write=False)
         object.__setattr__(self, "kappa", self.rate * spacing / self.array.speed)
         object.__setattr__(self, "grid_index", grid_index)
+        object.__setattr__(self, "n_grid_points", int(grid_index.max()) + 1)
         if 2 * self.correlation.highest * self.kappa > 1 + 1e-6:
             limit = self.rate / (2 * self.kappa)
             raise ValueError(
@@ -132,11 +136,6 @@ class ArraySamples(FrozenModel):
     def noise_ratio(self) -> float:
         """ε, noise power over source power."""
         return 10 ** (-float(self.snr_db) / 10)
-
-    @property
-    def n_grid_points(self) -> int:
-        """Number of grid points from the first sensor to the last."""
-        return int(self.grid_index.max()) + 1
 
     def frame(self, z: ArrayLike) -> Float:
         """Return snapshots on the grid: (..., n_sensors) -> (..., n_grid_points), else NaN.

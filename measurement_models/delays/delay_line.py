@@ -6,7 +6,7 @@ import math
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import ClassVar
 
 import numpy as np
@@ -68,7 +68,7 @@ class SourceAtCentre(MeasurementModel):
         """One sample of every sensor."""
         return self.n_sensors
 
-    @property
+    @cached_property
     def centred(self) -> Float:
         """Steps from the array's centre, j - (N-1)/2, (n_sensors,)."""
         return np.arange(self.n_sensors, dtype=np.float64) - (self.n_sensors - 1) / 2

@@ -65,7 +65,7 @@ def not_negative(name: str, value: Any) -> float:
         raise ValueError(f"{name} must be finite and not negative; got {value}")
     if not size < LARGEST:
         raise ValueError(f"{name} must be at most {LARGEST}; got {value}")
-    return abs(size) if size == 0 else size  # no -0.0
+    return size if size > 0 or np.copysign(1.0, size) > 0 else 0.0  # no -0.0
 
 
 def time_step(dt: Any) -> float:

@@ -53,7 +53,7 @@ class ARKalmanQRDRLS(BlockProcessor):
         Iterations of each interval.
     gate : float
         γ: a source below this fraction of its long-term power is inactive and keeps its direction
-        and its AR model.
+        and its AR model; all do in silence, 20 dB below their long-term powers together.
     memory : float
         Intervals over which the long-term power of a source is averaged, pauses included.
     regression : RegressionSettings
@@ -128,7 +128,7 @@ class ARKalmanQRDRLS(BlockProcessor):
         doa: Sequence[float] | Float | None = None,
         interval: int = 30,
         inner: int = 1,
-        gate: float = 0.01,
+        gate: float = 0.0,
         memory: float = 1000.0,
         regression: RegressionSettings = RegressionSettings(),  # noqa: B008
         noise: NoiseSettings = NoiseSettings(),  # noqa: B008

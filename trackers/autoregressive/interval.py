@@ -13,9 +13,10 @@ from arrivals.trackers.autoregressive.belief import SourceBelief
 from arrivals.trackers.autoregressive.interval_filter import FilteredInterval
 from arrivals.trackers.autoregressive.regressions import TINY
 from arrivals.trackers.autoregressive.settings import NoiseSettings
-from arrivals.typing import Float
+from arrivals.typing import Bool, Float
 
 MIN_NOISE = 1e-8  # measurement noise over the power of the strongest source
+SILENCE = 0.01  # of the long-term powers of all sources: received power below which none is active
 MIN_GATED_POWER = 0.5  # of the noise: the gate of a source is a fraction of at least this power
 PRIOR_INTERVALS = 20.0  # intervals that the initial powers count for
 
@@ -39,19 +40,20 @@ def finish_interval(
     gate, memory : float
         As in `ARKalmanQRDRLS`.
     """
-    current = source_power(filtered.X, belief.doa.shape[-1], belief.x.shape[-2])
+    n_parts = belief.x.shape[-2]
+    current = source_power(filtered.X, belief.doa.shape[-1], n_parts)
     has_data = np.asarray(filtered.decay < 1)[..., None]
     # active_k: mean |s_k|² > γ times the long-term power   (sec. 5)
     minimum = gate * np.maximum(belief.power, MIN_GATED_POWER * belief.r[..., None])
-    active = np.logical_and((current > minimum) | (gate == 0), has_data)
+    # in silence there is no information on any source
+    received = n_parts * (filtered.y * filtered.y).mean(axis=(-2, -1))
+    audible = np.asarray(received > SILENCE * belief.power.sum(axis=-1))[..., None]
+    active = ((current > minimum) | (gate == 0)) & has_data & audible
     any_active = np.asarray(active.any(axis=-1))[..., None, None]
     power = np.where(has_data, update_power(belief, current, memory), belief.power)
     scaled_q = belief.q * power / belief.power
-    # AR models of inactive sources, their factors in proportion to the weight
-    weight = np.where(any_active[..., 0, 0], new.ar_weight, belief.ar_weight)
-    scale = np.sqrt(weight / np.where(belief.ar_weight > 0, belief.ar_weight, 1.0))
-    kept_factor = scale[..., None, None, None] * belief.ar_factor
-    learning = active if noise.adapt_process_noise else np.ones_like(active)
+    if noise.adapt_process_noise and not active.all():
+        new = _with_kept_models(belief, new, active)
     return replace(
         new,
         x=filtered.X[..., -belief.x.shape[-2] :, :],
@@ -60,12 +62,24 @@ def finish_interval(
         manifold_factor=np.where(any_active, new.manifold_factor, belief.manifold_factor),
         r=update_noise(belief, filtered) if noise.adapt_measurement_noise else belief.r,
         power=power,
-        q=np.where(active, new.q, belief.q) if noise.adapt_process_noise else scaled_q,
-        a=np.where(learning[..., None], new.a, belief.a),
-        ar_factor=np.where(learning[..., None, None], new.ar_factor, kept_factor),
-        ar_weight=np.where(learning.any(axis=-1), new.ar_weight, belief.ar_weight),
+        q=new.q if noise.adapt_process_noise else scaled_q,
         active=active,
         n=belief.n + 1,
+    )
+
+
+def _with_kept_models(belief: SourceBelief, new: SourceBelief, active: Bool) -> SourceBelief:
+    """Return a belief with the former AR models of inactive sources."""
+    weight = np.where(active.any(axis=-1), new.ar_weight, belief.ar_weight)
+    # their factors in proportion to the weight, which all sources share
+    scale = np.sqrt(weight / np.where(belief.ar_weight > 0, belief.ar_weight, 1.0))
+    kept_factor = scale[..., None, None, None] * belief.ar_factor
+    return replace(
+        new,
+        a=np.where(active[..., None], new.a, belief.a),
+        q=np.where(active, new.q, belief.q),
+        ar_factor=np.where(active[..., None, None], new.ar_factor, kept_factor),
+        ar_weight=weight,
     )
 
 

@@ -27,6 +27,7 @@ from arrivals.trackers.autoregressive.belief import (
 )
 from arrivals.trackers.autoregressive.history import History
 from arrivals.trackers.autoregressive.initialization import acquire_directions, manifold_of
+from arrivals.trackers.autoregressive.interval import SILENCE
 from arrivals.trackers.autoregressive.settings import RegressionSettings
 from arrivals.trackers.autoregressive.snapshots import (
     MISSING,
@@ -224,10 +225,11 @@ class BlockProcessor(Tracker):
     def usable_rows(self, y: Float) -> list[Float] | None:
         """Return the complete rows of each sequence; None if a sequence has no usable ones.
 
-        With a gate, their mean power must exceed it.
+        Their mean power must exceed the gate, and that of silence.
         """
         usable = [one[np.isfinite(one).all(axis=-1)] for one in y]
-        minimum = self.gate * self.motion.power.sum() / self.motion.n_parts
+        least = max(self.gate, SILENCE)
+        minimum = least * self.motion.power.sum() / self.motion.n_parts
         if all(len(one) > 0 and np.mean(one**2) > minimum for one in usable):
             return usable
         return None

@@ -183,7 +183,7 @@ class QRDRLS(Configurable):
             raise ValueError(f"X and Y must have as many samples; got {X.shape} and {Y.shape}")
         valid: Bool | None = None
         if not np.isfinite(X.sum() + Y.sum()):  # a number is missing, or the sum is too large
-            valid = np.isfinite(X).all(axis=-1) & np.isfinite(Y).all(axis=-1)
+            valid = np.asarray(np.isfinite(X).all(axis=-1) & np.isfinite(Y).all(axis=-1))
             X, Y = np.where(valid[..., None], X, 0.0), np.where(valid[..., None], Y, 0.0)
         w, n = self._weights(weights, X, Y, n_parts), X.shape[-2] // n_parts
         if valid is not None:

@@ -87,8 +87,7 @@ class FilterAssembly(FrozenModel):
         self, x: Float, P: Float, frames: Float, n: int, misfit: Float
     ) -> DelayObservation:
         """Return the residuals of snapshot n, the newest of `frames`."""
-        stage = self.stage(n)
-        return stage.linearize(x, P, frames, self._limit(stage, P, misfit))
+        return self.stage(n).linearize(x, P, frames, self.limit(P, n, misfit))
 
     def update(
         self, x: Float, P: Float, frames: Float, n: int, misfit: Float
@@ -97,15 +96,15 @@ class FilterAssembly(FrozenModel):
 
         Misfits are those of `updated_misfit`.
         """
-        stage = self.stage(n)
-        limit = self._limit(stage, P, misfit)
-        x, P, e, used = stage.update(x, P, frames, limit)
+        limit = self.limit(P, n, misfit)
+        x, P, e, used = self.stage(n).update(x, P, frames, limit)
         if self.acquire is not None and n == self.acquisition:
             x, P = self._replay(x, P, frames[..., -n:, :])
         return x, P, misfit if limit is None else updated_misfit(misfit, e, used)
 
-    def _limit(self, stage: PairwiseUpdate | JointUpdate, P: Float, misfit: Float) -> Float | None:
-        return gate_limit(self.gate, misfit, P[..., 0, 0], stage.gated_variance)
+    def limit(self, P: Float, n: int, misfit: Float) -> Float | None:
+        """Return the limit of the residuals of snapshot n."""
+        return gate_limit(self.gate, misfit, P[..., 0, 0], self.stage(n).gated_variance)
 
     def _replay(self, x: Float, P: Float, frames: Float) -> tuple[Float, Float]:
         """Start the joint filter at the acquired delay, and process `frames` again."""

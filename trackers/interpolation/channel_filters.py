@@ -11,10 +11,11 @@ import numpy as np
 from arrivals.measurement_models.delays.array_samples import ArraySamples
 from arrivals.measurement_models.delays.band_filter import BandFilter
 from arrivals.trackers.interpolation.zero_runs import ZeroRuns
-from arrivals.typing import Bool, Float
+from arrivals.typing import Float
 
 LEARNING = 20  # samples of a channel before its steps are limited
 LONGEST_HOLD = 20  # missing samples that a held sample replaces in a filter
+NEGLIGIBLE = 1e-9  # of the tolerance: errors that count as none
 UNKNOWN = 1e3  # variance, over the power of the source, of what preceded the first sample
 
 
@@ -58,6 +59,8 @@ class ChannelFilters:
         Variance of filtered samples due to replaced ones, over the power of the source.
     energy, n_steps : ndarray, shape (..., n_channels)
         Sum of squares of all steps so far, without their outliers, and their number.
+    settled : bool
+        True if no sample is missing and no error is left.
     """
 
     band_filter: BandFilter | None
@@ -69,6 +72,7 @@ class ChannelFilters:
     error: Float
     energy: Float
     n_steps: Float
+    settled: bool = False
 
     @classmethod
     def start(cls, measurement: ArraySamples) -> ChannelFilters:
@@ -95,37 +99,47 @@ class ChannelFilters:
         zero_runs, z = self.zero_runs.without_zeros(z)
         if self.band_filter is None:
             return self if zero_runs is self.zero_runs else replace(self, zero_runs=zero_runs), z
-        valid, jumped, energy, n_steps = self._accepted(z, gate)
+        step = z - self.last
+        square, limit = step * step, self._limit(gate)
+        if self.settled and (square <= limit).all():  # the usual case; NaN is not
+            y, state = _filtered(self.band_filter, z, self.state)
+            energy, n_steps = self.energy + square, self.n_steps + 1
+            return replace(
+                self, zero_runs=zero_runs, state=state, last=z, energy=energy, n_steps=n_steps
+            ), y
+        known = np.isfinite(square)
+        square = np.where(known, square, 0.0)
+        jumped, valid = square > limit, np.isfinite(z) & (square <= limit * self.age**2)
+        energy = self.energy + np.minimum(square / self.age**2, limit)
         restarted = valid & (jumped | np.isnan(self.last) | (self.age > LONGEST_HOLD))
         held = np.where(valid, z, np.nan_to_num(self.last))
-        state = self.state
-        if restarted.any():
-            rest = self.band_filter.rest[:, None] * held[..., None, :]
-            state = np.where(restarted[..., None, :], rest, state)
-        # [y; s'] = M [x; s]
-        new = self.band_filter.step @ np.concatenate([held[..., None, :], state], axis=-2)
+        rest = self.band_filter.rest[:, None] * held[..., None, :]
+        y, state = _filtered(
+            self.band_filter, held, np.where(restarted[..., None, :], rest, self.state)
+        )
         # an error decays by r² in each step; that of a held sample grows with its age
         decay = self.band_filter.radius**2
         added = np.where(valid, 0.0, np.minimum(self.age**2, UNKNOWN))
         error = np.where(restarted, UNKNOWN, decay * self.error + (1 - decay) * added)
-        passed = valid & (error <= self.tolerance)
+        error = np.where(error < NEGLIGIBLE * self.tolerance, 0.0, error)
         after = ChannelFilters(
-            self.band_filter, self.tolerance, zero_runs, new[..., 1:, :],
-            np.where(valid, z, self.last), np.where(valid, 1.0, self.age + 1), error, energy,
-            n_steps,
+            self.band_filter, self.tolerance, zero_runs, state, np.where(valid, z, self.last),
+            np.where(valid, 1.0, self.age + 1), error, energy, self.n_steps + known,
+            bool(valid.all()) and not error.any(),
         )  # fmt: skip
-        return after, np.where(passed, new[..., 0, :], np.nan)
+        return after, np.where(valid & (error <= self.tolerance), y, np.nan)
 
-    def _accepted(self, z: Float, gate: float | None) -> tuple[Bool, Bool, Float, Float]:
-        """Return which samples are valid, and which of them jumped; and the learned steps."""
-        present = np.isfinite(z)
+    def _limit(self, gate: float | None) -> Float | float:
+        """Return the largest square of a step that is no jump."""
         if gate is None:
-            return present, np.zeros_like(present), self.energy, self.n_steps
-        known = present & np.isfinite(self.last)
-        square = np.where(known, (z - self.last) ** 2, 0.0)
+            return np.inf
+        if self.settled:
+            return (2 * gate) ** 2 * self.energy / self.n_steps
         limit = (2 * gate) ** 2 * self.energy / np.maximum(self.n_steps, 1)
-        limit = np.where(self.n_steps < LEARNING, np.inf, limit)
-        jumped = square > limit
-        valid = present & (square <= limit * self.age**2)
-        energy = self.energy + np.minimum(square / self.age**2, limit)
-        return valid, jumped, energy, self.n_steps + known
+        return np.where(self.n_steps < LEARNING, np.inf, limit)
+
+
+def _filtered(band_filter: BandFilter, x: Float, state: Float) -> tuple[Float, Float]:
+    """Return filtered samples and the states after them: [y; s'] = M [x; s]."""
+    new = band_filter.step @ np.concatenate([x[..., None, :], state], axis=-2)
+    return new[..., 0, :], new[..., 1:, :]

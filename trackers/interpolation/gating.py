@@ -44,7 +44,10 @@ def gate_limit(
     """
     if gate is None:
         return None
-    return np.where(variance < largest_variance, gate * gate * misfit, np.inf)[..., None]
+    known = variance < largest_variance
+    if np.ndim(known) == 0:
+        return np.array([gate * gate * float(misfit) if known else np.inf])
+    return np.where(known, gate * gate * misfit, np.inf)[..., None]
 
 
 def updated_misfit(misfit: Float, e: Float, used: Bool) -> Float:

@@ -91,14 +91,18 @@ class SampleBuffer:
                 quiet = np.nanmax(square, axis=-1, initial=0.0) * factor**2 < mean
                 energy = np.where(quiet, energy / 2, energy)
         n_valid = np.isfinite(frame).sum(axis=-1)
+        complete = n_valid.min() == frame.shape[-1]
         n_samples, misfit = self.n_samples + n_valid, self.misfit
         if not (misfit < np.inf).all():
             enough = n_samples >= ACQUISITION * frame.shape[-1]
             misfit = np.where(enough & np.isinf(misfit), 1.0, misfit)
+        if complete:
+            received, missing = square.sum(axis=-1), np.zeros(n_valid.shape, dtype=np.bool_)
+        else:
+            received, missing = np.nansum(square, axis=-1), (n_valid == 0) & (n_samples > 0)
         return SampleBuffer(
             np.concatenate([self.frames[..., 1:, :], frame[..., None, :]], axis=-2),
-            energy + np.nansum(square, axis=-1), n_samples, misfit,
-            (n_valid == 0) & (n_samples > 0), self.n_snapshots + 1,
+            energy + received, n_samples, misfit, missing, self.n_snapshots + 1,
         )  # fmt: skip
 
     def _level(self, power: float | None) -> Float:

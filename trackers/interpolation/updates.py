@@ -226,5 +226,7 @@ class JointUpdate(FrozenModel):
         h, H, R = self.source.linearise(x)
         e = frames[..., -1, :] - h
         used = is_used(e, ((H @ P) * H).sum(axis=-1) + R, limit)
+        if used.all():
+            return DelayObservation(e, H, R), e, used
         y, H = np.where(used, e, 0.0), np.where(used[..., None], H, 0.0)
         return DelayObservation(y, H, R), e, used
