@@ -53,6 +53,8 @@ def _run(argv: Sequence[str] | None) -> int:
     from arrivals.cli.main import run
 
     with warnings.catch_warnings():
+        if not sys.warnoptions:
+            warnings.simplefilter("default", UserWarning)
         warnings.showwarning = _print_warning  # type: ignore[assignment]  # its first argument
         try:
             run(argv)

@@ -18,8 +18,8 @@ from recording_files import NUMBERS, RATE, assert_refused
 from scipy.io import wavfile
 
 from arrivals.recordings import Recording, read
-from arrivals.recordings.matlab import matlab_arrays
-from arrivals.recordings.numpy_files import numpy_arrays
+from arrivals.recordings.formats.matlab import matlab_arrays
+from arrivals.recordings.formats.numpy_files import numpy_arrays
 
 VARIABLES: dict[str, Any] = {
     "samples": NUMBERS,
@@ -212,7 +212,7 @@ def test_missing_rate_is_refused_unread(tmp_path: Path, monkeypatch: pytest.Monk
     path = tmp_path / "a.npz"
     np.savez(path, samples=NUMBERS)
     monkeypatch.setattr(
-        "arrivals.recordings.numpy_files.read_array", lambda *_, **__: pytest.fail("loaded")
+        "arrivals.recordings.formats.numpy_files.read_array", lambda *_, **__: pytest.fail("loaded")
     )
     assert_refused(path, "the rate is unknown: pass rate=", rate_required=True)
     monkeypatch.undo()

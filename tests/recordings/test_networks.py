@@ -144,6 +144,23 @@ def test_damaged_npz_is_a_value_error_with_its_name(tmp_path: Path) -> None:
             assert str(error).startswith(f"{path}: ")  # noqa: PT017  (some are right)
 
 
+@pytest.mark.parametrize("suffix", ["csv", "npz"])
+def test_impossible_level_is_an_error_unless_it_is_named_as_missing(
+    tmp_path: Path, suffix: str
+) -> None:
+    readings, sensors = files(tmp_path, WIDE.replace("-71.5", "-999"))
+    paths: dict[str, Any] = {"readings": readings, "sensors": sensors}
+    if suffix == "npz":
+        network = read_network(**paths, missing=[-999.0])
+        rss_db = np.where(np.isnan(network.rss_db), -999.0, network.rss_db)
+        paths = {"readings": tmp_path / "n.npz"}
+        np.savez(paths["readings"], rss_db=rss_db, sensor_xy=network.sensors)
+    with pytest.raises(ValueError, match="got -999: pass missing=") as error:
+        read_network(**paths)
+    assert str(error.value).startswith(f"{paths['readings']}: ")
+    assert np.isnan(read_network(**paths, missing=[-999.0]).rss_db).sum() == 3
+
+
 def test_masked_readings_are_missing() -> None:
     masked = np.ma.masked_less([[-60.0, -200.0], [-61.0, -70.0]], -100)
     network = Network.fixed(["a", "b"], np.eye(2), masked)

@@ -15,8 +15,8 @@ import numpy as np
 from arrivals.files import file_error, open_input
 from arrivals.measurement_models import LogNormalRSS, db_to_neper
 from arrivals.measurements import real_numbers
-from arrivals.recordings.file_contents import MAX_BYTES, check_size
-from arrivals.recordings.numpy_files import numpy_arrays
+from arrivals.recordings.formats.file_contents import MAX_BYTES, check_size
+from arrivals.recordings.formats.numpy_files import numpy_arrays
 from arrivals.tables import TableRow, named_rows
 from arrivals.typing import Float
 from arrivals.validation import real
@@ -81,9 +81,6 @@ class Network:
         if len(got) != 3 or got[::2] != (len(self), 2):
             raise ValueError(f"truth must have shape ({len(self)}, n_sources, 2); got {got}")
         valid = np.isfinite(self.rss_db)
-        if (np.abs(self.rss_db[valid]) > MAX_LEVEL_DB).any():
-            worst = self.rss_db[valid][np.abs(self.rss_db[valid]).argmax()]
-            raise ValueError(f"rss_db must lie within ±{MAX_LEVEL_DB:g} dB; got {worst:g}")
         if not valid.any():
             raise ValueError("rss_db must have a valid reading; all are missing")
         unplaced = valid & ~np.isfinite(self.sensors).all(axis=-1)
@@ -188,13 +185,24 @@ def read_network(
     ValueError: readings.csv requires a table of sensors, with the columns name, x_m, y_m
     """
     if Path(readings).suffix.lower() == ".npz":
-        return _from_npz(readings).without(missing)
+        network = _from_npz(readings)
+        with _named(readings):
+            return _in_range(network.without(missing))
     if sensors is None:
         raise ValueError(f"{readings} requires a table of sensors, with the columns name, x_m, y_m")
     name, positions = read_sensors(sensors)
     with _named(readings):
         time, rss_db = _levels(_table(readings), name)
-        return Network.fixed(name, positions, rss_db, time).without(missing)
+        return _in_range(Network.fixed(name, positions, rss_db, time).without(missing))
+
+
+def _in_range(network: Network) -> Network:
+    """Return a network whose levels can be those of a receiver."""
+    worst = network.rss_db.flat[np.nanargmax(np.abs(network.rss_db))]
+    if abs(worst) > MAX_LEVEL_DB:
+        cure = f"pass missing=[{worst:g}] (--missing {worst:g}) if it stands for a missing reading"
+        raise ValueError(f"rss_db must lie within ±{MAX_LEVEL_DB:g} dB; got {worst:g}: {cure}")
+    return network
 
 
 def read_sensors(path: str | PathLike[str]) -> tuple[list[str], Float]:

@@ -14,12 +14,17 @@ from numpy.typing import ArrayLike
 from arrivals.files import file_error, open_input
 from arrivals.measurement_models import SensorArray
 from arrivals.measurements import numbers
-from arrivals.recordings.file_contents import MAX_BYTES, FileContents, StoredArray, check_size
-from arrivals.recordings.matlab import matlab_arrays
-from arrivals.recordings.numpy_files import numpy_arrays
+from arrivals.recordings.formats.file_contents import (
+    MAX_BYTES,
+    FileContents,
+    StoredArray,
+    check_size,
+)
+from arrivals.recordings.formats.matlab import matlab_arrays
+from arrivals.recordings.formats.numpy_files import numpy_arrays
+from arrivals.recordings.formats.text_table import read_text
+from arrivals.recordings.formats.wav import read_wav
 from arrivals.recordings.recording import Recording
-from arrivals.recordings.text_table import read_text
-from arrivals.recordings.wav import read_wav
 from arrivals.typing import Float
 from arrivals.validation import positive
 

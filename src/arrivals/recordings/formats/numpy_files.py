@@ -16,7 +16,7 @@ from numpy.lib.format import (
 )
 from numpy.typing import NDArray
 
-from arrivals.recordings.file_contents import StoredArray, damage_refused
+from arrivals.recordings.formats.file_contents import StoredArray, damage_refused
 
 ZIP = b"PK"  # first bytes of a zip file
 KIND = "NumPy file of numbers"

@@ -20,7 +20,7 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from arrivals.recordings.file_contents import StoredArray, damage_refused
+from arrivals.recordings.formats.file_contents import StoredArray, damage_refused
 
 MATRIX, COMPRESSED = 14, 15  # data types of elements
 NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8",

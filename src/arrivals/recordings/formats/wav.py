@@ -9,7 +9,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from arrivals.recordings.file_contents import MAX_BYTES, FileContents, check_size
+from arrivals.recordings.formats.file_contents import MAX_BYTES, FileContents, check_size
 from arrivals.validation import positive
 
 # sizes in the headers of ffmpeg, sox and arecord when they write to a pipe

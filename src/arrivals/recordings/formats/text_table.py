@@ -9,7 +9,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from arrivals.recordings.file_contents import FileContents
+from arrivals.recordings.formats.file_contents import FileContents
 from arrivals.tables import MISSING, TableLine, plain, table_lines
 
 TIME_HEADINGS = ("time", "time_s", "t")  # of a first column with times

@@ -1,0 +1,1 @@
+"""Formats of recording files: WAV, NumPy, MATLAB and text."""
