@@ -185,7 +185,10 @@ class SensorArray(FrozenModel):
         speed: float | None = None,
     ) -> SensorArray:
         """Make a uniform line about the origin; `missing` names sensors, from 0, to leave out."""
-        places = np.arange(count("n_sensors", n_sensors), dtype=np.float64) - (n_sensors - 1) / 2
+        places = (
+            np.arange(count("n_sensors", n_sensors, 1, 100_000), dtype=np.float64)
+            - (n_sensors - 1) / 2
+        )
         return cls(places * positive("spacing", spacing), speed).without(missing)
 
     @classmethod
@@ -198,7 +201,7 @@ class SensorArray(FrozenModel):
         speed: float | None = None,
     ) -> SensorArray:
         """Make a uniform circle about the origin, the first sensor on the x axis, anticlockwise."""
-        angle = 2 * np.pi * np.arange(count("n_sensors", n_sensors, minimum=2)) / n_sensors
+        angle = 2 * np.pi * np.arange(count("n_sensors", n_sensors, 2, 100_000)) / n_sensors
         return cls(positive("radius", radius) * direction(angle, 2), speed).without(missing)
 
     @classmethod

@@ -112,7 +112,7 @@ class PAST(SubspaceTracker[DirectionFinder]):
         n_directions: int = 361,
     ) -> None:
         self.method = one_of("method", method, ("esprit", "root_music", "music"))
-        self.n_directions = count("n_directions", n_directions, minimum=3)
+        self.n_directions = count("n_directions", n_directions, 3, 100_000)
         super().__init__(
             measurement,
             n_sources,
