@@ -14,7 +14,7 @@ from arrivals.measurement_models.arrays.uniform_grid import grid_spacing
 from arrivals.messages import shown
 from arrivals.parameters import FrozenModel
 from arrivals.typing import Complex, Float, Int
-from arrivals.validation import count, items, positive, real
+from arrivals.validation import LARGEST, count, items, positive, real
 
 
 def direction(doa: ArrayLike, dim: int) -> Float:
@@ -118,7 +118,7 @@ class SensorArray(FrozenModel):
                 "positions must have shape (n_sensors, dim), dim 1, 2 or 3; "
                 f"got {np.shape(self.positions)}"
             )
-        if not np.isfinite(positions).all():
+        if not (np.abs(positions) < LARGEST).all():
             bad = int(np.argmin(np.isfinite(positions).all(axis=1)))
             raise ValueError(f"positions must be finite; sensor {bad} is at {positions[bad]}")
         _distinct(positions)
