@@ -95,7 +95,7 @@ class ArraySnapshot(SnapshotGate, SingleSourceSnapshot):
         object.__setattr__(self, "wavelength", frequency_bins(self.wavelength))
         for name in ("noise", "power"):
             positive(name, getattr(self, name))
-        count("n_snapshots", self.n_snapshots)
+        count("n_snapshots", self.n_snapshots, maximum=100_000)
         one_of("angle", self.angle, ("auto", "doa"))
         for name in ("slowness", "elevation"):
             object.__setattr__(self, name, grid_of(name, getattr(self, name)))

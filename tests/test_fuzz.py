@@ -18,10 +18,7 @@ from arrivals.measurement_models import LinearMeasurement
 from arrivals.motion_models import RandomWalk
 from arrivals.trackers import Kalman, available
 
-OPEN = [  # kinds that are worked on
-    "ar_kalman_qrd_rls", "ekf", "imm", "interpolation_ekf", "kalman", "particle", "rss_ml",
-    "rss_vb", "ukf",
-]  # fmt: skip
+OPEN = ["ekf", "imm", "kalman", "particle", "ukf"]  # kinds that are worked on
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 
 

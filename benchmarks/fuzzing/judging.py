@@ -131,7 +131,8 @@ def _of_error(error: Exception, call: Call) -> tuple[str, str] | None:
         return f"multi-line {kind.__name__}: {_short(message)}", place
     if len(message) > LONGEST_MESSAGE:
         return f"long {kind.__name__}: {len(message)} characters, {_short(message)}", place
-    if call.deliberate and not line.startswith("raise"):
+    of_signature = "() missing" in message or "() got" in message  # names the arguments
+    if call.deliberate and not of_signature and not line.startswith("raise"):
         return f"foreign {kind.__name__}: {_short(message)}", place
     return None
 

@@ -119,7 +119,7 @@ def _fitting(model: MeasurementModel) -> Any:
 def _is_modest(value: Any) -> bool:
     """Return whether a result of the value has to be finite."""
     parts = value if isinstance(value, list | tuple) else (value,)
-    if any(np.ma.isMaskedArray(part) for part in parts):
+    if any(np.ma.isMaskedArray(part) or hasattr(part, "to_numpy") for part in parts):
         return False
     try:
         with np.errstate(all="ignore"):

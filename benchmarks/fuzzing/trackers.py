@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from arrivals.trackers import StateEstimate, Tracker
+from arrivals.trackers import PositionEstimate, StateEstimate, Tracker
 from fuzzing.judging import Call
 from fuzzing.tracker_cases import CASES, is_symmetric_and_positive
 from fuzzing.values import malformed, same, scalar, value_of, whatever
@@ -240,7 +240,8 @@ def _construct(tracker: Tracker, z: Any, _: list[Any], rng: np.random.Generator)
 
 def _assign(tracker: Any, z: Any, _: list[Any], rng: np.random.Generator) -> Call:
     """Return an assignment; a wrong `x` or `P` may also be refused by the next step."""
-    known = [name for name in ASSIGNED if hasattr(tracker, name)]
+    has_belief = isinstance(tracker.estimate, StateEstimate | PositionEstimate)
+    known = [name for name in ASSIGNED if has_belief and hasattr(tracker, name)] or ["estimate"]
     name = str(rng.choice(known if rng.random() < 0.9 else ["nothing"]))
     old = getattr(tracker, name, None)
     text = malformed(rng, old)

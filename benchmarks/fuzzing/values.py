@@ -23,13 +23,13 @@ def _words(text: str) -> list[str]:
 
 SCALARS = _words("""
 None nan inf -inf 0 -1 1 2 7 0.5 -0.5 1e-9 1e6 1e139 1e141 1e200 1e308 -1e308 -0.0 5e-324 1e-200
-1e-320 True np.True_ 2**31 2**63 2**64 -2**70 10**30 10**400 -10**5000 1j complex(1,nan)
-complex(inf,0) Decimal('0.5') Decimal('NaN') Decimal('sNaN') Decimal('1e999') Fraction(1,3)
-Fraction(10**400,3) np.float64(1.5) np.float32(nan) np.float16(6e4) np.longdouble('1e4000')
-np.int8(-128) np.uint64(2**64-1) np.complex64(1j) np.datetime64('2020-01-01')
-np.timedelta64(1,'s') np.datetime64('NaT') datetime.date(2020,1,1) np.str_('a') np.void(b'ab')
-np.ma.masked np.array(1.0) np.array(nan) np.array(1.5,dtype='>f8') np.array(None) np.array('a')
-np.array(1j)
+1e-320 True np.True_ 10**9 3*10**7 2**31 2**63 2**64 -2**70 10**30 10**400 -10**5000 1j
+complex(1,nan) complex(inf,0) Decimal('0.5') Decimal('NaN') Decimal('sNaN') Decimal('1e999')
+Fraction(1,3) Fraction(10**400,3) np.float64(1.5) np.float32(nan) np.float16(6e4)
+np.longdouble('1e4000') np.int8(-128) np.uint64(2**64-1) np.complex64(1j)
+np.datetime64('2020-01-01') np.timedelta64(1,'s') np.datetime64('NaT') datetime.date(2020,1,1)
+np.str_('a') np.void(b'ab') np.ma.masked np.array(1.0) np.array(nan) np.array(1.5,dtype='>f8')
+np.array(None) np.array('a') np.array(1j)
 """)
 
 THINGS = _words("""

@@ -14,7 +14,7 @@ from arrivals.measurement_models.arrays.uniform_grid import grid_spacing
 from arrivals.messages import shown
 from arrivals.parameters import FrozenModel
 from arrivals.typing import Complex, Float, Int
-from arrivals.validation import count, items, positive, real
+from arrivals.validation import LARGEST, count, items, positive, real
 
 
 def direction(doa: ArrayLike, dim: int) -> Float:
@@ -118,7 +118,7 @@ class SensorArray(FrozenModel):
                 "positions must have shape (n_sensors, dim), dim 1, 2 or 3; "
                 f"got {np.shape(self.positions)}"
             )
-        if not np.isfinite(positions).all():
+        if not (np.abs(positions) < LARGEST).all():
             bad = int(np.argmin(np.isfinite(positions).all(axis=1)))
             raise ValueError(f"positions must be finite; sensor {bad} is at {positions[bad]}")
         _distinct(positions)
@@ -185,7 +185,10 @@ class SensorArray(FrozenModel):
         speed: float | None = None,
     ) -> SensorArray:
         """Make a uniform line about the origin; `missing` names sensors, from 0, to leave out."""
-        places = np.arange(count("n_sensors", n_sensors), dtype=np.float64) - (n_sensors - 1) / 2
+        places = (
+            np.arange(count("n_sensors", n_sensors, 1, 100_000), dtype=np.float64)
+            - (n_sensors - 1) / 2
+        )
         return cls(places * positive("spacing", spacing), speed).without(missing)
 
     @classmethod
@@ -198,7 +201,7 @@ class SensorArray(FrozenModel):
         speed: float | None = None,
     ) -> SensorArray:
         """Make a uniform circle about the origin, the first sensor on the x axis, anticlockwise."""
-        angle = 2 * np.pi * np.arange(count("n_sensors", n_sensors, minimum=2)) / n_sensors
+        angle = 2 * np.pi * np.arange(count("n_sensors", n_sensors, 2, 100_000)) / n_sensors
         return cls(positive("radius", radius) * direction(angle, 2), speed).without(missing)
 
     @classmethod

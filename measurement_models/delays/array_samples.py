@@ -15,7 +15,7 @@ from arrivals.measurement_models.delays.source_correlation import SourceCorrelat
 from arrivals.measurements import real_numbers
 from arrivals.parameters import FrozenModel
 from arrivals.typing import Float, Int
-from arrivals.validation import instance, number, positive
+from arrivals.validation import instance, items, number, positive
 
 MARGIN = 1.1  # of the edges of a filter, so that it does not change the spectrum in the band
 
@@ -202,7 +202,10 @@ def checked_band(band: Sequence[float], rate: float) -> tuple[float, float]:
     Traceback (most recent call last):
     ValueError: band must lie between 0 and half the rate, 4000 Hz; got 500 and 300
     """
-    low, high = (number("band", edge) for edge in band)
+    edges = items("band", band)
+    if len(edges) != 2:
+        raise ValueError(f"band must be two frequencies, Hz; got {len(edges)}")
+    low, high = (number("band", edge) for edge in edges)
     if not 0 <= low < high <= rate / 2:
         raise ValueError(
             f"band must lie between 0 and half the rate, {rate / 2:g} Hz; got {low:g} and {high:g}"

@@ -143,7 +143,7 @@ class DelayLine(SourceAtCentre):
     process_noise: float | None = None
 
     def __post_init__(self) -> None:
-        count("n_sensors", self.n_sensors, minimum=2)
+        count("n_sensors", self.n_sensors, minimum=2, maximum=10_000)
         positive("noise_ratio", self.noise_ratio)
         instance("correlation", self.correlation, SourceCorrelation)  # type: ignore[type-abstract]  # any
         positive("kappa", self.kappa)
@@ -247,7 +247,7 @@ class Phasor(SourceAtCentre):
     process_noise: float = 1e-2
 
     def __post_init__(self) -> None:
-        count("n_sensors", self.n_sensors, minimum=2)
+        count("n_sensors", self.n_sensors, minimum=2, maximum=10_000)
         positive("noise_ratio", self.noise_ratio)
         positive("process_noise", self.process_noise)
         if not 0 < number("frequency", self.frequency) < 0.5:

@@ -17,6 +17,7 @@ from arrivals.measurement_models.manifolds.manifold import (
 )
 from arrivals.typing import Complex, Float, Int
 
+MOST_POINTS = 1 << 20
 NEGLIGIBLE = 1e-9  # of the largest harmonic
 
 
@@ -42,6 +43,9 @@ def fourier_series(function: Callable[[Float], Complex], n_points: int) -> Compl
     >>> fourier_series(lambda theta: 2 + np.exp(-1j * theta), 16).round(6) + 0
     array([1.+0.j, 2.+0.j, 0.+0.j])
     """
+    if n_points > MOST_POINTS:
+        wanted = f"at most {MOST_POINTS // 8} wavelengths apart"
+        raise ValueError(f"positions must be {wanted}; got a response of {n_points} points")
     theta = 2 * np.pi * np.arange(n_points) / n_points
     series = np.fft.fftshift(np.fft.fft(function(theta), axis=-1), axes=-1) / n_points
     size = np.abs(series).reshape(-1, n_points).max(axis=0)

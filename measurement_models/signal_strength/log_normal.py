@@ -135,7 +135,7 @@ class LogNormalRSS(MeasurementModel):
             "gains": gains,
             "r_min": positive("r_min", r_min),
             "log_amplitude": number("log_amplitude", log_amplitude),
-            "n_sources": count("n_sources", n_sources),
+            "n_sources": count("n_sources", n_sources, maximum=1000),
         }
         if not abs(own["log_amplitude"]) < LARGEST:
             raise ValueError(f"log_amplitude must be finite; got {log_amplitude}")

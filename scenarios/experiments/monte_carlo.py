@@ -122,7 +122,7 @@ def compute_study(
     config = {
         "version": arrivals.__version__,
         "code": code_mark({one.__module__ for one in [*cases.values(), *measures.values()]}),
-        "seed": count("seed", seed, minimum=0),
+        "seed": count("seed", seed, minimum=0, maximum=2**128),
         "scenarios": {name: to_plain(one) for name, one in cases.items()},
         "methods": [method.to_dict() for method in compared],
         "metrics": {name: f"{f.__module__}.{f.__qualname__}" for name, f in measures.items()},

@@ -172,7 +172,7 @@ def reproduce(
         count("jobs", jobs)
     if runs is not None:
         count("runs", runs, minimum=min(2, _runs(name, quick=True)))
-    count("seed", seed, minimum=0)
+    count("seed", seed, minimum=0, maximum=2**128)
     if page is not None:  # checked before hours of computation
         if not Path(page).parent.is_dir():
             raise FileNotFoundError(2, "the folder does not exist", str(Path(page).parent))

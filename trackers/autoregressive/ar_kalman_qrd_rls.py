@@ -135,7 +135,7 @@ class ARKalmanQRDRLS(BlockProcessor):
     ) -> None:
         self.measurement = instance("measurement", measurement, ArraySnapshot)
         self.motion = instance("motion", motion, AutoregressiveSources)
-        self.doa, self.interval = doa, count("interval", interval)
+        self.doa, self.interval = doa, count("interval", interval, 1, 100_000)
         self.inner, self.gate = count("inner", inner), not_negative("gate", gate)
         self.memory = positive("memory", memory)
         self.regression = instance("regression", regression, RegressionSettings)
@@ -162,7 +162,7 @@ class ARKalmanQRDRLS(BlockProcessor):
         """
         if u is not None:
             no_control(u)
-        if dt != 1.0:
+        if type(dt) is not float or dt != 1.0:
             time_step(dt)
         self.process_if_full()
 

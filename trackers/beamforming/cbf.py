@@ -69,11 +69,11 @@ class CBF(DirectionTracker):
         max_sources: int | None = None,
     ) -> None:
         self.measurement = instance("measurement", measurement, ArraySnapshot)
-        self.n_directions = count("n_directions", n_directions, minimum=3)
+        self.n_directions = count("n_directions", n_directions, 3, 100_000)
         self.threshold_db = positive("threshold_db", threshold_db)
         self.max_sources = max_sources
         if max_sources is not None:
-            count("max_sources", max_sources)
+            count("max_sources", max_sources, maximum=1000)
         warn_of_ambiguity(measurement)
         self.reset()
 

@@ -149,7 +149,7 @@ class Particle(DeclaredAttributes, Tracker):
         instance("measurement", measurement, MeasurementModel)  # type: ignore[type-abstract]  # any
         self.measurement = measurement.for_likelihood(motion.state_names)
         self.x, self.P = self._check_belief(x, P)
-        self.n_particles = count("n_particles", n_particles)
+        self.n_particles = count("n_particles", n_particles, maximum=10**7)
         self.resample_below = probability("resample_below", resample_below)
         self.rng = rng
         self.particles = np.tile(self.x, (n_particles, 1))

@@ -77,7 +77,7 @@ class SampleBuffer:
         """
         square, energy = frame * frame, self.energy
         if gate is not None:
-            factor = (2 * gate) ** 2
+            factor = min(2 * gate, 1e30) ** 2
             if power is None:
                 mean = energy / np.maximum(self.n_samples, 1)
                 suspect = square > (factor * mean)[..., None]

@@ -25,7 +25,7 @@ from arrivals.parameters import FrozenModel
 from arrivals.trackers.interpolation.assembly import MAX_INITIAL_STD, FilterAssembly
 from arrivals.trackers.interpolation.channel_filters import settling_steps
 from arrivals.trackers.interpolation.updates import JointUpdate, PairwiseUpdate
-from arrivals.validation import not_negative, one_of, positive
+from arrivals.validation import count, items, not_negative, one_of, positive
 
 VariantName: TypeAlias = Literal["B", "Bw", "C", "D", "E", "E2", "phasor"]
 
@@ -92,8 +92,10 @@ class Variant(FrozenModel):
 
     def __post_init__(self) -> None:
         if self.offsets is not None:
-            object.__setattr__(self, "offsets", tuple(self.offsets))
-        object.__setattr__(self, "baselines", tuple(self.baselines))
+            offsets = (count("offsets", o, -10_000) for o in items("offsets", self.offsets))
+            object.__setattr__(self, "offsets", tuple(offsets))
+        baselines = tuple(count("baselines", m) for m in items("baselines", self.baselines))
+        object.__setattr__(self, "baselines", baselines)
         if self.loading is not None:
             not_negative("loading", self.loading)
         if self.joint is not None:
@@ -209,6 +211,9 @@ def _baseline_models(measurement: ArraySamples, variant: Variant) -> tuple[Inter
             InterpolationDelay(taps, measurement.n_grid_points, ratio, direction * m, inflation)
             for direction in ((1, -1) if variant.bidirectional else (1,))
         ]
+    if not models:
+        wanted = f"below the number of grid points, {measurement.n_grid_points}"
+        raise ValueError(f"baselines must be {wanted}; got {variant.baselines}")
     return tuple(models)
 
 

@@ -107,7 +107,7 @@ class PeaksGNN(DirectionTracker):
         self.patience = count("patience", patience, 0)
         self.max_sources = max_sources
         if max_sources is not None:
-            count("max_sources", max_sources)
+            count("max_sources", max_sources, maximum=1000)
         warn_of_ambiguity(measurement)
         self.reset()
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from arrivals.messages import shown
 from arrivals.trackers.rss.belief import Entries, SourceBeliefs
 from arrivals.trackers.rss.settings import AmplitudePrior, BirthDeath
 from arrivals.typing import Float
@@ -25,7 +26,7 @@ def birth_death(births: Any) -> BirthDeath | None:
     if isinstance(births, bool | None):
         return BirthDeath() if births else None
     if not isinstance(births, BirthDeath):
-        raise TypeError(f"births must be a BirthDeath, True, False or None; got {births!r}")
+        raise TypeError(f"births must be a BirthDeath, True, False or None; got {shown(births)}")
     return births
 
 

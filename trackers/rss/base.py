@@ -78,7 +78,7 @@ class RSSTracker(Tracker):
                 f"{motion.dim_x}; got {self.position}"
             )
         self.x0, self.P0 = x0, P0
-        self.n_sources = None if n_sources is None else count("n_sources", n_sources)
+        self.n_sources = None if n_sources is None else count("n_sources", n_sources, maximum=1000)
         self.amplitude = instance("amplitude", amplitude, AmplitudePrior)
         self.births = birth_death(births)
         self.search = instance("search", search, GridSearch)

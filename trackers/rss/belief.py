@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from arrivals.messages import shown
 from arrivals.motion_models.base import MotionModel
 from arrivals.trackers.gaussian.arguments import overrides
 from arrivals.trackers.gaussian.circular import wrapped
@@ -15,6 +16,7 @@ from arrivals.trackers.gaussian.linearization import at_each
 from arrivals.trackers.rss.inference.joint_posterior import Prior
 from arrivals.trackers.rss.inference.solution import Marginals
 from arrivals.typing import Float
+from arrivals.validation import LARGEST
 
 Entries = tuple[int, int]
 
@@ -53,6 +55,11 @@ class SourceBeliefs(NamedTuple):
         >>> x, SourceBeliefs.from_state(x, P, 2).u
         (array([ 1.,  1.,  1., nan, nan, nan]), array([1.]))
         """
+        if x.size % (n + 1) or P.size != x.size**2:
+            shapes = f"{x.shape} and {P.shape}"
+            raise ValueError(f"x and P must have {n + 1} entries a source; got shapes {shapes}")
+        if (np.abs(x) >= LARGEST).any():
+            raise ValueError(f"x must be finite, or NaN in unused slots; got {shown(x)}")
         x = x.reshape(-1, n + 1)
         each = np.flatnonzero(np.isfinite(x).all(axis=1))
         blocks = P.reshape(len(x), n + 1, len(x), n + 1)[each, :, each]

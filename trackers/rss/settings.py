@@ -112,7 +112,7 @@ class GridSearch(FrozenModel):
     grid_step: float | None = None
 
     def __post_init__(self) -> None:
-        count("max_sources", self.max_sources)
+        count("max_sources", self.max_sources, maximum=1000)
         for name in ("area_std", "grid_step"):
             if getattr(self, name) is not None:
                 positive(name, getattr(self, name))

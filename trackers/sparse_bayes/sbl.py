@@ -106,13 +106,13 @@ class SBL(BatchDirectionTracker):
     ) -> None:
         self.measurement = instance("measurement", measurement, ArraySnapshot)
         measurement.plain_wavelength("sbl")
-        self.n_directions = count("n_directions", n_directions, minimum=3)
+        self.n_directions = count("n_directions", n_directions, 3, 100_000)
         self.threshold = probability("threshold", threshold)
         self.initial_power = positive("initial_power", initial_power)
         self.initial_noise = positive("initial_noise", initial_noise)
         self.max_sources = max_sources
         if max_sources is not None:
-            count("max_sources", max_sources)
+            count("max_sources", max_sources, maximum=1000)
         self.solver = instance("solver", solver, FixedPointSolver)
         warn_of_ambiguity(measurement)
         self.reset()

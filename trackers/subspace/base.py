@@ -139,11 +139,11 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
         self.forgetting = probability("forgetting", forgetting)
         self.interval = count("interval", interval)
         if max_sources is not None:
-            count("max_sources", max_sources)
+            count("max_sources", max_sources, maximum=1000)
         if isinstance(n_sources, str):
             one_of("n_sources", n_sources, ("aic", "mdl"))
         elif n_sources is not None:
-            self.n_sources = count("n_sources", n_sources)
+            self.n_sources = count("n_sources", n_sources, maximum=1000)
         self._check_number_of_sources()
         warn_of_ambiguity(measurement)
         self.reset()

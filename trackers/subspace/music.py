@@ -183,7 +183,7 @@ class MUSIC(CovarianceSubspace[SpectrumSearch]):
         interval: int = 1,
         n_directions: int = 361,
     ) -> None:
-        self.n_directions = count("n_directions", n_directions, minimum=3)
+        self.n_directions = count("n_directions", n_directions, 3, 100_000)
         super().__init__(
             measurement,
             n_sources,

@@ -27,7 +27,7 @@ from arrivals.trackers.subspace.past_steps import (
 )
 from arrivals.trackers.subspace.root_music import PolynomialRooting
 from arrivals.typing import Bool, Complex, Float
-from arrivals.validation import count, one_of
+from arrivals.validation import SMALLEST, count, one_of
 
 MIN_FORGETTING = 1e-6  # bounds P after a long gap: the weight of older data is at least this
 MAX_RELATIVE_TRACE = 1e12  # of P relative to the power: bounds wind-up along unexcited directions
@@ -112,7 +112,7 @@ class PAST(SubspaceTracker[DirectionFinder]):
         n_directions: int = 361,
     ) -> None:
         self.method = one_of("method", method, ("esprit", "root_music", "music"))
-        self.n_directions = count("n_directions", n_directions, minimum=3)
+        self.n_directions = count("n_directions", n_directions, 3, 100_000)
         super().__init__(
             measurement,
             n_sources,
@@ -178,7 +178,7 @@ class PAST(SubspaceTracker[DirectionFinder]):
             power += len(expected) * noise / self.total_weight
         self.energy, self.age = beta * self.energy + power, 0.0
         self.prior = beta * self.prior
-        P = limited_trace(P, MAX_RELATIVE_TRACE / self.energy)
+        P = limited_trace(P, MAX_RELATIVE_TRACE / max(self.energy, SMALLEST))
         if self.n_slots > L:  # some sensors have had no data
             rest = self.n_slots - L
             W, P = np.pad(W, ((0, 0), (0, rest))), np.pad(P, (0, rest))

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from arrivals.measurement_models.direction_measurement import DirectionMeasurement
 from arrivals.measurement_models.manifolds.manifold import Manifold, Reference
 from arrivals.measurement_models.observed import ObservedSnapshots, merge_noise
+from arrivals.messages import shown
 from arrivals.trackers.direction_tracker import BatchDirectionTracker, warn_of_ambiguity
 from arrivals.trackers.registry import register
 from arrivals.trackers.svalse.components import (
@@ -221,7 +222,7 @@ def selected_solver(
         return solver
     if not isinstance(solver, CoordinateSolver):
         raise ValueError(
-            f"posterior must be None without coordinate ascent; got {posterior!r}: "
+            f"posterior must be None without coordinate ascent; got {shown(posterior)}: "
             'pass engine="coordinate"'
         )
     return solver.replace(posterior=posterior)

@@ -19,6 +19,7 @@ from arrivals.trackers.svalse.newton.elbo import Components, evaluate
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
 from arrivals.trackers.svalse.newton.state import SolverState, log_odds
 from arrivals.typing import Bool, Float, Int
+from arrivals.validation import count, not_negative
 
 MARGIN = 1e-3  # nats by which an addition must exceed the record
 
@@ -47,6 +48,12 @@ class IterationLimits(FrozenModel):
     inner_tolerance: float = 1e-2
     large_gain: float = 10.0
     max_changes: int = 60
+
+    def __post_init__(self) -> None:
+        for name in ("inner", "removal", "fill", "final", "max_changes"):
+            object.__setattr__(self, name, count(name, getattr(self, name), minimum=0))
+        not_negative("inner_tolerance", self.inner_tolerance)
+        not_negative("large_gain", self.large_gain)
 
 
 DEFAULT_LIMITS = IterationLimits()
