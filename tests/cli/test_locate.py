@@ -180,6 +180,7 @@ def test_locate_finds_a_source_in_single_readings(
     assert np.linalg.norm(last - [60.0, 90.0]) < 10
 
 
+@pytest.mark.filterwarnings("always")
 def test_locate_missing_names_a_fill_value(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -202,6 +203,7 @@ def test_locate_refuses_more_sources_than_sensors_with_readings(
     assert "n_sources must be at most 25, the number of sensors" in capsys.readouterr().err
 
 
+@pytest.mark.filterwarnings("always")
 def test_locate_warns_if_no_source_was_found(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,7 +11,8 @@ from arrivals.typing import Float
 MAX_RELATIVE_WIDTH = 1e-2  # of a line of sensors, of its length
 
 
-class Line(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Line:
     """Line through sensors.
 
     Parameters

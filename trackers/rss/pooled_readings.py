@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,7 +15,8 @@ MAX_SQUARED_CHANGE = (
 )
 
 
-class PooledReadings(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class PooledReadings:
     """Weighted mean of the latest readings of each sensor; most arrays (n_sensors,).
 
     Parameters
@@ -50,7 +51,7 @@ class PooledReadings(NamedTuple):
 
     def later(self, dt: float) -> PooledReadings:
         """Return the readings after a time step."""
-        return self._replace(age=self.age + dt)
+        return replace(self, age=self.age + dt)
 
     def aged(self, spread: Float) -> Float:
         """Return the weights, given the variances, Np², of the levels' changes since; inf: 0."""

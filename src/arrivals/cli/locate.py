@@ -14,8 +14,8 @@ import numpy as np
 from arrivals.cli.outputs import check_different
 from arrivals.files import check_output
 from arrivals.measurement_models import LogNormalRSS, db_to_neper
+from arrivals.measurement_models.signal_strength.fill_values import warn_fill_values
 from arrivals.motion_models import ConstantVelocity
-from arrivals.recordings.fill_values import warn_fill_values
 from arrivals.recordings.networks import Network, read_network
 from arrivals.trackers import RSSML, RSSVB, AmplitudePrior, PositionEstimate, find
 from arrivals.trackers.run import Run, RunRecorder, header, text

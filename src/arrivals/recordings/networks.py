@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -14,12 +14,12 @@ import numpy as np
 
 from arrivals.files import file_error, open_input
 from arrivals.measurement_models import LogNormalRSS, db_to_neper
+from arrivals.measurement_models.signal_strength.fill_values import without
 from arrivals.measurements import real_numbers
 from arrivals.recordings.formats.file_contents import MAX_BYTES, check_size
 from arrivals.recordings.formats.numpy_files import numpy_arrays
 from arrivals.tables import TableRow, named_rows
 from arrivals.typing import Float
-from arrivals.validation import real
 
 TIMES = ("time_s", "time", "t")
 ARRAYS = ("rss_db", "sensor_xy", "sensor_name", "time", "tx_xy")  # of an npz file
@@ -118,12 +118,6 @@ class Network:
     def __len__(self) -> int:
         return len(self.time)
 
-    def without(self, missing: Sequence[float]) -> Network:
-        """Return the network without the readings that equal a value of `missing`, dB."""
-        values = np.atleast_1d(real("missing", missing))
-        rss_db = np.where(np.isin(self.rss_db, values), np.nan, self.rss_db)
-        return replace(self, rss_db=rss_db)
-
     def select(self, steps: Any) -> Network:
         """Return the network at some of the steps."""
         truth = None if self.truth is None else self.truth[steps]
@@ -185,15 +179,15 @@ def read_network(
     ValueError: readings.csv requires a table of sensors, with the columns name, x_m, y_m
     """
     if Path(readings).suffix.lower() == ".npz":
-        network = _from_npz(readings)
+        network = _from_npz(readings, missing)
         with _named(readings):
-            return _in_range(network.without(missing))
+            return _in_range(network)
     if sensors is None:
         raise ValueError(f"{readings} requires a table of sensors, with the columns name, x_m, y_m")
     name, positions = read_sensors(sensors)
     with _named(readings):
         time, rss_db = _levels(_table(readings), name)
-        return _in_range(Network.fixed(name, positions, rss_db, time).without(missing))
+        return _in_range(Network.fixed(name, positions, without(rss_db, missing), time))
 
 
 def _in_range(network: Network) -> Network:
@@ -223,7 +217,7 @@ def read_sensors(path: str | PathLike[str]) -> tuple[list[str], Float]:
         return name, positions
 
 
-def _from_npz(path: str | PathLike[str]) -> Network:
+def _from_npz(path: str | PathLike[str], missing: Sequence[float]) -> Network:
     with open_input(path) as file, _named(path):
         stored = numpy_arrays(file)
         for key in ("rss_db", "sensor_xy"):
@@ -241,6 +235,7 @@ def _from_npz(path: str | PathLike[str]) -> Network:
         sensors = np.broadcast_to(sensors, (*rss_db.shape, 2))
         name = held.get("sensor_name", np.arange(rss_db.shape[1])).astype(str).ravel().tolist()
         time = held.get("time", np.arange(float(len(rss_db))))
+        rss_db = without(rss_db, missing)
         return Network(tuple(name), time, rss_db, sensors, held.get("tx_xy"))
 
 

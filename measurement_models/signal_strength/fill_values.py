@@ -5,8 +5,10 @@ from __future__ import annotations
 import warnings
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from arrivals.typing import Float
+from arrivals.typing import Bool, Float
+from arrivals.validation import real
 
 MIN_GAP_DB = 20.0  # from a constant to all other readings
 MIN_GAP_OF_MANY_DB = 10.0  # the same if it occurs often and at several sensors
@@ -52,7 +54,19 @@ def fill_values(rss_db: Float) -> list[float]:
     return found
 
 
-def min_gap(is_constant: np.typing.NDArray[np.bool_]) -> float:
+def without(rss_db: ArrayLike, missing: ArrayLike) -> Float:
+    """Return levels, dB, NaN where they equal a value of `missing`.
+
+    Examples
+    --------
+    >>> without([[-60.0, 100.0]], [100.0, -200.0])
+    array([[-60.,  nan]])
+    """
+    levels = real("rss_db", rss_db)
+    return np.where(np.isin(levels, real("missing", missing)), np.nan, levels)
+
+
+def min_gap(is_constant: Bool) -> float:
     """Return the gap, dB, at which a constant counts as a fill value."""
     many = is_constant.sum() >= MANY and is_constant.any(axis=0).sum() > 1
     return MIN_GAP_OF_MANY_DB if many else MIN_GAP_DB
