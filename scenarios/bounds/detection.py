@@ -131,8 +131,8 @@ def network_detection(false_alarm: ArrayLike, weights: ArrayLike, snr: ArrayLike
 
     weights, snr = np.atleast_1d(real("weights", weights)), real("snr", snr)
     _, weights, snr = _arguments(0.5, weights, snr, "weights", 0.0)
-    false_alarm, _, _ = _arguments(false_alarm, 1.0, 0.0)
     delta = np.sqrt((weights * (0.5 * np.log1p(snr)) ** 2).sum(axis=-1))
+    false_alarm, _, _ = _arguments(false_alarm, 1.0, delta)
     return np.asarray(ndtr(delta + ndtri(false_alarm)))
 
 

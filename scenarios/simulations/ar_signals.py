@@ -58,7 +58,7 @@ def ar_signals(
     """
     orders = [np.atleast_1d(real("coefficients", a)) for a in items("coefficients", coefficients)]
     variances = real("noise", noise)
-    count("n", n)
+    count("n", n, maximum=10**7)
     if variances.shape != (len(orders),) or not ((variances >= 0) & (variances < LARGEST)).all():
         raise ValueError(
             f"noise must have one variance, not negative, for each of {len(orders)} sources; "

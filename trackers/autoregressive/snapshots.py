@@ -63,7 +63,7 @@ def without_clicks(y: Float, n_parts: int, power: Float) -> Float:
     array([ 1., nan,  2.])
     """
     level = np.fmax.reduce(y * y, axis=-1)  # of the loudest sensor
-    if not (np.fmax.reduce(level, axis=-1) > LOUDEST * power).any():
+    if not (np.fmax.reduce(level, axis=-1, initial=0.0) > LOUDEST * power).any():
         return y  # the usual case
     level = level.reshape(*level.shape[:-1], -1, n_parts)
     level = np.nan_to_num(level.max(axis=-1))
