@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from arrivals.measurement_models.signal_strength.envelope import AveragedEnvelope
 from arrivals.messages import shown
 from arrivals.typing import Float
-from arrivals.validation import count, items, number, real
+from arrivals.validation import SMALLEST, count, items, number, real
 
 MOST_NEPER = 300.0  # its exponential, squared, is finite
 
@@ -68,7 +68,7 @@ def reading_error(
         checked: float | Float | AveragedEnvelope = sigma
     else:
         checked = per_sensor("sigma", sigma, n)
-        if not np.all(np.asarray(checked) > 0):
+        if not np.all(np.asarray(checked) > SMALLEST):
             raise ValueError(f"sigma must be positive; got {shown(sigma)}")
         variance[:] = np.square(checked)
     variance.setflags(write=False)

@@ -58,8 +58,11 @@ class SourceBeliefs(NamedTuple):
         if x.size % (n + 1) or P.size != x.size**2:
             shapes = f"{x.shape} and {P.shape}"
             raise ValueError(f"x and P must have {n + 1} entries a source; got shapes {shapes}")
-        if (np.abs(x) >= LARGEST).any():
-            raise ValueError(f"x must be finite, or NaN in unused slots; got {shown(x)}")
+        for name, value in (("x", x), ("P", P)):
+            if (np.abs(value) >= LARGEST).any():
+                raise ValueError(
+                    f"{name} must be finite, x NaN in unused slots; got {shown(value)}"
+                )
         x = x.reshape(-1, n + 1)
         each = np.flatnonzero(np.isfinite(x).all(axis=1))
         blocks = P.reshape(len(x), n + 1, len(x), n + 1)[each, :, each]
@@ -151,6 +154,7 @@ class SourceBeliefs(NamedTuple):
         x, P = smooth_gaussian(
             self.x, self.P, G, theta - self.x[..., position], moments.Sigma - P_theta_theta
         )
+        P[(..., *np.ix_(position, position))] = moments.Sigma  # where P_θθ is 1e15 times as large
         if overrides(type(motion), MotionModel, "angles"):
             x = wrapped(x, motion.angles)
         return SourceBeliefs(x, P, u, moments.v)
