@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from arrivals.measurement_models.base import MeasurementModel, paired
 from arrivals.measurements import numbers, real_numbers
 from arrivals.typing import Float
-from arrivals.validation import instance, shaped, state
+from arrivals.validation import instance, real, shaped, state
 
 
 @dataclass(frozen=True, init=False)
@@ -132,7 +132,8 @@ class CombinedMeasurement(MeasurementModel):
         The sum over the parts that are not missing: by the part's own `log_likelihood` where it
         has one, else that of Gaussian noise.
         """
-        z, total = shaped("z", real_numbers("z", z), self.dim_z), np.zeros(())
+        z, x = shaped("z", real_numbers("z", z), self.dim_z), real("x", x)
+        total = np.zeros(())
         for part, own in zip((self.first, self.second), self._split(z), strict=True):
             if not np.isnan(own).all():
                 exact = getattr(part, "log_likelihood", None)

@@ -82,7 +82,7 @@ class ShiftInvariance:
     @property
     def shift(self) -> int:
         """Shift between the subarrays, in grid points."""
-        half_wave = int(np.pi / self.line.step * (1 + 1e-9))
+        half_wave = int(min(np.pi / self.line.step * (1 + 1e-9), 1e9))
         widest = min(half_wave, int(np.ptp(self.line.grid_index)))
         pairs = [len(shifted_pairs(self.line.grid_index, s)[0]) for s in range(1, widest + 1)]
         return max(range(1, widest + 1), key=lambda s: (pairs[s - 1], s))

@@ -11,7 +11,7 @@ import numpy as np
 from arrivals.measurement_models.manifolds.manifold import Manifold
 from arrivals.parameters import FrozenModel
 from arrivals.typing import Bool, Complex, Float, Int
-from arrivals.validation import count, not_negative, positive
+from arrivals.validation import count, not_negative, number, positive
 
 Settings = TypeVar("Settings", bound="SolverSettings")
 MERGE_DISTANCE = float(np.deg2rad(1.5))  # rad of direction, of tracked components
@@ -149,7 +149,7 @@ class SolverSettings(FrozenModel):
         self._set("tempering", positive)
         self._set("power_floor", not_negative)
         self._set("max_snr_db", positive)
-        if self.tempering < 1:
+        if not number("tempering", self.tempering) >= 1:
             raise ValueError(f"tempering must be at least 1; got {self.tempering:g}")
 
     def _set(self, name: str, checked: Callable[[str, Any], Any]) -> None:
