@@ -154,7 +154,8 @@ class SourceBeliefs(NamedTuple):
         x, P = smooth_gaussian(
             self.x, self.P, G, theta - self.x[..., position], moments.Sigma - P_theta_theta
         )
-        P[(..., *np.ix_(position, position))] = moments.Sigma  # where P_θθ is 1e15 times as large
+        entries = np.array(position)
+        P[..., entries[:, None], entries] = moments.Sigma  # exact, however wide P_θθ was
         if overrides(type(motion), MotionModel, "angles"):
             x = wrapped(x, motion.angles)
         return SourceBeliefs(x, P, u, moments.v)
