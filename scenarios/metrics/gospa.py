@@ -263,7 +263,9 @@ def _steps(
     truth, estimate = items("truth", truth), items("estimate", estimate)
     if len(truth) != len(estimate) or len(truth) == 0:
         got = f"{len(truth)} and {len(estimate)}"
-        raise ValueError(f"truth and estimate must have the same number of steps; got {got}")
+        raise ValueError(
+            f"truth and estimate must have the same number of steps, at least one; got {got}"
+        )
     return list(zip(truth, estimate, strict=True))
 
 

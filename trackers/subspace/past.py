@@ -27,8 +27,9 @@ from arrivals.trackers.subspace.past_steps import (
 )
 from arrivals.trackers.subspace.root_music import PolynomialRooting
 from arrivals.typing import Bool, Complex, Float
-from arrivals.validation import SMALLEST, count, one_of
+from arrivals.validation import count, one_of
 
+TINY = 1e-290  # an energy above zero
 MIN_FORGETTING = 1e-6  # bounds P after a long gap: the weight of older data is at least this
 MAX_RELATIVE_TRACE = 1e12  # of P relative to the power: bounds wind-up along unexcited directions
 
@@ -178,7 +179,7 @@ class PAST(SubspaceTracker[DirectionFinder]):
             power += len(expected) * noise / self.total_weight
         self.energy, self.age = beta * self.energy + power, 0.0
         self.prior = beta * self.prior
-        P = limited_trace(P, MAX_RELATIVE_TRACE / max(self.energy, SMALLEST))
+        P = limited_trace(P, MAX_RELATIVE_TRACE / max(self.energy, TINY))
         if self.n_slots > L:  # some sensors have had no data
             rest = self.n_slots - L
             W, P = np.pad(W, ((0, 0), (0, rest))), np.pad(P, (0, rest))

@@ -212,7 +212,7 @@ def test_other_metrics_reject_invalid_arguments() -> None:
         rmse([1], [1], c=-1)
     with pytest.raises(ValueError, match="p must be"):
         ospa([1], [1], c=1, p=np.inf)
-    with pytest.raises(ValueError, match="same number of steps; got 1 and 2"):
+    with pytest.raises(ValueError, match="same number of steps, at least one; got 1 and 2"):
         mean_rmse([[1]], [[1], [2]], c=1)
     with pytest.raises(ValueError, match="at least one; got 0 and 0"):
         mean_gospa([], [], c=1)
