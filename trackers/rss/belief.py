@@ -58,6 +58,8 @@ class SourceBeliefs(NamedTuple):
         if x.size % (n + 1) or P.size != x.size**2:
             shapes = f"{x.shape} and {P.shape}"
             raise ValueError(f"x and P must have {n + 1} entries a source; got shapes {shapes}")
+        if not (np.abs(P) < LARGEST).all():
+            raise ValueError(f"P must be finite and below {LARGEST:g}; got {shown(P)}")
         if (np.abs(x) >= LARGEST).any():
             raise ValueError(f"x must be finite, or NaN in unused slots; got {shown(x)}")
         x = x.reshape(-1, n + 1)
@@ -147,10 +149,13 @@ class SourceBeliefs(NamedTuple):
         P_theta_theta = P_theta[..., position, :]
         # G = P_:θ P_θθ⁻¹
         G = P_theta @ inverse_2x2(P_theta_theta)
+        G[..., position, :] = np.eye(2)  # exactly, also where P is so large that Σ is rounded off
         # x = x + G (θ - x_θ), P = P + G (Σ - P_θθ) G'
         x, P = smooth_gaussian(
             self.x, self.P, G, theta - self.x[..., position], moments.Sigma - P_theta_theta
         )
+        P[..., np.array(position)[:, None], np.array(position)] = moments.Sigma
+        x[..., position] = theta
         if overrides(type(motion), MotionModel, "angles"):
             x = wrapped(x, motion.angles)
         return SourceBeliefs(x, P, u, moments.v)

@@ -175,7 +175,8 @@ class PAST(SubspaceTracker[DirectionFinder]):
             W, P, self.rows, z = incomplete_step(W, P, rows, y, valid, beta, noise)
             expected = (W @ z)[known & ~valid]
             power += float(np.vdot(expected, expected).real)
-            power += len(expected) * noise / self.total_weight
+            if self.total_weight > 0:  # 0 after a gap in which all was forgotten
+                power += len(expected) * noise / self.total_weight
         self.energy, self.age = beta * self.energy + power, 0.0
         self.prior = beta * self.prior
         P = limited_trace(P, MAX_RELATIVE_TRACE / max(self.energy, SMALLEST))

@@ -210,7 +210,7 @@ def selected_solver(
     9
     """
     if not hasattr(solver, "solve_batch"):
-        raise TypeError(f"solver must be a NewtonSolver or a CoordinateSolver; got {solver!r}")
+        raise TypeError(f"solver must be a NewtonSolver or a CoordinateSolver; got {shown(solver)}")
     if engine is not None:
         one_of("engine", engine, ("newton", "fast", "coordinate"))
         settings = instance("solver", solver, SolverSettings)
