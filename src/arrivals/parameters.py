@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
+from arrivals.messages import shown
+
 FINDERS: list[Callable[[str], type]] = []  # functions from registered names to classes
 NAMERS: list[Callable[[type], str | None]] = []  # functions from classes to registered names
 MAX_DEPTH = 32  # of parts and lists in a configuration, one in the other
@@ -124,8 +126,8 @@ class Configurable:
         for key, value in changes.items():
             name, deeper, rest = key.partition("__")
             if name not in params:
-                known = ", ".join(sorted(params)) or "none"
-                unknown = f"{type(self).__name__} has no parameter {name!r}; it has: {known}"
+                known = f"it has: {', '.join(sorted(params)) or 'none'}"
+                unknown = f"{type(self).__name__} has no parameter {name!r}; {known}"
                 raise ValueError(self.renaming(name) or unknown)
             if deeper:
                 nested.setdefault(name, {})[rest] = value
@@ -184,19 +186,20 @@ class Configurable:
         """
         _check_depth(config)
         if not isinstance(config, Mapping) or "type" not in config:
-            raise ValueError(f"config must be a dictionary with the key 'type'; got {config!r}")
-        kind = _find_type(str(config["type"])[:500])
+            raise ValueError(
+                f"config must be a dictionary with the key 'type'; got {shown(config)}"
+            )
+        name = config["type"] if isinstance(config["type"], str) else shown(config["type"])
+        kind = _find_type(name[:500])
         if not (inspect.isclass(kind) and issubclass(kind, cls)):
-            raise TypeError(f"{config['type']} is not a {cls.__name__}")
-        unknown = sorted(set(config) - {"type", *kind.param_names()}, key=str)
-        if unknown:
-            name = unknown[0]
-            raise ValueError(kind.renaming(name) or f"{config['type']} has no parameter {name!r}")
+            raise TypeError(f"{name} is not a {cls.__name__}")
+        for key in sorted(set(config) - {"type", *kind.param_names()}, key=str):
+            raise ValueError(kind.renaming(key) or f"{name} has no parameter {key!r}")
         params = {key: _built(value) for key, value in config.items() if key != "type"}
         try:
             return kind(**params)
         except (AttributeError, LookupError, ArithmeticError, RuntimeError, MemoryError) as error:
-            raise ValueError(f"{config['type']} must have valid parameters; got {error}") from error
+            raise ValueError(f"{name} must have valid parameters; got {error}") from error
 
 
 class FrozenModel(Configurable):
@@ -278,9 +281,7 @@ def to_plain(value: Any) -> Any:
         return value.to_dict()
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
-    if isinstance(value, tuple | list):
-        return [to_plain(item) for item in value]
-    return value
+    return [to_plain(item) for item in value] if isinstance(value, tuple | list) else value
 
 
 def _check_depth(value: Any, depth: int = 0) -> None:
@@ -294,6 +295,4 @@ def _check_depth(value: Any, depth: int = 0) -> None:
 def _built(value: Any) -> Any:
     if isinstance(value, Mapping) and "type" in value:
         return Configurable.from_dict(value)
-    if isinstance(value, list):
-        return [_built(item) for item in value]
-    return value
+    return [_built(item) for item in value] if isinstance(value, list) else value

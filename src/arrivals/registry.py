@@ -7,7 +7,7 @@ from collections.abc import Callable
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Generic, TypeVar
 
-from arrivals.messages import with_article
+from arrivals.messages import shown, with_article
 
 Base = TypeVar("Base")
 Kind = TypeVar("Kind", bound=type)
@@ -132,7 +132,9 @@ class Registry(Generic[Base]):
         ValueError: there is no mapping 'plain'; known: tidy
         """
         if not isinstance(name, str):
-            raise TypeError(f"name of {with_article(self.noun)} must be a string; got {name!r}")
+            raise TypeError(
+                f"name of {with_article(self.noun)} must be a string; got {shown(name)}"
+            )
         points = self._entry_points().get(name, [])
         ours = self._classes.get(name)
         if ours is not None:  # an entry point may name the same class by another path

@@ -10,7 +10,8 @@ from typing import Any, Protocol, Self, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.measurements import is_missing
+from arrivals.measurements import LARGEST, is_missing
+from arrivals.messages import shown
 from arrivals.trackers.base import Tracker
 from arrivals.trackers.estimates import StateEstimate
 from arrivals.trackers.gaussian.arguments import control_input
@@ -133,8 +134,7 @@ class IMM(DeclaredAttributes, Tracker):
         self.mu, self.M = shaped("mu", mu, self.N), shaped("M", M, self.N, self.N)
         self.angles = angles
         self.omega, self.cbar = np.zeros((self.N, self.N)), self.mu @ self.M
-        self.likelihood = np.ones(self.N)
-        self.log_likelihood = 0.0
+        self.likelihood, self.log_likelihood = np.ones(self.N), 0.0
         self.combine()
         self.x_prior, self.P_prior = self.x_post, self.P_post = self.x.copy(), self.P.copy()
 
@@ -251,11 +251,11 @@ def _check_filters(filters: Any) -> None:
 
 def _probabilities(name: str, values: Float) -> Float:
     """Return values normalized along the last axis, unchanged where their sum is 1."""
-    totals = values.sum(axis=-1, keepdims=True)
+    totals = np.where(values < LARGEST, values, np.inf).sum(axis=-1, keepdims=True)
     if not ((values >= 0).all() and (totals > 0).all() and (totals < np.inf).all()):
-        raise ValueError(f"{name} must hold probabilities; got {values.tolist()}")
+        raise ValueError(f"{name} must hold probabilities; got {shown(values)}")
     if name == "M" and np.abs(totals - 1).max() > 1e-6:
-        raise ValueError(f"M must have rows of sum 1; got {totals.ravel().tolist()}")
+        raise ValueError(f"M must have rows of sum 1; got {shown(totals.ravel())}")
     return values if np.abs(totals - 1).max() < 1e-12 else values / totals
 
 

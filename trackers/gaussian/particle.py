@@ -165,11 +165,8 @@ class Particle(DeclaredAttributes, Tracker):
     @rng.setter
     def rng(self, rng: int | np.random.Generator) -> None:
         if rng is not getattr(self, "_rng", None):
-            try:
-                self._generator = np.random.default_rng(rng)
-            except (TypeError, ValueError):
-                wanted = "a numpy Generator or a whole number that is not negative"
-                raise TypeError(f"rng must be {wanted}; got {shown(rng)}") from None
+            seed = rng if isinstance(rng, np.random.Generator) else _seed(rng)
+            self._generator = np.random.default_rng(seed)
             self._rng = rng
 
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
@@ -271,6 +268,14 @@ class Particle(DeclaredAttributes, Tracker):
     def estimate(self) -> StateEstimate:
         """Mean and covariance of the particles."""
         return StateEstimate(real("x", self.x).copy(), real("P", self.P).copy())
+
+
+def _seed(rng: Any) -> int:
+    is_seed = isinstance(rng, int | np.integer) and not isinstance(rng, bool) and rng >= 0
+    if not is_seed:
+        wanted = "a numpy Generator or a whole number that is not negative"
+        raise TypeError(f"rng must be {wanted}; got {shown(rng)}")
+    return int(rng)
 
 
 def _log(weights: Float) -> Float:

@@ -18,6 +18,7 @@ from arrivals.measurement_models.delays.interpolation import (
     window,
 )
 from arrivals.measurement_models.delays.source_correlation import SourceCorrelation, Tones
+from arrivals.messages import shown
 from arrivals.motion_models.base import MotionModel
 from arrivals.motion_models.combined import CombinedMotion
 from arrivals.motion_models.linear import LinearMotion
@@ -98,6 +99,8 @@ class Variant(FrozenModel):
         object.__setattr__(self, "baselines", baselines)
         if self.loading is not None:
             not_negative("loading", self.loading)
+        for name in ("bidirectional", "sequential_update", "aligned", "extrapolate", "acquire"):
+            one_of(name, getattr(self, name), (False, True))
         if self.joint is not None:
             one_of("joint", self.joint, ("delay_line", "phasor"))
         if self.process_noise is not None:
@@ -189,7 +192,7 @@ def _source_model(measurement: ArraySamples, variant: Variant) -> SourceAtCentre
     if variant.joint == "delay_line":
         return DelayLine(n, ratio, source, measurement.kappa, q)
     if not isinstance(source, Tones) or source.order != 2:
-        raise ValueError(f"variant 'phasor' requires a source of one tone; got {source!r}")
+        raise ValueError(f"variant 'phasor' requires a source of one tone; got {shown(source)}")
     return Phasor(n, ratio, source.highest, 1e-2 if q is None else q)
 
 

@@ -58,11 +58,10 @@ class SourceBeliefs(NamedTuple):
         if x.size % (n + 1) or P.size != x.size**2:
             shapes = f"{x.shape} and {P.shape}"
             raise ValueError(f"x and P must have {n + 1} entries a source; got shapes {shapes}")
-        for name, value in (("x", x), ("P", P)):
-            if (np.abs(value) >= LARGEST).any():
-                raise ValueError(
-                    f"{name} must be finite, x NaN in unused slots; got {shown(value)}"
-                )
+        if not (np.abs(P) < LARGEST).all():
+            raise ValueError(f"P must be finite and below {LARGEST:g}; got {shown(P)}")
+        if (np.abs(x) >= LARGEST).any():
+            raise ValueError(f"x must be finite, or NaN in unused slots; got {shown(x)}")
         x = x.reshape(-1, n + 1)
         each = np.flatnonzero(np.isfinite(x).all(axis=1))
         blocks = P.reshape(len(x), n + 1, len(x), n + 1)[each, :, each]
@@ -150,12 +149,14 @@ class SourceBeliefs(NamedTuple):
         P_theta_theta = P_theta[..., position, :]
         # G = P_:θ P_θθ⁻¹
         G = P_theta @ inverse_2x2(P_theta_theta)
+        G[..., position, :] = np.eye(2)  # exactly, also where P is so large that Σ is rounded off
         # x = x + G (θ - x_θ), P = P + G (Σ - P_θθ) G'
         x, P = smooth_gaussian(
             self.x, self.P, G, theta - self.x[..., position], moments.Sigma - P_theta_theta
         )
         entries = np.array(position)
         P[..., entries[:, None], entries] = moments.Sigma  # exact, however wide P_θθ was
+        x[..., position] = theta
         if overrides(type(motion), MotionModel, "angles"):
             x = wrapped(x, motion.angles)
         return SourceBeliefs(x, P, u, moments.v)

@@ -176,7 +176,8 @@ class PAST(SubspaceTracker[DirectionFinder]):
             W, P, self.rows, z = incomplete_step(W, P, rows, y, valid, beta, noise)
             expected = (W @ z)[known & ~valid]
             power += float(np.vdot(expected, expected).real)
-            power += len(expected) * noise / self.total_weight
+            if self.total_weight > 0:  # 0 after a gap in which all was forgotten
+                power += len(expected) * noise / self.total_weight
         self.energy, self.age = beta * self.energy + power, 0.0
         self.prior = beta * self.prior
         P = limited_trace(P, MAX_RELATIVE_TRACE / max(self.energy, TINY))
@@ -218,7 +219,10 @@ class PAST(SubspaceTracker[DirectionFinder]):
         if self.n_tracked < self.n_slots:
             W, inverse = W[:, : self.n_tracked], inverse[: self.n_tracked, : self.n_tracked]
         Q, R = np.linalg.qr(W, mode="complete")
-        S = R[:L] @ np.linalg.solve(inverse, R[:L].conj().T)
+        try:
+            S = R[:L] @ np.linalg.solve(inverse, R[:L].conj().T)
+        except np.linalg.LinAlgError:  # a leap of the level by many orders: P has lost its rank
+            S = R[:L] @ np.linalg.pinv(inverse, hermitian=True) @ R[:L].conj().T
         values, rotation = np.linalg.eigh((S + S.conj().T) / 2)
         noise = (self.energy - values.sum()) / max(n - L, 1)  # the power outside, spread evenly
         values = np.concatenate([values[::-1], np.full(n - L, noise)])

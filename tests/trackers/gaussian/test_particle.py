@@ -139,7 +139,8 @@ def test_particle_assigned_belief_is_sampled() -> None:
         ({"P": [[1, 2], [0, 1]]}, ValueError, "P must be symmetric"),
         ({"n_particles": 0}, ValueError, "n_particles must be at least 1"),
         ({"resample_below": 2.0}, ValueError, r"resample_below must lie in \[0, 1\]"),
-        ({"rng": "dice"}, TypeError, "rng|SeedSequence|seed"),
+        ({"rng": "dice"}, TypeError, "rng must be"),
+        ({"rng": np.ones((1, 2))}, TypeError, "rng must be"),  # a np.matrix crashes numpy
         ({"motion": None}, TypeError, "motion must be a MotionModel"),
     ],
 )
