@@ -263,9 +263,7 @@ def _steps(
     truth, estimate = items("truth", truth), items("estimate", estimate)
     if len(truth) != len(estimate) or len(truth) == 0:
         got = f"{len(truth)} and {len(estimate)}"
-        raise ValueError(
-            f"truth and estimate must have the same number of steps, at least one; got {got}"
-        )
+        raise ValueError(f"truth and estimate must have the same number of steps, >= 1; got {got}")
     return list(zip(truth, estimate, strict=True))
 
 

@@ -2,6 +2,7 @@
 
 import io
 import os
+import shlex
 import subprocess
 import sys
 import warnings
@@ -24,7 +25,7 @@ posix = pytest.mark.skipif(sys.platform == "win32", reason="shell and devices ar
 def test_closed_or_full_stream_has_status_2_without_a_traceback(
     redirected: str, status: int
 ) -> None:
-    command = ["bash", "-c", f"{sys.executable} -m arrivals {redirected}"]
+    command = ["bash", "-c", f"{shlex.quote(sys.executable)} -m arrivals {redirected}"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == status
     assert done.stderr.count("\n") == (0 if "2>&-" in redirected else 1)

@@ -212,9 +212,9 @@ def test_other_metrics_reject_invalid_arguments() -> None:
         rmse([1], [1], c=-1)
     with pytest.raises(ValueError, match="p must be"):
         ospa([1], [1], c=1, p=np.inf)
-    with pytest.raises(ValueError, match="same number of steps, at least one; got 1 and 2"):
+    with pytest.raises(ValueError, match="same number of steps, >= 1; got 1 and 2"):
         mean_rmse([[1]], [[1], [2]], c=1)
-    with pytest.raises(ValueError, match="at least one; got 0 and 0"):
+    with pytest.raises(ValueError, match=">= 1; got 0 and 0"):
         mean_gospa([], [], c=1)
 
 
