@@ -164,7 +164,7 @@ class Particle(DeclaredAttributes, Tracker):
 
     @rng.setter
     def rng(self, rng: int | np.random.Generator) -> None:
-        if rng is not getattr(self, "_rng", None):
+        if rng is None or rng is not getattr(self, "_rng", None):
             seed = rng if isinstance(rng, np.random.Generator) else _seed(rng)
             self._generator = np.random.default_rng(seed)
             self._rng = rng
@@ -271,8 +271,8 @@ class Particle(DeclaredAttributes, Tracker):
 
 
 def _seed(rng: Any) -> int:
-    is_seed = isinstance(rng, int | np.integer) and not isinstance(rng, bool) and rng >= 0
-    if not is_seed:
+    is_whole = isinstance(rng, int | np.integer) and not isinstance(rng, bool | np.timedelta64)
+    if not (is_whole and rng >= 0):
         wanted = "a numpy Generator or a whole number that is not negative"
         raise TypeError(f"rng must be {wanted}; got {shown(rng)}")
     return int(rng)

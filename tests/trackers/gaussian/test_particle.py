@@ -218,3 +218,9 @@ def test_particle_runs_with_velocity_states() -> None:
     run = Particle(motion, position, np.zeros(4), np.eye(4), 500, rng=1).run([[1.0, 1.0], None])
     assert run.x.shape == (2, 4)
     np.testing.assert_allclose(run.P, run.P.swapaxes(1, 2))
+
+
+@pytest.mark.parametrize("rng", [None, np.timedelta64(1, "s")])
+def test_seed_that_is_no_whole_number_is_refused(rng: Any) -> None:
+    with pytest.raises(TypeError, match="rng must be a numpy Generator or a whole number"):
+        Particle(WALK, POSITION, [0.0, 0.0], np.eye(2), 30, rng=rng)
