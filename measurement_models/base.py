@@ -124,30 +124,22 @@ class MeasurementModel(FrozenModel, ABC):
 
 
 @dataclass(frozen=True)
-class SelectedEntries(MeasurementModel):
-    """A measurement model that reads some entries of a longer state.
+class WrappedMeasurement(MeasurementModel):
+    """Base of models that change one thing of another model and pass on the rest.
 
     Parameters
     ----------
     measurement : MeasurementModel
-        Model of states that hold these entries alone.
-    entries : tuple of int
-        Places of the entries in the state, in the order of the model.
-    names : tuple of str
-        Names of all entries of the state.
+        The other model.
 
     Examples
     --------
-    >>> from arrivals.measurement_models import Phasor
-    >>> phasor = Phasor(3, 0.1, frequency=0.25)
-    >>> names = ("x", "delay", "amplitude_re", "amplitude_im")
-    >>> phasor.for_state(names).h([7.0, 0.5, 1.0, 0.0]).round(3)
-    array([0.707, 1.   , 0.707])
+    >>> from arrivals.measurement_models import LinearMeasurement
+    >>> WrappedMeasurement(LinearMeasurement([[2.0]], [[1.0]])).h([3.0])
+    array([6.])
     """
 
     measurement: MeasurementModel
-    entries: tuple[int, ...]
-    names: tuple[str, ...]
 
     @property
     def dim_z(self) -> int:
@@ -169,6 +161,44 @@ class SelectedEntries(MeasurementModel):
         """That of the model."""
         return self.measurement.is_linear
 
+    def h(self, x: ArrayLike) -> Float:
+        """Return the measurements expected of states: (..., dim_x) -> (..., dim_z)."""
+        return self.measurement.h(x)
+
+    def H(self, x: ArrayLike) -> Float:
+        """Return the Jacobian of `h` at one state, (dim_z, dim_x)."""
+        return self.measurement.H(x)
+
+    def residual(self, z: ArrayLike, z_pred: ArrayLike) -> Float:
+        """Return the residual of the model."""
+        return self.measurement.residual(z, z_pred)
+
+
+@dataclass(frozen=True)
+class SelectedEntries(WrappedMeasurement):
+    """A measurement model that reads some entries of a longer state.
+
+    Parameters
+    ----------
+    measurement : MeasurementModel
+        Model of states that hold these entries alone.
+    entries : tuple of int
+        Places of the entries in the state, in the order of the model.
+    names : tuple of str
+        Names of all entries of the state.
+
+    Examples
+    --------
+    >>> from arrivals.measurement_models import Phasor
+    >>> phasor = Phasor(3, 0.1, frequency=0.25)
+    >>> names = ("x", "delay", "amplitude_re", "amplitude_im")
+    >>> phasor.for_state(names).h([7.0, 0.5, 1.0, 0.0]).round(3)
+    array([0.707, 1.   , 0.707])
+    """
+
+    entries: tuple[int, ...]
+    names: tuple[str, ...]
+
     def for_state(self, names: Sequence[str]) -> MeasurementModel:
         """Return the model for states with these names."""
         return self if checked_names(names) == self.names else self.measurement.for_state(names)
@@ -182,10 +212,6 @@ class SelectedEntries(MeasurementModel):
         H = np.zeros((self.dim_z, len(self.names)))
         H[:, self.entries] = self.measurement.H(self.select(x))
         return H
-
-    def residual(self, z: ArrayLike, z_pred: ArrayLike) -> Float:
-        """Return the residual of the model."""
-        return self.measurement.residual(z, z_pred)
 
     def sample(self, x: ArrayLike, rng: np.random.Generator) -> Float:
         """Draw a measurement of each state: (..., dim_x) -> (..., dim_z)."""

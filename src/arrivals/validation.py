@@ -1,7 +1,7 @@
 """Argument checks with uniform messages: "<argument> must be <wanted>; got <value>"."""
 
 import operator
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Set
 from typing import Any, TypeVar
 
 import numpy as np
@@ -242,7 +242,7 @@ def items(name: str, value: Any) -> tuple[Any, ...]:
     Traceback (most recent call last):
     TypeError: angles must be a sequence; got 2
     """
-    is_sequence = isinstance(value, Iterable) and not isinstance(value, str | bytes | Mapping)
+    is_sequence = isinstance(value, Iterable) and not isinstance(value, str | bytes | Mapping | Set)
     if not is_sequence or getattr(value, "ndim", 1) == 0:
         raise TypeError(f"{name} must be a sequence; got {shown(value)}")
     return tuple(value)

@@ -9,15 +9,22 @@ from typing import Any
 import numpy as np
 import pytest
 
-from arrivals.measurement_models import ArraySnapshot, LinearMeasurement, SensorArray
+from arrivals.measurement_models import (
+    ArraySnapshot,
+    LinearMeasurement,
+    LogNormalRSS,
+    SensorArray,
+)
 from arrivals.motion_models import RandomWalk
-from arrivals.trackers import IMM, PAST, Kalman, Tracker
+from arrivals.trackers import IMM, PAST, RSSVB, Kalman, Tracker
+from arrivals.trackers.autoregressive.settings import NoiseSettings, RegressionSettings
 from arrivals.trackers.interpolation.variants import Variant
 from arrivals.trackers.rss.belief import SourceBeliefs
 from arrivals.trackers.rss.inference.solution import Marginals
 
 ARRAY = np.eye(3)
 ANY: Any = ARRAY
+WALK, RSS = RandomWalk(1.0), LogNormalRSS(10.0 * np.eye(4)[:, :2], position=(0, 1))
 
 
 def imm(M: Any) -> IMM:
@@ -34,11 +41,28 @@ def imm(M: Any) -> IMM:
         (lambda: Tracker.from_dict({"type": ARRAY}), "there is no tracker '[[1.0"),
         (lambda: Tracker.from_dict({"type": -(10**5000)}), "there is no tracker 'an int'"),
         (lambda: Tracker.from_dict({"cups": ARRAY}), "config must be a dictionary"),
+        (lambda: RSSVB(WALK, RSS, np.zeros((0, 2)), np.eye(2)), "x0 must have at least one source"),
         (lambda: SourceBeliefs.from_state(np.zeros(3), ARRAY * 1e300, 2), "P must be finite"),
     ],
 )
 def test_malformed_values_are_refused_in_one_line(call: Callable[[], object], message: str) -> None:
     with pytest.raises(ValueError, match=re.escape(message)) as caught:
+        call()
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: IMM({1.0, 2.0}, mu=[0.5, 0.5], M=np.eye(2)), "filters must be a sequence; got {"),  # type: ignore[arg-type]
+        (lambda: RegressionSettings(correction=ANY), "correction must be a bool; got"),
+        (lambda: NoiseSettings(adapt_process_noise=ANY), "adapt_process_noise must be a bool; got"),
+    ],
+)
+def test_values_of_another_type_are_refused_in_one_line(
+    call: Callable[[], object], message: str
+) -> None:
+    with pytest.raises(TypeError, match=re.escape(message)) as caught:
         call()
     assert "\n" not in str(caught.value)
 

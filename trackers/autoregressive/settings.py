@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from arrivals.parameters import FrozenModel
-from arrivals.validation import not_negative, positive
+from arrivals.validation import instance, not_negative, positive
 
 
 @dataclass(frozen=True)
@@ -44,6 +44,7 @@ class RegressionSettings(FrozenModel):
     correction: bool = True
 
     def __post_init__(self) -> None:
+        instance("correction", self.correction, bool)
         for name in ("forgetting", "ar_forgetting", "ridge", "ar_ridge"):
             positive(name, getattr(self, name))
         for name in ("forgetting", "ar_forgetting"):
@@ -85,5 +86,7 @@ class NoiseSettings(FrozenModel):
     tau: float = 25.0
 
     def __post_init__(self) -> None:
+        for name in ("adapt_process_noise", "adapt_measurement_noise"):
+            instance(name, getattr(self, name), bool)
         not_negative("r_start", self.r_start)
         positive("tau", self.tau)

@@ -65,6 +65,23 @@ class ConstructedByDimensions(Base):
         return super().dim_u or self.unused_controls
 
 
+class LinearByDimensions(ConstructedByDimensions):
+    """Base of those whose models are linear until others are assigned.
+
+    Parameters
+    ----------
+    dim_x, dim_z : int
+        Numbers of entries of state and measurement.
+    dim_u : int
+        Number of control inputs; `B` is assigned.
+    """
+
+    def __init__(self, dim_x: int, dim_z: int, dim_u: int = 0) -> None:
+        motion, measurement = unit_models(dim_x, dim_z)
+        super().__init__(motion, measurement, np.zeros((dim_x, 1)), np.eye(dim_x))
+        self.unused_controls = count("dim_u", dim_u, minimum=0)
+
+
 def unit_models(dim_x: int, dim_z: int) -> tuple[LinearMotion, LinearMeasurement]:
     """Return filterpy's initial models: F, Q and R are unit matrices, H is zero.
 

@@ -8,13 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.linear import LinearMeasurement
-from arrivals.trackers.filterpy.dimensions import ConstructedByDimensions, unit_models
+from arrivals.trackers.filterpy.dimensions import LinearByDimensions
 from arrivals.trackers.gaussian.ekf import EKF
 from arrivals.trackers.gaussian.filterpy_names.function_updates import has_functions
-from arrivals.validation import count
 
 
-class ExtendedKalmanFilter(ConstructedByDimensions, EKF):
+class ExtendedKalmanFilter(LinearByDimensions, EKF):
     """Extended Kalman filter that is constructed as `filterpy.kalman.ExtendedKalmanFilter`.
 
     The motion is linear, by the matrix `F`; a subclass may define `predict_x` instead, the
@@ -38,11 +37,6 @@ class ExtendedKalmanFilter(ConstructedByDimensions, EKF):
     """
 
     plain: ClassVar[type[EKF]] = EKF
-
-    def __init__(self, dim_x: int, dim_z: int, dim_u: int = 0) -> None:
-        motion, measurement = unit_models(dim_x, dim_z)
-        super().__init__(motion, measurement, np.zeros((dim_x, 1)), np.eye(dim_x))
-        self.unused_controls = count("dim_u", dim_u, minimum=0)
 
     def predict(self, u: ArrayLike | None = None, **step: Any) -> None:
         """Predict mean and covariance; parameters as in `GaussianFilter.predict`."""

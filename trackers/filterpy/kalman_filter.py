@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.trackers.filterpy.dimensions import ConstructedByDimensions, unit_models
+from arrivals.trackers.filterpy.dimensions import LinearByDimensions
 from arrivals.trackers.gaussian.kalman import Kalman
-from arrivals.validation import count
 
 
-class KalmanFilter(ConstructedByDimensions, Kalman):
+class KalmanFilter(LinearByDimensions, Kalman):
     """Kalman filter that is constructed as `filterpy.kalman.KalmanFilter`.
 
     Parameters
@@ -24,6 +22,7 @@ class KalmanFilter(ConstructedByDimensions, Kalman):
 
     Examples
     --------
+    >>> import numpy as np
     >>> kf = KalmanFilter(dim_x=2, dim_z=1)
     >>> kf.x, kf.P = np.array([0.0, 1.0]), 10.0
     >>> kf.F[0, 1] = 1.0
@@ -36,11 +35,6 @@ class KalmanFilter(ConstructedByDimensions, Kalman):
     """
 
     plain: ClassVar[type[Kalman]] = Kalman
-
-    def __init__(self, dim_x: int, dim_z: int, dim_u: int = 0) -> None:
-        motion, measurement = unit_models(dim_x, dim_z)
-        super().__init__(motion, measurement, np.zeros((dim_x, 1)), np.eye(dim_x))
-        self.unused_controls = count("dim_u", dim_u, minimum=0)
 
     def predict(
         self,

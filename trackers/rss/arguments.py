@@ -73,6 +73,8 @@ def initial_sources(
     K = len(x)
     if x.shape != (K, n) or not np.isfinite(x).all():
         raise ValueError(f"x0 must be finite, of shape (n_sources, {n}); got {x.tolist()}")
+    if K == 0:
+        raise ValueError("x0 must have at least one source; got none: pass None")
     u, v = (_per_source(name, getattr(amplitude, name), K) for name in ("mean", "variance"))
     return SourceBeliefs(x.copy(), _covariances(P0, K, n, position), u, v)
 

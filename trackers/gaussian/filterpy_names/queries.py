@@ -18,7 +18,7 @@ from arrivals.trackers.gaussian.arguments import (
 )
 from arrivals.trackers.gaussian.equations import log_normal_update
 from arrivals.typing import Float
-from arrivals.validation import number
+from arrivals.validation import LARGEST, number
 
 if TYPE_CHECKING:
     from arrivals.trackers.gaussian.base import GaussianFilter as Base
@@ -27,7 +27,7 @@ else:
 
 
 class Queries(Base):
-    """Questions to a filter, under filterpy's names.
+    """Results that leave the filter unchanged, under filterpy's names.
 
     Examples
     --------
@@ -48,15 +48,15 @@ class Queries(Base):
         dt: float = 1.0,
     ) -> tuple[Float, Float]:
         """Return mean and covariance that `predict` would give; parameters as there."""
-        twin = copy.deepcopy(self)
-        twin.predict(u, dt=dt, F=F, Q=Q, B=B)
-        return twin.x, twin.P
+        changed = copy.deepcopy(self)
+        changed.predict(u, dt=dt, F=F, Q=Q, B=B)
+        return changed.x, changed.P
 
     def get_update(self, z: ArrayLike | None = None) -> tuple[Float, Float]:
         """Return mean and covariance that `update` would give."""
-        twin = copy.deepcopy(self)
-        twin.update(z)
-        return twin.x, twin.P
+        changed = copy.deepcopy(self)
+        changed.update(z)
+        return changed.x, changed.P
 
     def residual_of(self, z: ArrayLike | None) -> Float:
         """Return the residual of a measurement from the last prediction; 0 where missing."""
@@ -131,6 +131,6 @@ class FadingMemory(Base):
 
     @alpha.setter
     def alpha(self, alpha: float) -> None:
-        if not 1 <= number("alpha", alpha) < np.inf:
-            raise ValueError(f"alpha must be finite and at least 1; got {alpha}")
-        self.fading = alpha**2
+        if not (number("alpha", alpha) >= 1 and alpha * alpha < LARGEST):
+            raise ValueError(f"alpha must be from 1 to {math.sqrt(LARGEST):g}; got {alpha}")
+        self.fading = alpha * alpha

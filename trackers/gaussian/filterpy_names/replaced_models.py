@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.measurement_models.base import MeasurementModel
+from arrivals.measurement_models.base import MeasurementModel, WrappedMeasurement
 from arrivals.measurement_models.linear import LinearMeasurement
 from arrivals.motion_models.base import MotionModel
 from arrivals.motion_models.linear import LinearMotion
@@ -86,7 +86,7 @@ class ReplacedMotion(MotionModel):
 
 
 @dataclass(frozen=True, eq=False)
-class ReplacedNoise(MeasurementModel):
+class ReplacedNoise(WrappedMeasurement):
     """A measurement model with another noise than its own.
 
     Parameters
@@ -103,45 +103,17 @@ class ReplacedNoise(MeasurementModel):
     array([[4.]])
     """
 
-    measurement: MeasurementModel
     noise: Float
-
-    @property
-    def dim_z(self) -> int:
-        """That of the model."""
-        return self.measurement.dim_z
 
     @property
     def R(self) -> Float:
         """A copy of `noise`."""
         return self.noise.copy()
 
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """Those of the model."""
-        return self.measurement.needs
-
-    @property
-    def is_linear(self) -> bool:
-        """That of the model."""
-        return self.measurement.is_linear
-
     def for_state(self, names: Sequence[str]) -> MeasurementModel:
         """Return the model for states with these names, with this noise."""
         measurement = self.measurement.for_state(names)
         return self if measurement is self.measurement else ReplacedNoise(measurement, self.noise)
-
-    def h(self, x: ArrayLike) -> Float:
-        """Return the measurements expected of states: (..., dim_x) -> (..., dim_z)."""
-        return self.measurement.h(x)
-
-    def H(self, x: ArrayLike) -> Float:
-        """Return the Jacobian of `h` at one state, (dim_z, dim_x)."""
-        return self.measurement.H(x)
-
-    def residual(self, z: ArrayLike, z_pred: ArrayLike) -> Float:
-        """Return the residual of the model."""
-        return self.measurement.residual(z, z_pred)
 
 
 def replace_motion(motion: MotionModel, changes: dict[str, Any], dt: float = 1.0) -> MotionModel:
