@@ -10,9 +10,8 @@ from arrivals.motion_models.base import MotionModel
 from arrivals.trackers.rss.belief import Entries, transition_matrices
 from arrivals.typing import Bool, Float
 
-MAX_SQUARED_CHANGE = (
-    16.0  # of a reading to the mean before, in variances; beyond, the mean restarts
-)
+# of a reading to the mean before, in variances; beyond, the mean restarts
+MAX_SQUARED_CHANGE = 16.0
 
 
 @dataclass(frozen=True, eq=False)
