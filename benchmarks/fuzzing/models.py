@@ -121,6 +121,8 @@ def _is_modest(value: Any) -> bool:
     parts = value if isinstance(value, list | tuple) else (value,)
     if any(np.ma.isMaskedArray(part) or hasattr(part, "to_numpy") for part in parts):
         return False
+    if any(isinstance(part, np.ndarray) and part.dtype == object for part in (value, *parts)):
+        return False  # numpy 2.0 takes arrays in it as numbers, with a warning
     try:
         with np.errstate(all="ignore"):
             numbers = np.abs(np.asarray(value, dtype=np.complex128))

@@ -125,11 +125,11 @@ def count(name: str, value: Any, minimum: int = 1, maximum: int = MOST) -> int:
     TypeError: n_sensors must be a whole number; got 2.5
     """
     try:
+        if isinstance(value, bool | np.bool_):
+            raise TypeError
         whole = operator.index(value)
     except TypeError:
         raise TypeError(f"{name} must be a whole number; got {shown(value)}") from None
-    if isinstance(value, bool):
-        raise TypeError(f"{name} must be a whole number; got {shown(value)}")
     if whole < minimum:
         raise ValueError(f"{name} must be at least {minimum}; got {shown(value)}")
     if whole > maximum:
