@@ -8,10 +8,12 @@ from numpy.typing import ArrayLike
 
 from arrivals.messages import shown
 from arrivals.motion_models.base import MotionModel
-from arrivals.motion_models.von_mises import VonMisesWalk
+from arrivals.motion_models.move_stop import MoveStopWalk
+from arrivals.motion_models.von_mises import VonMisesWalk, wrap
 from arrivals.typing import Bool, Float
-from arrivals.validation import instance, probability, real, time_step
+from arrivals.validation import instance, number, probability, real, time_step
 
+MIN_KAPPA = 1e-9
 PAPER_KAPPA = 148.0  # 1.5° at broadside of a half-wavelength line
 
 
@@ -29,12 +31,15 @@ class BernoulliVonMises(MotionModel):
     sigma_doa : float, optional
         Instead of `kappa`, the standard deviation of the step in direction, rad; see
         `VonMisesWalk`.
+    still : float
+        Probability, in [0, 1), that a new source stands still; one that moves may stop, and one
+        that stands still may move, as `MoveStopWalk` says. 0 for a walk that never stops.
 
     Raises
     ------
     ValueError
         If `kappa` and `sigma_doa` are both given, one is not finite and positive, or a
-        probability lies outside [0, 1].
+        probability lies outside [0, 1], or `still` outside [0, 1).
 
     Notes
     -----
@@ -57,9 +62,12 @@ class BernoulliVonMises(MotionModel):
     p_activate: float = 0.10
     p_deactivate: float = 0.25
     sigma_doa: float | None = None
+    still: float = 0.0
 
     def __post_init__(self) -> None:
         self.walk  # noqa: B018  (rejects invalid steps)
+        if not 0 <= number("still", self.still) < 1:
+            raise ValueError(f"still must lie in [0, 1); got {self.still}")
         probability("p_activate", self.p_activate)
         probability("p_deactivate", self.p_deactivate)
 
@@ -69,6 +77,11 @@ class BernoulliVonMises(MotionModel):
         if self.kappa is None and self.sigma_doa is None:
             return VonMisesWalk(PAPER_KAPPA)
         return VonMisesWalk(self.kappa, self.sigma_doa)
+
+    @cached_property
+    def move_stop(self) -> MoveStopWalk | None:
+        """The two modes of a walk that may stand still; None where `still` is 0."""
+        return MoveStopWalk(self.still) if self.still else None
 
     @property
     def dim_x(self) -> int:
@@ -100,6 +113,34 @@ class BernoulliVonMises(MotionModel):
     def blur(self, kappa: ArrayLike, dt: float = 1.0, slope: ArrayLike = 1.0) -> Float:
         """Return the concentration after a step; see `VonMisesWalk.blur`."""
         return self.walk.blur(kappa, dt, slope)
+
+    def predict_angles(
+        self, mu: Float, kappa: Float, modes: Float, dt: float = 1.0, slope: ArrayLike = 1.0
+    ) -> tuple[Float, Float, Float]:
+        """Predict the densities of angles.
+
+        Parameters
+        ----------
+        mu, kappa : ndarray, shape (...)
+            Von Mises densities; NaN and 0 in unused places.
+        modes : ndarray, shape (3, ..., 2)
+            Their modes, as in `MoveStopWalk`, which begin anew where they do not have the variance
+            1/kappa; not used where `still` is 0.
+        dt : float
+            Length of the step.
+        slope : array_like, shape (...)
+            As in `VonMisesWalk.step_concentration`.
+
+        Returns
+        -------
+        mu, kappa, modes : ndarray
+        """
+        if self.move_stop is None:
+            return mu, self.blur(kappa, dt, slope), modes
+        modes = self.move_stop.renewed(modes, 1 / np.maximum(kappa, MIN_KAPPA))
+        step_variance = 1 / self.walk.step_concentration(slope)
+        shift, variance, modes = self.move_stop.predict(modes, step_variance, dt)
+        return wrap(mu + shift), np.where(np.isnan(mu), 0.0, 1 / variance), modes
 
     def sample(self, x: ArrayLike, rng: np.random.Generator, dt: float = 1.0) -> Float:
         """Draw angles after a step of sources that remain active."""

@@ -14,6 +14,7 @@ from arrivals.scenarios.bounds.signal_strength import rss_bound
 from arrivals.scenarios.experiments.methods import Method, grid
 from arrivals.scenarios.experiments.monte_carlo import monte_carlo
 from arrivals.scenarios.experiments.study import Study
+from arrivals.scenarios.metrics.calibration import Reliability, reliability
 from arrivals.scenarios.metrics.gospa import Gospa, gospa, mean_gospa, mean_rmse, ospa, rmse
 from arrivals.scenarios.metrics.separation import nmse, sdr
 from arrivals.scenarios.metrics.unlabelled_rmse import best_assignment_rmse
@@ -25,6 +26,7 @@ __all__ = [
     "Method",
     "Network",
     "Recording",
+    "Reliability",
     "Scenario",
     "Study",
     "Trial",
@@ -48,6 +50,7 @@ __all__ = [
     "read",
     "read_network",
     "register",
+    "reliability",
     "rmse",
     "rss_bound",
     "sdr",

@@ -12,7 +12,7 @@ NAMES = {
     "motion_models": """
         AutoregressiveSources BernoulliVonMises CombinedMotion ConstantVelocity CoordinatedTurn
         DelayDrift DelayWalk DirectionAmplitudeWalk FunctionMotion LinearMotion LinearMotionModel
-        MotionModel RandomWalk VonMisesWalk select_order wrap yule_walker
+        MotionModel MoveStopWalk RandomWalk VonMisesWalk select_order wrap yule_walker
     """,
     "measurement_models": """
         ArrayManifold ArraySamples ArraySnapshot Autoregressive AveragedEnvelope Bearing

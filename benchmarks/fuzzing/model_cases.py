@@ -11,7 +11,7 @@ import numpy as np
 from arrivals import measurement_models as mm
 from arrivals import motion_models as motions
 from arrivals.measurements import is_missing, numbers, real_numbers, rows
-from arrivals.motion_models.ar_estimation import partial_autocorrelation
+from arrivals.motion_models.autoregressive.estimation import partial_autocorrelation
 from arrivals.scenarios.bounds.delay import tone_bound
 from arrivals.scenarios.bounds.detection import exact_detection, network_detection
 from arrivals.scenarios.bounds.signal_strength import rss_bound

@@ -71,7 +71,9 @@ def tracker(name: str, measurement: ArraySnapshot) -> Tracker:
     solver = NewtonSolver(tempering=4.0, power_floor=3.0, max_components=2, merge=np.deg2rad(1.5))
     if name == "valse":
         return VALSE(measurement, solver=solver)
-    return SVALSE(measurement, BernoulliVonMises(sigma_doa=np.deg2rad(3.0)), solver=solver)
+    return SVALSE(
+        measurement, BernoulliVonMises(sigma_doa=np.deg2rad(3.0), still=0.1), solver=solver
+    )
 
 
 def infrasound(

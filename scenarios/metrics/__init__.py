@@ -1,6 +1,7 @@
 """Errors of estimates against the truth, and the consistency of their stated deviations."""
 
 from arrivals.scenarios.metrics.assignment import label_switches, matches, track_lengths
+from arrivals.scenarios.metrics.calibration import Reliability, reliability
 from arrivals.scenarios.metrics.consistency import (
     circular_nees,
     coverage,
@@ -16,6 +17,7 @@ from arrivals.scenarios.metrics.unlabelled_rmse import best_assignment_rmse
 __all__ = [
     "METRICS",
     "Gospa",
+    "Reliability",
     "best_assignment_rmse",
     "circular_nees",
     "coverage",
@@ -29,6 +31,7 @@ __all__ = [
     "ospa",
     "position_coverage",
     "position_nees",
+    "reliability",
     "rmse",
     "scores",
     "sdr",

@@ -13,6 +13,7 @@ import numpy as np
 
 from arrivals.scenarios.base import Trial
 from arrivals.scenarios.metrics.assignment import Matches, label_switches, matches, track_lengths
+from arrivals.scenarios.metrics.calibration import reliability
 from arrivals.scenarios.metrics.consistency import (
     circular_nees,
     coverage,
@@ -21,7 +22,7 @@ from arrivals.scenarios.metrics.consistency import (
 )
 from arrivals.scenarios.metrics.gospa import Gospa, mean_gospa, mean_rmse, ospa
 from arrivals.trackers.run import Run
-from arrivals.typing import Float
+from arrivals.typing import Bool, Float
 
 Metric: TypeAlias = Callable[[Trial, Run], float]
 CUT_OFF = 10.0  # degrees, the paper's c; for positions metres
@@ -133,12 +134,44 @@ def _covered(trial: Trial, run: Run, level: float) -> float:
     return (coverage if error.ndim == 1 else position_coverage)(error, spread, level=level)
 
 
+def _coverage50(trial: Trial, run: Run) -> float:
+    return _covered(trial, run, 0.50)
+
+
 def _coverage68(trial: Trial, run: Run) -> float:
     return _covered(trial, run, 0.68)
 
 
+def _coverage90(trial: Trial, run: Run) -> float:
+    return _covered(trial, run, 0.90)
+
+
 def _coverage95(trial: Trial, run: Run) -> float:
     return _covered(trial, run, 0.95)
+
+
+def existence_and_hits(trial: Trial, run: Run) -> tuple[Float, Bool]:
+    """Return the stated existence of all estimates, and which are matched to a source, (n,)."""
+    existence = run.fields.get("existence", np.full((0, 0), np.nan))
+    if run.n_found.any() and np.isnan(existence).all():
+        raise ValueError("the tracker does not estimate probabilities of existence")
+    pairs = pairs_of(trial, run)
+    hit = np.zeros(existence.shape, dtype=np.bool_)
+    hit[pairs.step, pairs.slot] = True
+    stated = ~np.isnan(existence)
+    return np.asarray(existence[stated]), hit[stated]
+
+
+def _ece(trial: Trial, run: Run) -> float:
+    return reliability(*existence_and_hits(trial, run)).ece
+
+
+def _brier(trial: Trial, run: Run) -> float:
+    return reliability(*existence_and_hits(trial, run)).brier
+
+
+def _log_score(trial: Trial, run: Run) -> float:
+    return reliability(*existence_and_hits(trial, run)).log_score
 
 
 def _label_switches(trial: Trial, run: Run) -> float:
@@ -163,8 +196,13 @@ METRICS: dict[str, Metric] = {
     "ospa": _ospa,
     "cardinality": _cardinality,
     "nees": _nees,
+    "coverage50": _coverage50,
     "coverage68": _coverage68,
+    "coverage90": _coverage90,
     "coverage95": _coverage95,
+    "ece": _ece,
+    "brier": _brier,
+    "log_score": _log_score,
     "label_switches": _label_switches,
     "track_length": _track_length,
     "converged": _converged,

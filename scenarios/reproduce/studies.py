@@ -29,6 +29,7 @@ QUICK = 10  # runs of a quick study
 STUDIES: dict[str, str] = {
     "any-array": f"{PACKAGE}.svalse.any_array:any_array",
     "ar-kf": f"{PACKAGE}.ar_kalman:ar_kf",
+    "calibration": f"{PACKAGE}.svalse.calibration:calibration",
     "interpolation-table1": f"{PACKAGE}.interpolation.table_1:table1",
     "interpolation-convergence": f"{PACKAGE}.interpolation.convergence:convergence",
     "interpolation-rmse": f"{PACKAGE}.interpolation.rmse:rmse_study",
@@ -46,6 +47,7 @@ STUDIES: dict[str, str] = {
 # Runs of studies with numbers other than 100, and QUICK in a quick study
 RUNS: dict[str, tuple[int, int]] = {
     "any-array": (20, 3),
+    "calibration": (30, 2),
     "ar-kf": (100, 4),
     "svalse-fig4": (20, 4),
     "svalse-fig5": (20, 4),

@@ -21,6 +21,7 @@ from arrivals.scenarios.simulations.line_arrays import (
 )
 from arrivals.scenarios.simulations.moving_emitters import BirthsAndDeaths, CrossingSources
 from arrivals.scenarios.simulations.planar_arrays import Cardioids, Circle, Grating
+from arrivals.scenarios.simulations.random_walks import RandomWalks, SwitchingWalks
 from arrivals.scenarios.simulations.sampled_source import (
     InterpolationBand,
     InterpolationCoupled,
@@ -49,10 +50,12 @@ __all__ = [
     "PairsInTurn",
     "RSSTrial",
     "RandomPairsOff",
+    "RandomWalks",
     "SixSources",
     "SixStatic",
     "SpeechField",
     "SpeechOfOrderTwo",
+    "SwitchingWalks",
     "Table1K3",
     "Table1K7",
     "ThirdOrder",

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.messages import shown
-from arrivals.motion_models.companion_form import pole_radius, solve_lyapunov
+from arrivals.motion_models.autoregressive.companion_form import pole_radius, solve_lyapunov
 from arrivals.typing import Complex, Float
 from arrivals.validation import LARGEST, count, instance, items, one_of, real
 

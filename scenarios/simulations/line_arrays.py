@@ -72,7 +72,7 @@ class LineScenario(Scenario):
         model = self.measurement
         waves = model.wave(truth, amplitude)
         u = np.sqrt(noise)[:, None] * complex_normal(rng, waves.shape)
-        motion = BernoulliVonMises(sigma_doa=np.deg2rad(1.5))
+        motion = BernoulliVonMises(sigma_doa=np.deg2rad(1.5), still=0.1)
         return Trial(waves + u, truth, model, motion)
 
 

@@ -122,7 +122,7 @@ class Circle(Scenario):
         """Draw one trial; the motion model has 3° a step."""
         truth, model = np.deg2rad(self.doa_deg()), self.measurement
         z = simulate_snapshots(model, truth, self.snr_db, rng)
-        return Trial(z, truth, model, BernoulliVonMises(sigma_doa=np.deg2rad(3.0)))
+        return Trial(z, truth, model, BernoulliVonMises(sigma_doa=np.deg2rad(3.0), still=0.1))
 
 
 @register("cardioids")
@@ -173,7 +173,7 @@ class Cardioids(Scenario):
         model = self.measurement
         z = simulate_snapshots(model, truth, self.snr_db, rng, received=True)
         assumed = model if self.known else model.replace(response=None)
-        return Trial(z, truth, assumed, BernoulliVonMises(sigma_doa=np.deg2rad(3.0)))
+        return Trial(z, truth, assumed, BernoulliVonMises(sigma_doa=np.deg2rad(3.0), still=0.1))
 
 
 @register("grating")
@@ -234,4 +234,4 @@ class Grating(Scenario):
         if self.hopping and self.n_bins > 1:
             valid = rng.integers(self.n_bins, size=self.n_steps)
             z[np.arange(self.n_bins) != valid[:, None]] = complex(np.nan, np.nan)
-        return Trial(z, truth, model, BernoulliVonMises(sigma_doa=np.deg2rad(2.0)))
+        return Trial(z, truth, model, BernoulliVonMises(sigma_doa=np.deg2rad(2.0), still=0.1))

@@ -59,7 +59,7 @@ def active_components(prior: ComponentPrior, posterior: ComponentPosterior) -> C
     components.kl_constant[:] = np.log(2 * np.pi)
     components.log_odds[:] = log_odds(np.array(prior.birth))
     components.mu[0, : len(on)] = posterior.theta[on]
-    components.variance[0, : len(on)] = -2 * np.log(posterior.resultant[on])
+    components.variance[0, : len(on)] = 1 / posterior.kappa[on]
     for i, k in enumerate(on):
         if k < len(prior.mu):
             components.prior_mu[0, i], components.prior_kappa[0, i] = prior.mu[k], prior.kappa[k]

@@ -12,8 +12,12 @@ from hypothesis import strategies as st
 from scipy.linalg import solve_discrete_lyapunov, solve_toeplitz
 
 from arrivals.motion_models import AutoregressiveSources, select_order, yule_walker
-from arrivals.motion_models.ar_estimation import autocovariance, partial_autocorrelation
-from arrivals.motion_models.companion_form import companion_layout, pole_radius, stabilised
+from arrivals.motion_models.autoregressive.companion_form import (
+    companion_layout,
+    pole_radius,
+    stabilised,
+)
+from arrivals.motion_models.autoregressive.estimation import autocovariance, partial_autocorrelation
 from arrivals.typing import Float
 
 RAGGED = AutoregressiveSources([[0.7, -0.4, 0.2], [0.9], [0.3, 0.3]], [0.5, 1.0, 2.0])

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
-from arrivals.motion_models.autoregressive import AutoregressiveSources
+from arrivals.motion_models.autoregressive.sources import AutoregressiveSources
 from arrivals.trackers.autoregressive.belief import SourceBelief
 from arrivals.trackers.autoregressive.initialization import check_directions, manifold_of
 from arrivals.trackers.autoregressive.interval import finish_interval

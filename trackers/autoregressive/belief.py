@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from arrivals.measurement_models.manifolds.symmetric_line import ArrayManifold
-from arrivals.motion_models.autoregressive import AutoregressiveSources
+from arrivals.motion_models.autoregressive.companion_form import companion_layout
+from arrivals.motion_models.autoregressive.sources import AutoregressiveSources
 from arrivals.motion_models.combined import block_diagonal
-from arrivals.motion_models.companion_form import companion_layout
 from arrivals.trackers.autoregressive.qrd_rls import ridge_rows
 from arrivals.trackers.autoregressive.settings import RegressionSettings
 from arrivals.typing import Bool, Complex, Float, Int

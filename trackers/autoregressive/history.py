@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from arrivals.motion_models.autoregressive import AutoregressiveSources
+from arrivals.motion_models.autoregressive.sources import AutoregressiveSources
 from arrivals.trackers.autoregressive.belief import SourceBelief, to_state_vector
 from arrivals.trackers.autoregressive.snapshots import completes_interval
 from arrivals.trackers.estimates import SourceEstimate

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.manifolds.symmetric_line import ArrayManifold
-from arrivals.motion_models.autoregressive import AutoregressiveSources
-from arrivals.motion_models.companion_form import companion_layout, solve_lyapunov
+from arrivals.motion_models.autoregressive.companion_form import companion_layout, solve_lyapunov
+from arrivals.motion_models.autoregressive.sources import AutoregressiveSources
 from arrivals.trackers.autoregressive.steady_state import StateSpace, fixed_gain, steady_state
 from arrivals.trackers.gaussian.linalg import transposed
 from arrivals.typing import Float

@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.manifolds.symmetric_line import ArrayManifold
 from arrivals.measurements import rows
-from arrivals.motion_models.autoregressive import AutoregressiveSources
-from arrivals.motion_models.companion_form import CompanionLayout, companion_layout
+from arrivals.motion_models.autoregressive.companion_form import CompanionLayout, companion_layout
+from arrivals.motion_models.autoregressive.sources import AutoregressiveSources
 from arrivals.trackers.autoregressive.belief import (
     SourceBelief,
     initialize_belief,

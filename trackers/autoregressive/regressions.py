@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from arrivals.measurement_models.manifolds.symmetric_line import ArrayManifold
-from arrivals.motion_models.companion_form import CompanionLayout, stabilised
+from arrivals.motion_models.autoregressive.companion_form import CompanionLayout, stabilised
 from arrivals.trackers.autoregressive.belief import SourceBelief
 from arrivals.trackers.autoregressive.interval_filter import FilteredInterval
 from arrivals.trackers.autoregressive.qrd_rls import append_rows, ridge_rows, solve_factor

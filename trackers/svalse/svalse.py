@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import ClassVar, Literal, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from arrivals.measurement_models.direction_measurement import DirectionMeasurement
 from arrivals.measurement_models.manifolds.manifold import Reference
@@ -15,20 +15,28 @@ from arrivals.motion_models.bernoulli_von_mises import BernoulliVonMises
 from arrivals.motion_models.bessel import bessel_ratio, bessel_ratios
 from arrivals.trackers.direction_tracker import padded
 from arrivals.trackers.registry import register
-from arrivals.trackers.svalse.components import ComponentPosterior, ComponentPrior, Solver
-from arrivals.trackers.svalse.coordinate.solver import PosteriorName
+from arrivals.trackers.svalse.components import (
+    ComponentPosterior,
+    ComponentPrior,
+    Solver,
+    drifted,
+    with_modes,
+)
+from arrivals.trackers.svalse.coordinate.solver import NO_COMPONENTS, PosteriorName
 from arrivals.trackers.svalse.valse import (
     DEFAULT_SOLVER,
     VALSE,
     Engine,
     circular_std,
     detected,
+    existence_of,
 )
-from arrivals.typing import Bool, Complex, Float, Int
+from arrivals.typing import Bool, Float, Int
 from arrivals.validation import instance, no_control, one_of, time_step
 
-DEFAULT_MOTION = BernoulliVonMises(sigma_doa=np.deg2rad(1.5))
+DEFAULT_MOTION = BernoulliVonMises(sigma_doa=np.deg2rad(1.5), still=0.1)
 Memory = Literal["von_mises", "posterior"]
+CarriedExistence = Literal["active", "probability"]
 INITIAL_SNR_DB = 20.0  # of the first step, for one snapshot a step
 
 
@@ -46,9 +54,9 @@ class SVALSE(VALSE):
         An `ArraySnapshot`, or a model with its methods: any array, with any number of frequencies
         and snapshots a step. Its noise is not used: the method estimates it.
     motion : BernoulliVonMises
-        Steps, births and deaths. The default has the paper's probabilities, and a step of 1.5°
-        in direction; the paper's, `BernoulliVonMises()`, is one in the electrical angle,
-        2π d/λ sin β, which lets sources near endfire jump by many degrees.
+        Steps, births and deaths. The default has the paper's probabilities, a step of 1.5° in
+        direction, and may stand still; the paper's, `BernoulliVonMises()`, has one in the
+        electrical angle, 2π d/λ sin β, which lets sources near endfire jump by many degrees.
     solver : NewtonSolver or CoordinateSolver
         Maximization of the bound, with its settings; see `VALSE`. The paper's choices are
         `CoordinateSolver.paper()` and `reference="first"`.
@@ -63,6 +71,10 @@ class SVALSE(VALSE):
         What is kept of an angle from step to step: one von Mises density, or the whole density,
         with all directions that single steps leave ambiguous. The whole density needs coordinate
         ascent: `NewtonSolver` passes it on to a `CoordinateSolver`.
+    carry_existence : {"active", "probability"}
+        What is kept of a component's existence: 1 where it is active, which is the paper's, or
+        its probability, a Bernoulli filter. The latter is better where sources start and stop as
+        often as the motion model says, and loses weak ones where they stay on for long.
 
     Attributes
     ----------
@@ -77,10 +89,10 @@ class SVALSE(VALSE):
         ⟨exp(jiθ)⟩ of the tracked components, where the memory is the posterior; else none.
     nuisance : ndarray, shape (L, n_nuisance)
         Their densities over the values of an unknown slowness or elevation.
+    modes : ndarray, shape (3, L, 2)
+        Their modes where the motion may stand still, as in `MoveStopWalk`; else zeros.
     bin_noise : ndarray, shape (n_bins,)
         Noise of each bin when it last had valid data; NaN before.
-    x, P, noise
-        As in `VALSE`.
 
     Notes
     -----
@@ -92,8 +104,7 @@ class SVALSE(VALSE):
 
     References
     ----------
-    Park, Meyer and Gerstoft, JASA 153(1), 2023. Direct quadrature, and the phase reference in
-    mid array: ours.
+    Park, Meyer and Gerstoft, JASA 153(1), 2023; quadrature and the reference in mid array: ours.
 
     Examples
     --------
@@ -105,14 +116,8 @@ class SVALSE(VALSE):
     (array([0.5 , 0.51, 0.52]), array([0, 0, 0]))
     """
 
-    mu: Float
-    kappa: Float
-    existence: Float
-    label: Int
-    age: Int
-    moments: Complex
+    moments: NDArray[np.complex128]
     nuisance: Float
-
     renamed: ClassVar[dict[str, str]] = {"carry": "memory", "snr_db": "solver__snr_db"}
 
     def __init__(
@@ -125,9 +130,15 @@ class SVALSE(VALSE):
         posterior: PosteriorName | None = None,
         reference: Reference = "middle",
         memory: Memory = "von_mises",
+        carry_existence: CarriedExistence = "active",
     ) -> None:
         self.motion = instance("motion", motion, BernoulliVonMises)
         self.memory = one_of("memory", memory, ("von_mises", "posterior"))
+        self.carry_existence = one_of("carry_existence", carry_existence, ("active", "probability"))
+        if self.memory == "posterior" and motion is DEFAULT_MOTION:
+            self.motion = motion.replace(still=0.0)
+        elif self.memory == "posterior" and motion.still:
+            raise ValueError(f'still must be 0 where memory is "posterior"; got {motion.still}')
         super().__init__(
             measurement, solver=solver, engine=engine, posterior=posterior, reference=reference
         )
@@ -137,9 +148,7 @@ class SVALSE(VALSE):
         self.n_labels, self.birth = 0, self.motion.p_activate
         self.expected_snr_db: float | None = None
         self.bin_noise = np.full(len(self.bin_noise), np.nan)
-        none = np.zeros(0)
-        self._keep(none, none, none, none.astype(np.int64), none.astype(np.int64))
-        self._keep_densities(None, none.astype(np.int64))
+        self._keep(NO_COMPONENTS, np.zeros(0, dtype=np.int64))
         super().reset()
 
     @property
@@ -169,6 +178,7 @@ class SVALSE(VALSE):
             return
         prior = self.component_prior(observed)  # (65)
         posterior = self.solver.solve(observed.snapshots, observed.manifold, prior)  # (30)-(59)
+        posterior = self.updated_modes([self], [posterior])[0]  # of a walk that may stand still
         self.store(posterior, observed)  # labels, components, noise per bin
 
     def predict_batch(self, trackers: Sequence[Self], dt: float) -> None:
@@ -181,14 +191,23 @@ class SVALSE(VALSE):
         tracked = ~np.isnan(mu)
         slope = self.measurement.manifold(self.reference).slope(np.where(tracked, mu, 0.0))
         # μ' = μ   (62);  A(κ') = A(κ) A(κ_r), of which (63) is the limit for large κ
-        kappa = self.motion.blur(kappa, dt, slope)
+        modes = np.stack([tracker.modes for tracker in trackers], axis=1)
+        mu, kappa, modes = self.motion.predict_angles(mu, kappa, modes, dt, slope)
         # ρ' = (1 - p_d) ρ + p_a (1 - ρ)   (64)
         rho = np.where(tracked, self.motion.predict_existence(existence, dt), 0.0)
         # ρ' = p_a of a component that was not tracked   (65)
         birth = float(self.motion.predict_existence(0.0, dt))
         for i, tracker in enumerate(trackers):
-            tracker.kappa, tracker.existence, tracker.birth = kappa[i], rho[i], birth
+            tracker.mu, tracker.kappa, tracker.modes = mu[i], kappa[i], modes[:, i]
+            tracker.existence, tracker.birth = rho[i], birth
             tracker._predict_densities(slope[i], dt)
+
+    def updated_modes(
+        self, trackers: Sequence[Self], posteriors: Sequence[ComponentPosterior]
+    ) -> Sequence[ComponentPosterior]:
+        """Return posteriors with updated modes of a walk that may stand still."""
+        walk = self.motion.move_stop
+        return posteriors if walk is None else with_modes(walk, trackers, posteriors)
 
     def _predict_densities(self, slope: Float, dt: float) -> None:
         """Predict whole densities by the exact convolution, and those of the second unknown."""
@@ -249,52 +268,28 @@ class SVALSE(VALSE):
         label[unlabelled] = self.n_labels + np.arange(n_new)
         self.n_labels += n_new
         self.report_posterior(posterior, manifold, active, label[active])
-        age = posterior.age
-        order = np.concatenate([np.flatnonzero(age == 0), np.flatnonzero(age > 0)])
-        self._keep(
-            posterior.theta[order],
-            posterior.kappa[order],
-            posterior.active[order],
-            label[order],
-            age[order],
-        )
-        self._keep_densities(posterior, order)
+        self._keep(posterior, label)
         self.expected_snr_db = posterior.snr_db
         self.bin_noise = merge_noise(self.bin_noise, observed.bins, posterior.bin_noise)
 
-    def _keep(self, mu: Float, kappa: Float, existence: Float | Bool, label: Int, age: Int) -> None:
-        """Track components, as many as there are slots."""
-        n = self.n_slots
-        self.mu = padded(mu, n, np.nan)
-        self.kappa = padded(kappa, n, 0.0)
-        self.existence = padded(existence, n, 0.0)
-        self.label = padded(label, n, -1).astype(np.int64)
-        self.age = padded(age, n, 0).astype(np.int64)
-
-    def _keep_densities(self, posterior: ComponentPosterior | None, order: Int) -> None:
-        """Keep the whole densities of the tracked components, and those of the second unknown."""
+    def _keep(self, posterior: ComponentPosterior, label: Int) -> None:
+        """Track active components and recent ones, as many as there are slots."""
+        n, age = self.n_slots, posterior.age
+        order = np.concatenate([np.flatnonzero(age == 0), np.flatnonzero(age > 0)])[:n]
+        existence: Float = posterior.active.astype(np.float64)
+        if self.carry_existence == "probability":
+            existence = existence * existence_of(posterior)
+        self.mu = padded(posterior.theta[order], n, np.nan)
+        self.kappa = padded(posterior.kappa[order], n, 0.0)
+        self.existence: Float = padded(existence[order], n, 0.0)
+        self.label: Int = padded(label[order], n, -1).astype(np.int64)
+        self.age: Int = padded(age[order], n, 0).astype(np.int64)
         weights = self.measurement.manifold(self.reference).nuisance_weights
-        n = len(self.mu)
         self.nuisance = np.tile(weights, (n, 1))
         self.moments = np.zeros((n, self.n_moments), dtype=np.complex128)
-        if posterior is None or posterior.nuisance is None or posterior.moments is None:
-            return
-        order = order[:n]
-        self.nuisance[: len(order)] = posterior.nuisance[order]
-        self.moments[: len(order)] = posterior.moments[order]
-
-
-def drifted(nuisance: Float) -> Float:
-    """Return densities (..., n) of a second unknown after a step, on its grid.
-
-    It stays with probability 0.9, and else goes to a neighbour; a trace is anywhere.
-
-    Examples
-    --------
-    >>> drifted(np.array([0.0, 1.0, 0.0])).round(4)
-    array([0.05  , 0.8999, 0.05  ])
-    """
-    left, right = nuisance[..., :1], nuisance[..., -1:]
-    wide = np.concatenate([left, nuisance, right], axis=-1)
-    shifted = 0.9 * nuisance + 0.05 * (wide[..., :-2] + wide[..., 2:])
-    return np.asarray((1 - 1e-4) * shifted + 1e-4 / nuisance.shape[-1])
+        self.modes = np.zeros((3, n, 2))
+        if posterior.modes is not None:
+            self.modes[:, : len(order)] = posterior.modes[:, order]
+        if posterior.nuisance is not None and posterior.moments is not None:
+            self.nuisance[: len(order)] = posterior.nuisance[order]
+            self.moments[: len(order)] = posterior.moments[order]

@@ -65,11 +65,11 @@ class VALSE(BatchDirectionTracker):
 
     Notes
     -----
-    `existence` of an estimate is the posterior probability of the component if all others are
-    held: it ranks components, but is not a calibrated frequency. `std` is the circular standard
-    deviation of the angle, given the other components; with several sources it is too small, by a
-    factor of 1.5 to 2 typically. Below half a wavelength of spacing, components to which no real
-    direction belongs are left out of the estimate.
+    `existence` of an estimate is the posterior probability of the component, the noise integrated
+    out. `std` is the marginal circular standard deviation of the angle, for unknown noise; with
+    coordinate ascent that of the angle given the other components, which with several sources is
+    too small, by a factor of 1.5 to 2 typically. Below half a wavelength of spacing, components to
+    which no real direction belongs are left out of the estimate.
 
     References
     ----------
@@ -135,7 +135,7 @@ class VALSE(BatchDirectionTracker):
             return
         prior = self.component_prior(observed)  # None in VALSE
         posterior = self.solver.solve(observed.snapshots, observed.manifold, prior)  # (30)-(59)
-        self.store(posterior, observed)  # labels, components, noise per bin
+        self.store(posterior, observed)  # noise per bin
 
     def step_batch(self, trackers: Sequence[Self], step: Sequence[Any], dt: float) -> None:
         """Predict and update copies of this tracker, those with the same sensors in one call."""
@@ -153,7 +153,8 @@ class VALSE(BatchDirectionTracker):
                 group[0][1].manifold,
                 [tracker.component_prior(observed) for tracker, observed in group],
             )
-            for (tracker, observed), posterior in zip(group, posteriors, strict=True):
+            updated = self.updated_modes([tracker for tracker, _ in group], posteriors)
+            for (tracker, observed), posterior in zip(group, updated, strict=True):
                 tracker.store(posterior, observed)
 
     def predict_batch(self, trackers: Sequence[Self], dt: float) -> None:
@@ -171,6 +172,12 @@ class VALSE(BatchDirectionTracker):
     def component_prior(self, observed: ObservedSnapshots) -> ComponentPrior | None:
         """Return the prior of the components: None in VALSE."""
         return None
+
+    def updated_modes(
+        self, trackers: Sequence[Self], posteriors: Sequence[ComponentPosterior]
+    ) -> Sequence[ComponentPosterior]:
+        """Return posteriors with updated modes of the motion: unchanged in VALSE."""
+        return posteriors
 
     def store(self, posterior: ComponentPosterior, observed: ObservedSnapshots) -> None:
         """Report the active components, and keep the noise of each bin."""
@@ -190,7 +197,7 @@ class VALSE(BatchDirectionTracker):
         self.report(
             manifold.to_doa(theta, slack=np.inf),
             manifold.doa_std(theta, std),
-            existence=1 / (1 + np.exp(-np.maximum(posterior.evidence[active], -700))),
+            existence=existence_of(posterior)[active],
             amplitude=manifold.to_amplitude(posterior.amplitude[active], theta),
             label=label,
             converged=posterior.converged,
@@ -232,6 +239,11 @@ def detected(manifold: Manifold, posterior: ComponentPosterior) -> Bool:
     """Return which components are active and belong, within three std, to a real direction."""
     doa = manifold.to_doa(posterior.theta, slack=3 * circular_std(posterior.resultant))
     return np.asarray(posterior.active & ~np.isnan(doa))
+
+
+def existence_of(posterior: ComponentPosterior) -> Float:
+    """Return the probabilities of existence of active components, from their log odds."""
+    return np.asarray(1 / (1 + np.exp(-np.maximum(posterior.evidence, -700))))
 
 
 def circular_std(resultant: ArrayLike) -> Float:

@@ -9,7 +9,7 @@ from filterpy.kalman import KalmanFilter
 
 from arrivals.measurement_models import ArrayManifold, SensorArray
 from arrivals.motion_models import AutoregressiveSources
-from arrivals.motion_models.companion_form import companion_layout
+from arrivals.motion_models.autoregressive.companion_form import companion_layout
 from arrivals.trackers.autoregressive.steady_state import (
     StateSpace,
     exact_filter,

@@ -21,8 +21,9 @@ from arrivals.trackers.svalse.components import (
 )
 from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver
 from arrivals.trackers.svalse.newton.batch import all_set, any_set
-from arrivals.trackers.svalse.newton.candidates import CandidateGrid, removal_gains
+from arrivals.trackers.svalse.newton.candidates import CandidateGrid
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
+from arrivals.trackers.svalse.newton.marginals import marginals
 from arrivals.trackers.svalse.newton.state import (
     SolverState,
     StepInput,
@@ -200,10 +201,10 @@ def solved_posteriors(
     """Return the posteriors of the problems that are done, by their numbers."""
     if not any_set(state.done):
         return {}
-    gains = removal_gains(search.response, state.evaluation, search.kl_weight)
+    result = marginals(search.response, state.evaluation, search.kl_weight)
     manifold, numbers = search.grid.manifold, state.problem.tolist()
     return {
-        numbers[i]: solved_posterior(state, i, steps[numbers[i]], manifold, gains)
+        numbers[i]: solved_posterior(state, i, steps[numbers[i]], manifold, result)
         for i in map(int, np.flatnonzero(state.done))
     }
 

@@ -18,6 +18,7 @@ from arrivals.trackers.svalse.newton.batch import BatchRecord
 from arrivals.trackers.svalse.newton.candidates import LOG_2PI, RemovedComponents
 from arrivals.trackers.svalse.newton.elbo import Components, Evaluation, evaluate
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
+from arrivals.trackers.svalse.newton.marginals import ComponentMarginals
 from arrivals.trackers.svalse.newton.step import MAX_ANGLE_VARIANCE
 from arrivals.trackers.svalse.noise_initialization import (
     NOISE_FLOOR,
@@ -217,17 +218,19 @@ def log_odds(rho: Float) -> Float:
 
 
 def solved_posterior(
-    state: SolverState, i: int, step: StepInput, manifold: Manifold, gains: Float
+    state: SolverState, i: int, step: StepInput, manifold: Manifold, result: ComponentMarginals
 ) -> ComponentPosterior:
-    """Return the posterior of the i-th row; `gains` are those of removing each component."""
+    """Return the posterior of the i-th row, whose active components have these marginals."""
     evaluation, K, n = state.evaluation, int(state.evaluation.K[i]), int(state.n_known[i])
     slot = evaluation.components.slot[i, :K]
     memory = Components(state.removed.memory.packed[i : i + 1, :, :n].copy())
     memory.packed[0][:, slot] = evaluation.components.packed[i, :, :K]
     mu, variance = memory.mu[0], memory.variance[0]
+    marginal, stated = variance.copy(), variance.copy()
+    marginal[slot], stated[slot] = result.variance[i, :K], result.stated_variance[i, :K]
     amplitude, evidence = np.zeros(n, dtype=np.complex128), np.full(n, -np.inf)
     amplitude[slot] = mean_amplitudes(evaluation.W[i, :, :K], step.power)
-    evidence[slot] = -gains[i, :K]
+    evidence[slot] = result.log_odds[i, :K]
     age = np.ones(n, dtype=np.int64)
     age[: step.n_tracked] = step.age + 1
     age[age > MAX_AGE] = -1
@@ -237,8 +240,9 @@ def solved_posterior(
     snr_db = (1 - SNR_WEIGHT) * state.snr_db[i] + SNR_WEIGHT * newest
     return ComponentPosterior(
         theta=front_angles(manifold, mu),
-        resultant=np.exp(-variance / 2),
+        resultant=np.exp(-stated / 2),
         kappa=1 / variance,
+        marginal_kappa=1 / marginal,
         active=age == 0,
         age=age,
         amplitude=amplitude,

@@ -22,6 +22,7 @@ ROUNDING = 1e-7  # nats
 # Shares of the step of the angles, and of the logarithms of their variances, which in full can
 # decrease F however short the step of the angles.
 BACKTRACKING = ((1 / 4, 1.0), (1 / 16, 1.0), (1 / 64, 1.0), (1 / 16, 1 / 16), (1 / 256, 1 / 256))
+MIN_FREEDOM_SHARE = 0.15  # of the data, that is left for the noise
 MIN_RELATIVE_CURVATURE = 1e-3  # smaller eigenvalues are clipped to this fraction of the largest
 
 
@@ -142,15 +143,15 @@ def update_variances(response: ExpectedResponse, old: Evaluation) -> Evaluation:
     nearer to it. Where F decreases the EM step (58) is taken, for which it cannot.
     """
     M, N = old.Y.shape[2:]
-    K, ratio, T = old.K[:, None], old.nu / old.tau, response.tempering
+    K, ratio = old.K[:, None], old.nu / old.tau
     w2 = over_snapshots(old.W.real**2 + old.W.imag**2)
     energy = w2.sum(axis=2)
-    trace = (diagonals(old.G).real * old.used[:, None]).sum(axis=2)
+    trace = amplitude_traces(old)
     # ‖Y‖² - 2 Re tr HᴴŴ + tr ŴᴴJŴ, since JŴ = H - ν/τ Ŵ and ‖Y‖² = M N
     E = M * N - old.explained - ratio * energy
     gamma = N * (K - ratio * trace)  # N tr JG
-    S = np.minimum((w2 * old.uncertainty_loss).sum(axis=2), 0.5 * T * K * old.nu)
-    freedom = np.maximum(M * N - gamma - S / old.nu, 0.15 * M * N)
+    S = uncertainty_losses(response, old, w2)
+    freedom = np.maximum(M * N - gamma - S / old.nu, MIN_FREEDOM_SHARE * M * N)
     nu = np.maximum((E - S) / freedom, response.noise_floor)
     # τ = Σ (|ŵ|² + ν G) / N K   (59)
     tau = (energy + N * old.nu * trace) / np.maximum(N * K, 1)
@@ -163,6 +164,28 @@ def update_variances(response: ExpectedResponse, old: Evaluation) -> Evaluation:
         tau = floored(response, part, em, tau[worse])
         new = new.replace_rows(worse, with_variances(response, part, em, tau))
     return new
+
+
+def noise_freedom(response: ExpectedResponse, evaluation: Evaluation) -> Float:
+    """Return the complex degrees of freedom left for the noise of each bin, (B, F)."""
+    M, N = evaluation.Y.shape[2:]
+    w2 = over_snapshots(evaluation.W.real**2 + evaluation.W.imag**2)
+    ratio = evaluation.nu / evaluation.tau
+    gamma = N * (evaluation.K[:, None] - ratio * amplitude_traces(evaluation))
+    S = uncertainty_losses(response, evaluation, w2)
+    freedom = M * N - gamma - S / evaluation.nu
+    return np.asarray(np.maximum(freedom, MIN_FREEDOM_SHARE * M * N))
+
+
+def amplitude_traces(evaluation: Evaluation) -> Float:
+    """Return tr G of the used slots, (B, F)."""
+    return np.asarray((diagonals(evaluation.G).real * evaluation.used[:, None]).sum(axis=2))
+
+
+def uncertainty_losses(response: ExpectedResponse, evaluation: Evaluation, w2: Float) -> Float:
+    """Return the power lost by uncertain angles, (B, F), at most half of all the amplitudes'."""
+    most = 0.5 * response.tempering * evaluation.K[:, None] * evaluation.nu
+    return np.asarray(np.minimum((w2 * evaluation.uncertainty_loss).sum(axis=2), most))
 
 
 def floored(response: ExpectedResponse, old: Evaluation, nu: Float, tau: Float) -> Float:

@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.messages import shown
-from arrivals.motion_models.base import LinearMotionModel
-from arrivals.motion_models.combined import block_diagonal
-from arrivals.motion_models.companion_form import (
+from arrivals.motion_models.autoregressive.companion_form import (
     CompanionLayout,
     companion_layout,
     pole_radius,
     solve_lyapunov,
 )
+from arrivals.motion_models.base import LinearMotionModel
+from arrivals.motion_models.combined import block_diagonal
 from arrivals.typing import Complex, Float
 from arrivals.validation import items, one_of, positive, real, state, time_step
 

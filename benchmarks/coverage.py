@@ -1,0 +1,67 @@
+"""Coverage of the stated deviations and reliability of the stated existence, tracker by tracker.
+
+    python benchmarks/coverage.py [--runs 20] [--seed 0] [TRACKER ...]
+
+Each tracker on scenes of its own kind: share of errors within the stated 68 and 95 % intervals,
+the squared error over the stated variance (NEES), and the calibration error (ECE) of the existence.
+"""
+
+import argparse
+import warnings
+from typing import Any
+
+import numpy as np
+
+from arrivals.scenarios import create
+from arrivals.scenarios.experiments.workers import parallel_map
+from arrivals.scenarios.metrics import METRICS
+
+COLUMNS = ("coverage68", "coverage95", "nees", "ece")
+SCENES: dict[str, list[tuple[str, dict[str, Any]]]] = {
+    "svalse": [("walk", {"n_sources": 4}), ("svalse_fig6", {})],
+    "valse": [("walk", {"n_sources": 4}), ("svalse_fig6", {})],
+    "sbl": [("walk", {}), ("svalse_fig6", {})],
+    "ssbl": [("walk", {}), ("svalse_fig6", {})],
+    "peaks_gnn": [("walk", {}), ("svalse_fig6", {})],
+    "interpolation_ekf": [("interpolation_tone", {}), ("interpolation_band", {})],
+    "ar_kalman_qrd_rls": [("ar_fig1", {}), ("ar_fig4", {})],
+    "rss_vb": [("rss_table1_k3", {}), ("rss_crossing", {})],
+    "rss_ml": [("rss_table1_k3", {}), ("rss_crossing", {})],
+}
+
+
+def measure(tracker: str, scene: str, parameters: dict[str, Any], seed: int) -> list[float]:
+    """Return the figures of one run; NaN where the tracker does not state what they need."""
+    trial = create(scene, **parameters).sample(np.random.default_rng(seed))
+    values = []
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        run = trial.tracker(tracker).run(trial.measurements)
+    for name in COLUMNS:
+        try:
+            values.append(METRICS[name](trial, run))
+        except ValueError:
+            values.append(np.nan)
+    return values
+
+
+def main() -> None:
+    """Print a table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("trackers", nargs="*", metavar="TRACKER")
+    parser.add_argument("--runs", type=int, default=20)
+    parser.add_argument("--seed", type=int, default=0)
+    arguments = parser.parse_args()
+    print(f"{'tracker':18} {'scene':34}", *(f"{name:>11}" for name in COLUMNS))
+    for tracker in arguments.trackers or SCENES:
+        for scene, parameters in SCENES[tracker]:
+            jobs = [(tracker, scene, parameters, arguments.seed + n) for n in range(arguments.runs)]
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", RuntimeWarning)  # means of nothing but NaN
+                means = np.nanmean(np.array(parallel_map(measure, jobs)), axis=0)
+            label = f"{scene} {parameters or ''}"
+            print(f"{tracker:18} {label:34}", *(f"{value:11.3f}" for value in means), flush=True)
+
+
+if __name__ == "__main__":
+    main()

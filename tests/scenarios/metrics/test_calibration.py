@@ -1,0 +1,119 @@
+"""Reliability of stated existence, scenes for coverage, their study and plots."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from arrivals.plots.calibration import plot_coverage, plot_reliability
+from arrivals.scenarios import create, monte_carlo, reliability
+from arrivals.scenarios.metrics import METRICS
+from arrivals.scenarios.reproduce.studies import reproduce
+from arrivals.scenarios.reproduce.svalse import calibration
+
+statements = st.lists(st.tuples(st.floats(0, 1), st.booleans()), min_size=1, max_size=60)
+
+
+@given(statements, st.integers(1, 12))
+def test_scores_equal_their_definitions(pairs: list[tuple[float, bool]], bins: int) -> None:
+    p, y = (np.array(each, dtype=float) for each in zip(*pairs, strict=True))
+    result = reliability(p, y.astype(bool), bins=bins)
+    assert result.brier == pytest.approx(np.mean((p - y) ** 2), abs=1e-12)
+    assert result.table.count.sum() == len(p)
+    total = result.table.count @ result.table.stated
+    assert total == pytest.approx(p.sum())
+    assert result.table.count @ result.table.observed == pytest.approx(y.sum())
+    distance = np.abs(result.table.observed - result.table.stated)
+    assert result.ece == pytest.approx(result.table.count @ distance / len(p))
+    assert result.ece >= abs(p.mean() - y.mean()) - 1e-12
+
+
+def test_true_probabilities_are_reliable() -> None:
+    rng = np.random.default_rng(0)
+    p = rng.random(20_000)
+    result = reliability(p, rng.random(20_000) < p)
+    assert result.ece < 0.02
+    assert result.brier == pytest.approx(1 / 6, abs=0.01)  # the mean of p (1 - p)
+    assert result.log_score == pytest.approx(0.5, abs=0.01)
+
+
+def test_no_statement_has_no_score() -> None:
+    result = reliability([], np.zeros(0, dtype=bool))
+    assert np.isnan([result.ece, result.brier, result.log_score]).all()
+    assert result.table.count.size == 0
+
+
+@pytest.mark.parametrize(
+    ("existence", "hit", "message"),
+    [
+        ([0.5, 1.5], [True, True], r"existence must lie in \[0, 1\]; got \[1.5\]"),
+        ([0.5, np.nan], [True, True], r"existence must lie in \[0, 1\]; got \[nan\]"),
+        ([0.5], [True, True], r"existence and hit must have one shape"),
+        ([0.5], [0.3], "hit must hold True or False"),
+    ],
+)
+def test_bad_statements_are_refused(existence: list[float], hit: list[float], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        reliability(existence, hit)
+
+
+def test_metrics_of_a_study() -> None:
+    names = ["ece", "brier", "log_score", "coverage50", "coverage68", "coverage90", "coverage95"]
+    study = monte_carlo(create("walk", n_steps=20), ["svalse"], runs=2, metrics=names)
+    values = [study.mean(name, "svalse") for name in names]
+    assert values[0] < 0.1
+    assert (np.diff(values[3:]) >= 0).all()
+
+
+def test_existence_that_is_not_stated_is_refused() -> None:
+    trial = create("walk", n_steps=20).sample(np.random.default_rng(0))
+    run = trial.tracker("music").run(trial.measurements)
+    with pytest.raises(ValueError, match="does not estimate probabilities of existence"):
+        METRICS["ece"](trial, run)
+
+
+def test_walks_take_steps_of_their_deviation_within_bounds() -> None:
+    trial = create("walk", n_sources=10, n_steps=400).sample(np.random.default_rng(0))
+    doa = np.rad2deg(trial.truth)
+    assert np.abs(doa).max() <= 75
+    assert np.diff(np.sort(doa[0])).min() >= 12
+    assert np.diff(doa, axis=0).std() == pytest.approx(1.5, rel=0.05)
+
+
+def test_switching_sources_follow_the_chain() -> None:
+    trial = create("switch", n_steps=3000).sample(np.random.default_rng(0))
+    active = ~np.isnan(trial.truth)
+    started = active[1:][~active[:-1]].mean()
+    stopped = 1 - active[1:][active[:-1]].mean()
+    assert [started, stopped] == pytest.approx([0.1, 0.25], abs=0.01)
+    assert active[0].all()
+
+
+def test_too_many_walks_are_refused() -> None:
+    with pytest.raises(ValueError, match="n_sources must be at most 10; got 11"):
+        create("walk", n_sources=11)
+
+
+def test_study_writes_table_claims_and_figures(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scenes = [calibration.SCENES[0], calibration.SCENES[-1]]
+    monkeypatch.setattr(calibration, "SCENES", scenes)
+    written = reproduce("calibration", tmp_path, runs=2)
+    names = {path.name for path in written}
+    assert {"calibration.csv", "calibration-coverage.png", "calibration-reliability.png"} <= names
+    page = (tmp_path / "calibration.md").read_text()
+    assert page.count("| walk") == 2
+    assert "existence at 10 dB and more" in page
+
+
+def test_plots_show_shares_and_intervals() -> None:
+    table = reliability([0.9] * 8 + [0.2] * 2, [True] * 7 + [False] * 3).table
+    ax = plot_reliability(table, label="some")
+    assert len(ax.containers) == 1
+    plot_reliability(table, label="others", ax=ax)
+    assert len(ax.containers) == 2
+    with pytest.raises(ValueError, match="covered must have one share for each of 2 levels"):
+        plot_coverage({"walk": [0.5]}, [0.5, 0.9])

@@ -1,0 +1,171 @@
+"""Marginal variances of the angles and odds of existence, at the end of a step.
+
+The ELBO has the variance of each angle with all other angles held, `Components.variance`. The
+marginal ones follow from the joint Hessian of all angles; the noise, which the ELBO takes as
+known, is integrated out of what is reported. Neither is put back into the ELBO.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from arrivals.trackers.svalse.newton.elbo import Evaluation
+from arrivals.trackers.svalse.newton.expected_response import (
+    ExpectedResponse,
+    diagonals,
+    over_snapshots,
+)
+from arrivals.trackers.svalse.newton.step import (
+    MAX_ANGLE_VARIANCE,
+    negative_hessian,
+    noise_freedom,
+    slopes,
+    weights,
+)
+from arrivals.typing import Complex, Float
+
+MIN_EIGENVALUE = 1e-3  # of the Hessian scaled to a unit diagonal
+MIN_FREEDOM = 2.0  # degrees of freedom of a t distribution below which the table ends
+NORMAL_QUANTILES = (0.99445788, 1.95996398)  # at 84 and 97.5 %
+
+
+@dataclass(frozen=True, eq=False)
+class ComponentMarginals:
+    """What is kept and reported of the components of each problem, (B, L).
+
+    Attributes
+    ----------
+    variance : ndarray
+        Marginal variances of the angles with known noise, rad²: the motion model widens them.
+    stated_variance : ndarray
+        Those with unknown noise, rad²: the reported ones.
+    log_odds : ndarray
+        Log odds of existence, the noise integrated out, nats.
+    """
+
+    variance: Float
+    stated_variance: Float
+    log_odds: Float
+
+
+def marginals(
+    response: ExpectedResponse, evaluation: Evaluation, kl_weight: float
+) -> ComponentMarginals:
+    """Return the marginals of the components of each problem."""
+    freedom = 2 * noise_freedom(response, evaluation)
+    w2 = evaluation.W.real**2 + evaluation.W.imag**2
+    variance = marginal_variances(response, evaluation)
+    factor = noise_factor(evaluation, w2, freedom)
+    return ComponentMarginals(
+        variance,
+        stated_variances(evaluation, variance, factor),
+        existence_log_odds(response, evaluation, w2, freedom, kl_weight),
+    )
+
+
+def marginal_variances(response: ExpectedResponse, evaluation: Evaluation) -> Float:
+    """Return the diagonal of N⁻¹, rad², (B, L): the Laplace approximation, noise known.
+
+    N is the negative Hessian of F with the amplitudes eliminated; eigenvalues below
+    `MIN_EIGENVALUE`, after scaling to a unit diagonal, are clipped.
+    """
+    v, P = weights(evaluation)
+    curvature = slopes(response, evaluation, v, P)[1]
+    used = evaluation.used
+    N = negative_hessian(response, evaluation, P, curvature)
+    N = np.where(used[:, :, None] & used[:, None, :], N, 0.0)
+    diagonals(N)[...] += ~used
+    # R = N / (d d'),  d_l = √max(N_ll, 1/0.3)
+    d = np.sqrt(np.maximum(diagonals(N), 1 / MAX_ANGLE_VARIANCE))
+    eigenvalues, V = np.linalg.eigh(N / (d[:, :, None] * d[:, None, :]))
+    # v_l = Σ V_li² / λ_i / d_l²
+    variance = (V**2 / np.maximum(eigenvalues, MIN_EIGENVALUE)[:, None, :]).sum(axis=2) / d**2
+    return np.asarray(np.minimum(variance, MAX_ANGLE_VARIANCE))
+
+
+def noise_factor(evaluation: Evaluation, w2: Float, freedom: Float) -> Float:
+    """Return by how much unknown noise widens the variances that the data give, (B, L).
+
+    Parameters
+    ----------
+    evaluation : Evaluation
+    w2 : ndarray, shape (B, F, L, N)
+        Powers of the amplitudes' means.
+    freedom : ndarray, shape (B, F)
+        Real degrees of freedom left for the noise of each bin.
+    """
+    share = w2 / evaluation.nu[:, :, None, None]
+    total = np.maximum(share.sum(axis=(1, 3)), 1e-300)
+    # ω_f: share of each bin in the information;  n = 1/Σω²,  d = Σ ω_f d_f
+    weight = share.sum(axis=3) / total[:, None]
+    n_bins = 1 / np.maximum((weight**2).sum(axis=1), 1e-300)
+    d = (weight * freedom[:, :, None]).sum(axis=1)
+    m = np.maximum(d, 4.0)
+    # f = c(d n) (m/(m-2))^(2(1-1/n)) g
+    factor = student_factor(d * n_bins) * (m / (m - 2)) ** (2 * (1 - 1 / n_bins))
+    if w2.shape[3] > 1:
+        factor = factor * (share * snapshot_noise(evaluation)).sum(axis=(1, 3)) / total
+    return np.where(evaluation.used & (share.sum(axis=(1, 3)) > 0), factor, 1.0)
+
+
+def snapshot_noise(evaluation: Evaluation) -> Float:
+    """Return the residual power of each snapshot over the mean of its bin, (B, F, 1, N)."""
+    residual: Complex = evaluation.Y - evaluation.A.swapaxes(2, 3) @ evaluation.W
+    power = (residual.real**2 + residual.imag**2).sum(axis=2, keepdims=True)
+    return np.asarray(power / np.maximum(power.mean(axis=3, keepdims=True), 1e-300))
+
+
+def student_factor(freedom: Float) -> Float:
+    """Return c(d), the variance of a normal density that covers as a t of d degrees does.
+
+    The geometric mean of the squared ratios of the quantiles at 68 and 95 % coverage.
+
+    Examples
+    --------
+    >>> student_factor(np.array([4.0, 8.0, 24.0])).round(3)
+    array([1.616, 1.254, 1.075])
+    """
+    inverse, factor = _student_table()
+    return np.interp(1 / np.maximum(freedom, MIN_FREEDOM), inverse, factor)
+
+
+@cache
+def _student_table() -> tuple[Float, Float]:
+    """Return 1/d and c(d) at 256 points."""
+    from scipy.special import stdtrit
+
+    inverse = np.linspace(0.0, 1 / MIN_FREEDOM, 256)
+    d = 1 / np.maximum(inverse, 1e-12)
+    ratios = [stdtrit(d, p) / z for p, z in zip((0.84, 0.975), NORMAL_QUANTILES, strict=True)]
+    return inverse, np.asarray(ratios[0] * ratios[1])
+
+
+def stated_variances(evaluation: Evaluation, variance: Float, factor: Float) -> Float:
+    """Return the reported variances, rad²: the data's information divided by `factor`.
+
+    v = [p + max(1/v - p, 0)/f]⁻¹, where p is the prior's part of the information.
+    """
+    prior = evaluation.prior_gradient.real
+    information = prior + np.maximum(1 / variance - prior, 0.0) / factor
+    return np.asarray(1 / np.maximum(information, 1 / MAX_ANGLE_VARIANCE))
+
+
+def existence_log_odds(
+    response: ExpectedResponse, evaluation: Evaluation, w2: Float, freedom: Float, kl_weight: float
+) -> Float:
+    """Return the log odds of existence with the noise integrated out, (B, L).
+
+    A component of power q in units of its own noise, with n complex degrees of freedom left for
+    the noise, counts (n + N) ln(1 + q/n) nats instead of q.
+    """
+    N = w2.shape[3]
+    C = evaluation.nu[:, :, None] * evaluation.G.diagonal(axis1=2, axis2=3).real
+    C = np.where(evaluation.used[:, None], C, 1.0)
+    q, n = over_snapshots(w2) / C, freedom[:, :, None] / 2
+    # ln r/(1-r) = 1/T Σ (n+N) ln(1 + q/n) - N ln τ/C  +  ln ρ/(1-ρ) - c D
+    by_bin = (n + N) * np.log1p(q / n) - N * np.log(evaluation.tau[:, :, None] / C)
+    prior = evaluation.components.log_odds - kl_weight * evaluation.D
+    return np.asarray(response.total(by_bin) + prior)
