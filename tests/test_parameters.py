@@ -73,7 +73,7 @@ def test_set_params_reaches_a_nested_tracker() -> None:
         (
             {"kappa": 1.0},
             ValueError,
-            "SVALSE has no parameter 'kappa'; it has: engine, measurement, memory, motion",
+            "SVALSE has no parameter 'kappa'; it has: carry_existence, engine, meas",
         ),
         ({"motion__kapa": 1.0}, ValueError, "BernoulliVonMises has no parameter 'kapa'"),
         ({"memory__x": 1.0}, ValueError, "memory of SVALSE has no parameters of its own"),

@@ -32,7 +32,7 @@ class ReliabilityTable:
 class Reliability:
     """Reliability of stated probabilities.
 
-    Attributes
+    Parameters
     ----------
     ece : float
         Expected calibration error: mean distance of stated and observed shares over the bins,
@@ -42,6 +42,12 @@ class Reliability:
     log_score : float
         Mean negative log likelihood, nats.
     table : ReliabilityTable
+        Statements, stated and observed shares by bins.
+
+    Examples
+    --------
+    >>> reliability([0.8, 0.8, 0.8, 0.8], [True, True, True, False]).table.observed
+    array([0.75])
     """
 
     ece: float

@@ -247,6 +247,7 @@ def with_modes(
     prior_kappa = np.concatenate([p.kappa[on] for p, on in zip(priors, first, strict=True)])
     prior_variance = 1 / np.maximum(prior_kappa, MIN_KAPPA)
     modes = np.concatenate([p.modes[:, on] for p, on in zip(priors, first, strict=True)], axis=1)
+    modes = walk.renewed(modes, prior_variance)
     theta, active = (
         np.concatenate([getattr(q, name)[:m] for q, m in zip(posteriors, n, strict=True)])
         for name in ("theta", "active")

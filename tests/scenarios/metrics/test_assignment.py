@@ -124,18 +124,19 @@ def test_metrics_of_a_perfect_run() -> None:
     perfect = type(run)(
         run.kind,
         {name: np.tile(v[:, :1], (1, n)) if v.ndim > 1 else v for name, v in run.fields.items()}
-        | {"doa": trial.truth, "label": np.tile(np.arange(n), (4, 1)), "std": np.ones((4, n))},
+        | {"doa": trial.truth, "label": np.tile(np.arange(n), (4, 1)), "std": np.ones((4, n))}
+        | {"existence": np.where(np.isnan(trial.truth), np.nan, 1.0)},
         run.x,
         (~np.isnan(trial.truth)).sum(axis=1),
         run.time,
         run.elapsed,
     )
     values = {name: metric(trial, perfect) for name, metric in METRICS.items()}
-    assert values == {
-        "gospa": 0, "distance": 0, "missed": 0, "false": 0, "rmse": 0, "ospa": 0,
-        "cardinality": 0, "nees": 0, "coverage68": 1, "coverage95": 1, "label_switches": 0,
-        "track_length": 4, "converged": values["converged"],
-    }  # fmt: skip
+    zeros = dict.fromkeys(["gospa", "distance", "missed", "false", "rmse", "ospa", "nees"], 0)
+    zeros |= dict.fromkeys(["cardinality", "ece", "brier", "log_score", "label_switches"], 0)
+    covered = dict.fromkeys(["coverage50", "coverage68", "coverage90", "coverage95"], 1)
+    counts = {"track_length": 4, "converged": values["converged"]}
+    assert values == pytest.approx(zeros | covered | counts)
 
 
 def test_inapplicable_metrics_report_the_reason() -> None:

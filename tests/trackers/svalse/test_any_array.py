@@ -137,8 +137,9 @@ def test_fourier_and_electrical_form_of_a_line_agree(reference: Any) -> None:
 def test_whole_posterior_and_von_mises_density_of_a_line_agree() -> None:
     """Specification, section 11: 5.57 and 5.57 on Fig. 4; its directions are unambiguous."""
     trial = create("svalse_fig4", n_steps=6).sample(np.random.default_rng(1))
-    one = trial.tracker("svalse", engine="coordinate").run(trial.measurements)
-    other = trial.tracker("svalse", memory="posterior").run(trial.measurements)
+    never = trial.motion.replace(still=0.0)  # stops
+    one = trial.tracker("svalse", engine="coordinate", motion=never).run(trial.measurements)
+    other = trial.tracker("svalse", memory="posterior", motion=never).run(trial.measurements)
     np.testing.assert_allclose(np.sort(other.doa[:, :4]), np.sort(one.doa[:, :4]), atol=0.05)
 
 
@@ -223,9 +224,13 @@ def test_one_frequency_a_step_is_ambiguous_until_others_follow() -> None:
     for seed in range(2):
         trial = scene.sample(np.random.default_rng(seed))
         for form, totals in result.items():
-            run = trial.tracker(
-                "svalse", solver=NewtonSolver(max_iterations=60), **forms[form]
-            ).run(trial.measurements)
+            tracker = trial.tracker(
+                "svalse",
+                motion=trial.motion.replace(still=0.0),
+                solver=NewtonSolver(max_iterations=60),
+                **forms[form],
+            )
+            run = tracker.run(trial.measurements)
             late = mean_gospa(np.rad2deg(trial.truth[10:]), np.rad2deg(run.doa[10:]), c=10.0)
             totals.append(late.total)
     assert np.mean(result["fast"]) < 1.0
