@@ -200,7 +200,7 @@ def yka2012(folder: Path) -> None:
     steps, after = frames.values[:, :, ::2], frames.time - 72
     model = ArraySnapshot(array, [2000.0, 1000.0, 2000 / 3], n_snapshots=4,
                           slowness=np.linspace(0.03, 0.15, 10).tolist())  # fmt: skip
-    motion = BernoulliVonMises(sigma_doa=np.deg2rad(3.0))
+    motion = BernoulliVonMises(sigma_doa=np.deg2rad(3.0), still=0.1)
     recorded: dict[str, Any] = {"tempering": 4.0, "max_snr_db": 10.0}
     tempered, untempered = (
         SVALSE(model, motion, solver=NewtonSolver(snr_db=10.0, **settings))
@@ -264,7 +264,7 @@ def packets(folder: Path) -> list[Packets]:
 def bluetooth(folder: Path) -> None:
     """Single emitters, one packet a step; then sums of packets of several emitters."""
     model = ArraySnapshot(SensorArray.uca(8, radius=0.0596), wavelength=0.123)
-    motion = BernoulliVonMises(sigma_doa=np.deg2rad(2.0))
+    motion = BernoulliVonMises(sigma_doa=np.deg2rad(2.0), still=0.1)
     places = packets(folder)
     figures = "3.6, 89 %; 0.63", "3.6, 90 %; 0.77", "3.6, 90 %; 0.77"
     for name, specified in zip(METHODS, figures, strict=True):

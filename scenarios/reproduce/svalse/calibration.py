@@ -1,13 +1,16 @@
-"""Calibration of SVALSE: coverage of its intervals and reliability of its existence."""
+"""Calibration of SVALSE: coverage of its intervals and reliability of its existence.
+
+Each scene is tracked twice: as the scenario says, and with a walk that never stops.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from arrivals.scenarios.base import Trial
 from arrivals.scenarios.experiments.workers import parallel_map
 from arrivals.scenarios.metrics.calibration import Reliability, reliability
 from arrivals.scenarios.metrics.consistency import circular_nees, coverage
@@ -15,6 +18,8 @@ from arrivals.scenarios.metrics.registry import METRICS, existence_and_hits, pai
 from arrivals.scenarios.registry import create
 from arrivals.scenarios.reproduce.claims import verdict
 from arrivals.scenarios.reproduce.studies import Report
+from arrivals.scenarios.reproduce.svalse.calibration_scenes import SCENES, CalibrationScene
+from arrivals.trackers.run import Run
 from arrivals.typing import Bool, Float
 
 if TYPE_CHECKING:
@@ -22,52 +27,6 @@ if TYPE_CHECKING:
 
 LEVELS = (0.50, 0.68, 0.90, 0.95)
 SETTLED = 5  # steps after which errors count
-
-
-@dataclass(frozen=True, eq=False)
-class CalibrationScene:
-    """One scene: scenario, signal-to-noise ratio, parameters, limits of coverage.
-
-    Parameters
-    ----------
-    scenario : str
-    snr_db : float
-    parameters : dict
-    limits : tuple of four float, or None
-        Lowest and highest coverage of the 68 % interval, then of the 95 % interval.
-    """
-
-    scenario: str
-    snr_db: float
-    parameters: dict[str, Any] = field(default_factory=dict)
-    limits: tuple[float, float, float, float] | None = None
-
-    @property
-    def label(self) -> str:
-        """Name of the scene."""
-        details = [f"{name} {value}" for name, value in self.parameters.items()]
-        return ", ".join([self.scenario.removeprefix("svalse_"), *details, f"{self.snr_db:g} dB"])
-
-
-HONEST = (0.65, 0.71, 0.93, 0.97)
-ON_CIRCLES = (0.65, 0.71, 0.925, 0.97)
-CONSERVATIVE = (0.65, 0.87, 0.93, 0.985)  # some sources stand still
-SCENES = [
-    CalibrationScene("walk", 20.0, limits=HONEST),
-    CalibrationScene("walk", 20.0, {"n_sources": 4}, HONEST),
-    CalibrationScene("switch", 20.0, limits=HONEST),
-    CalibrationScene("circle", 20.0, {"n_snapshots": 10}, ON_CIRCLES),
-    CalibrationScene("circle", 20.0, {"n_bins": 10}, ON_CIRCLES),
-    CalibrationScene("circle", 10.0, {"n_bins": 10}, ON_CIRCLES),
-    CalibrationScene("circle", 20.0),
-    *(
-        CalibrationScene(f"svalse_{figure}", snr_db, limits=CONSERVATIVE)
-        for figure in ("fig4", "fig5", "fig6")
-        for snr_db in (10.0, 20.0, 40.0)
-    ),
-    *(CalibrationScene(f"svalse_fig{n}", 0.0) for n in (4, 5, 6)),
-    CalibrationScene("walk", 0.0, {"n_sources": 4}),
-]
 
 
 class Statements(NamedTuple):
@@ -90,11 +49,37 @@ class Statements(NamedTuple):
     gospa: Float
 
 
-def statements(scene: CalibrationScene, seed: int, tracker: str = "svalse") -> Statements:
-    """Return the statements of one run."""
+class Paired(NamedTuple):
+    """Statements of the scenario's tracker, and of one with a walk that never stops.
+
+    Attributes
+    ----------
+    default, never_stops : Statements
+    """
+
+    default: Statements
+    never_stops: Statements
+
+
+Pooled = Mapping[CalibrationScene, Paired]
+
+
+def paired(scene: CalibrationScene, seed: int) -> Paired:
+    """Return the statements of both trackers on the data of one seed."""
     scenario = create(scene.scenario, snr_db=scene.snr_db, **scene.parameters)
     trial = scenario.sample(np.random.default_rng(seed))
-    run = trial.tracker(tracker).run(trial.measurements)
+    motion: Any = trial.tracker_arguments()["motion"]
+    each = (motion, motion.replace(still=0.0))
+    return Paired(
+        *(
+            statements(trial, trial.tracker("svalse", motion=m).run(trial.measurements))
+            for m in each
+        )
+    )
+
+
+def statements(trial: Trial, run: Run) -> Statements:
+    """Return what was stated in a run."""
     pairs = pairs_of(trial, run)
     late = pairs.step >= SETTLED
     std = run.fields["std"][pairs.step, pairs.slot]
@@ -106,30 +91,35 @@ def statements(scene: CalibrationScene, seed: int, tracker: str = "svalse") -> S
 def calibration(runs: int, seed: int) -> Report:
     """Coverage, NEES, reliability and GOSPA of SVALSE in every scene."""
     jobs = [(scene, seed + n) for scene in SCENES for n in range(runs)]
-    each = parallel_map(statements, jobs)
+    each = parallel_map(paired, jobs)
     pooled = {
-        scene: _pooled(each[n * runs : (n + 1) * runs]) for n, scene in enumerate(SCENES)
-    }  # fmt: skip
+        scene: Paired(
+            *(_pooled(parts) for parts in zip(*each[n * runs : (n + 1) * runs], strict=True))
+        )
+        for n, scene in enumerate(SCENES)
+    }
     columns = ("scene", "50 %", "68 %", "90 %", "95 %", "NEES", "GOSPA", "ECE", "Brier",
-               "log score")  # fmt: skip
+               "log score", "68 %, never stops", "95 %, never stops", "GOSPA, change",
+               "its error")  # fmt: skip
     remarks = (
         "Share of errors within the stated intervals, %, of estimates within 10 degrees of a "
         f"source, from step {SETTLED} on; NEES is the squared error over the stated variance. "
         "GOSPA in degrees, cut-off 10. ECE, Brier and log score compare the stated existence "
-        "with the share of estimates within 10 degrees of a source.",
+        "with the share of estimates within 10 degrees of a source. 'Never stops': by a walk that "
+        "never stops, `still=0`; the change of GOSPA from that to the default is paired, with its "
+        "standard error.",
         *claims(pooled),
     )
-    figures = _figures(pooled)
     return Report(
         f"SVALSE: stated deviations and existence over {runs} runs",
         columns,
         [_row(scene, result) for scene, result in pooled.items()],
         remarks,
-        figures,
+        _figures(pooled),
     )
 
 
-def _pooled(parts: list[Statements]) -> Statements:
+def _pooled(parts: Sequence[Statements]) -> Statements:
     return Statements(*(np.concatenate(values) for values in zip(*parts, strict=True)))
 
 
@@ -138,54 +128,83 @@ def shares(result: Statements) -> list[float]:
     return [coverage(result.error, result.std, level) for level in LEVELS]
 
 
-def _row(scene: CalibrationScene, result: Statements) -> tuple[Any, ...]:
-    r = reliability(result.existence, result.hit)
-    covered = [100 * share for share in shares(result)]
-    nees = circular_nees(result.error, result.std)
-    gospa = float(result.gospa.mean())
-    return (scene.label, *covered, nees, gospa, r.ece, r.brier, r.log_score)
+def change(result: Paired) -> tuple[float, float]:
+    """Return the paired change of GOSPA due to a walk that may stand still, and its error."""
+    difference = result.default.gospa - result.never_stops.gospa
+    n = len(difference)
+    return float(difference.mean()), float(difference.std(ddof=1) / np.sqrt(n)) if n > 1 else np.nan
 
 
-def at_least_10_db(pooled: Mapping[CalibrationScene, Statements]) -> Reliability:
-    """Return the reliability of all scenes at 10 dB and more, pooled."""
-    loud = [result for scene, result in pooled.items() if scene.snr_db >= 10]
-    all_of_them = _pooled(loud)
-    return reliability(all_of_them.existence, all_of_them.hit)
+def _row(scene: CalibrationScene, result: Paired) -> tuple[Any, ...]:
+    stated = result.default
+    r = reliability(stated.existence, stated.hit)
+    covered = [100 * share for share in shares(stated)]
+    nees = circular_nees(stated.error, stated.std)
+    gospa = float(stated.gospa.mean())
+    _, c68, _, c95 = shares(result.never_stops)
+    before = (100 * c68, 100 * c95, *change(result))
+    return (scene.label, *covered, nees, gospa, r.ece, r.brier, r.log_score, *before)
 
 
-def claims(pooled: Mapping[CalibrationScene, Statements]) -> list[str]:
-    """Return the verdicts on coverage and reliability."""
+def reliability_of(pooled: Pooled, loud: bool) -> Reliability:
+    """Return the reliability of all scenes at 10 dB and more, or below, pooled."""
+    parts = [result.default for scene, result in pooled.items() if (scene.snr_db >= 10) == loud]
+    together = _pooled(parts)
+    return reliability(together.existence, together.hit)
+
+
+def claims(pooled: Pooled) -> list[str]:
+    """Return the verdicts on coverage, GOSPA and reliability."""
+    return [
+        *(line for scene, result in pooled.items() for line in _claims_of(scene, result)),
+        *_claims_of_existence(pooled),
+    ]
+
+
+def _claims_of(scene: CalibrationScene, result: Paired) -> list[str]:
     lines = []
-    for scene, result in pooled.items():
-        if scene.limits is None:
-            continue
-        low68, high68, low95, high95 = scene.limits
-        _, c68, _, c95 = shares(result)
-        text = f"{scene.label}: coverage within {low68:.0%} to {high68:.0%} and {low95:.1%} to {high95:.1%}"  # noqa: E501
-        holds = low68 <= c68 <= high68 and low95 <= c95 <= high95
-        lines.append(verdict(text, holds, f"{c68:.1%} and {c95:.1%}"))
-    loud = at_least_10_db(pooled)
-    for name, value, limit in (
-        ("ECE", loud.ece, 0.05), ("Brier score", loud.brier, 0.007),
-        ("log score", loud.log_score, 0.04),
-    ):  # fmt: skip
-        text = f"existence at 10 dB and more, pooled: {name} below {limit:g}"
-        lines.append(verdict(text, value < limit, f"{value:.4f}"))
+    for limits, stated, note in (
+        (scene.limits, result.default, ""),
+        (scene.never_stops, result.never_stops, " by a walk that never stops"),
+    ):
+        if limits is not None:
+            _, c68, _, c95 = shares(stated)
+            text = f"{scene.label}: coverage{note} within {limits}"
+            lines.append(verdict(text, limits.holds(c68, c95), f"{c68:.1%} and {c95:.1%}"))
+    if scene.change is not None:
+        mean, error = change(result)
+        text = f"{scene.label}: GOSPA changes by at most {scene.change:+g} degrees"
+        lines.append(verdict(text, mean <= scene.change, f"{mean:+.2f} ± {error:.2f}"))
     return lines
 
 
-def _figures(pooled: Mapping[CalibrationScene, Statements]) -> dict[str, Figure]:
+def _claims_of_existence(pooled: Pooled) -> list[str]:
+    parts = {scene.label: result.default for scene, result in pooled.items() if scene.snr_db >= 10}
+    eces = {label: reliability(p.existence, p.hit).ece for label, p in parts.items()}
+    worst = max(eces, key=lambda label: eces[label])
+    text = "existence in every scene at 10 dB and more: ECE below 0.05"
+    lines = [verdict(text, eces[worst] < 0.05, f"at most {eces[worst]:.3f}: {worst}")]
+    loud = reliability_of(pooled, loud=True)
+    for name, value, limit in (
+        ("Brier score", loud.brier, 0.007),
+        ("log score", loud.log_score, 0.04),
+    ):
+        text = f"existence at 10 dB and more, pooled: {name} at most {limit:g}"
+        lines.append(verdict(text, value <= limit, f"{value:.4f}"))
+    return lines
+
+
+def _figures(pooled: Pooled) -> dict[str, Figure]:
     """Draw the coverage of every scene, and two reliability diagrams."""
     from matplotlib.figure import Figure
 
     from arrivals.plots.calibration import plot_coverage, plot_reliability
 
     first = Figure(figsize=(8.0, 6.0), layout="constrained")
-    labelled = {scene.label: shares(result) for scene, result in pooled.items()}
+    labelled = {scene.label: shares(result.default) for scene, result in pooled.items()}
     plot_coverage(labelled, LEVELS, ax=first.subplots())
     second = Figure(figsize=(5.0, 4.6), layout="constrained")
     ax = second.subplots()
-    plot_reliability(at_least_10_db(pooled).table, label="10 dB and more", ax=ax)
-    quiet = _pooled([result for scene, result in pooled.items() if scene.snr_db < 10])
-    plot_reliability(reliability(quiet.existence, quiet.hit).table, label="0 dB", ax=ax)
+    for label, loud in (("10 dB and more", True), ("0 dB", False)):
+        plot_reliability(reliability_of(pooled, loud).table, label=label, ax=ax)
     return {"coverage": first, "reliability": second}

@@ -12,6 +12,7 @@ from arrivals.scenarios import create, monte_carlo, reliability
 from arrivals.scenarios.metrics import METRICS
 from arrivals.scenarios.reproduce.studies import reproduce
 from arrivals.scenarios.reproduce.svalse import calibration
+from arrivals.scenarios.reproduce.svalse.calibration_scenes import SCENES
 
 statements = st.lists(st.tuples(st.floats(0, 1), st.booleans()), min_size=1, max_size=60)
 
@@ -99,8 +100,7 @@ def test_too_many_walks_are_refused() -> None:
 def test_study_writes_table_claims_and_figures(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    scenes = [calibration.SCENES[0], calibration.SCENES[-1]]
-    monkeypatch.setattr(calibration, "SCENES", scenes)
+    monkeypatch.setattr(calibration, "SCENES", [SCENES[0], SCENES[-1]])
     written = reproduce("calibration", tmp_path, runs=2)
     names = {path.name for path in written}
     assert {"calibration.csv", "calibration-coverage.png", "calibration-reliability.png"} <= names

@@ -1,0 +1,106 @@
+"""Scenes in which the statements of SVALSE are compared with the truth, with their limits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+Range = tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Coverage:
+    """Limits of the shares of errors within the stated 68 and 95 % intervals.
+
+    Parameters
+    ----------
+    share68, share95 : tuple of two float
+        Lowest and highest share.
+    """
+
+    share68: Range
+    share95: Range
+
+    def holds(self, share68: float, share95: float) -> bool:
+        """Return whether both shares are within the limits."""
+        (low68, high68), (low95, high95) = self.share68, self.share95
+        return low68 <= share68 <= high68 and low95 <= share95 <= high95
+
+    def __str__(self) -> str:
+        (low68, high68), (low95, high95) = self.share68, self.share95
+        return f"{low68:.0%} to {high68:.0%} and {low95:.1%} to {high95:.1%}"
+
+
+@dataclass(frozen=True, eq=False)
+class CalibrationScene:
+    """One scene, and what must hold in it.
+
+    Parameters
+    ----------
+    scenario : str
+    snr_db : float
+    parameters : dict
+        Of the scenario.
+    limits, never_stops : Coverage or None
+        Limits of the coverage of the tracker of the scenario, and of that with a walk that never
+        stops.
+    change : float or None
+        Highest paired change of GOSPA due to a walk that may stand still, degrees.
+    """
+
+    scenario: str
+    snr_db: float
+    parameters: dict[str, Any] = field(default_factory=dict)
+    limits: Coverage | None = None
+    never_stops: Coverage | None = None
+    change: float | None = None
+
+    @property
+    def label(self) -> str:
+        """Name of the scene."""
+        details = [f"{name} {value}" for name, value in self.parameters.items()]
+        return ", ".join([self.scenario.removeprefix("svalse_"), *details, f"{self.snr_db:g} dB"])
+
+
+HONEST = Coverage((0.65, 0.71), (0.93, 0.97))
+ON_CIRCLES = Coverage((0.65, 0.71), (0.925, 0.97))
+FEW_FREEDOM = {20.0: Coverage((0.66, 0.75), (0.91, 0.97)), 10.0: Coverage((0.60, 0.75), (0.90, 0.97))}  # fmt: skip  # noqa: E501
+SOME_STILL = Coverage((0.65, 0.80), (0.93, 0.975))
+CONSERVATIVE = Coverage((0.65, 0.87), (0.93, 0.985))
+FIGURE_CHANGES = {"fig4": -0.8, "fig5": -0.4, "fig6": -0.4}
+
+SCENES = [
+    CalibrationScene("walk", 20.0, {"n_sources": 1}, HONEST),
+    *(
+        CalibrationScene(
+            "walk", snr_db, {"n_sources": 4}, HONEST if snr_db == 20 else None, change=0.1
+        )
+        for snr_db in (10.0, 20.0, 40.0)
+    ),
+    CalibrationScene("switch", 20.0, limits=HONEST, change=0.1),
+    CalibrationScene("switch", 10.0, change=0.1),
+    *(
+        CalibrationScene("circle", snr_db, {}, FEW_FREEDOM[snr_db], change=0.0)
+        for snr_db in (20.0, 10.0)
+    ),
+    CalibrationScene("circle", 20.0, {"n_snapshots": 10}, ON_CIRCLES, change=0.0),
+    *(
+        CalibrationScene("circle", snr_db, {"n_bins": 10}, ON_CIRCLES, change=0.0)
+        for snr_db in (20.0, 10.0)
+    ),
+    *(
+        CalibrationScene(
+            f"svalse_{figure}",
+            snr_db,
+            limits=CONSERVATIVE,
+            never_stops=SOME_STILL,
+            change=change if snr_db == 20 else None,
+        )
+        for figure, change in FIGURE_CHANGES.items()
+        for snr_db in (10.0, 20.0, 40.0)
+    ),
+    CalibrationScene("svalse_scenario1", 20.0, change=-0.3),
+    CalibrationScene("svalse_scenario2", 20.0, change=-0.8),
+    *(CalibrationScene(f"svalse_{figure}", 0.0) for figure in FIGURE_CHANGES),
+    CalibrationScene("walk", 0.0, {"n_sources": 4}),
+]
