@@ -17,6 +17,7 @@ from arrivals.scenarios.simulations.line_arrays import (
     RandomPairsOff,
     SixSources,
     SixStatic,
+    StaticSources,
     ThreeStatic,
 )
 from arrivals.scenarios.simulations.moving_emitters import BirthsAndDeaths, CrossingSources
@@ -53,6 +54,7 @@ __all__ = [
     "RandomWalks",
     "SixSources",
     "SixStatic",
+    "StaticSources",
     "SpeechField",
     "SpeechOfOrderTwo",
     "SwitchingWalks",

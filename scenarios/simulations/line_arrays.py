@@ -7,6 +7,7 @@ in that step, so that the signal-to-noise ratio is the same in every snapshot.
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +17,7 @@ from arrivals.motion_models import BernoulliVonMises
 from arrivals.scenarios.base import Scenario, Trial
 from arrivals.scenarios.registry import register
 from arrivals.typing import Bool, Complex, Float
-from arrivals.validation import count, number
+from arrivals.validation import count, number, real
 
 
 @dataclass(frozen=True)
@@ -86,6 +87,36 @@ def complex_normal(rng: np.random.Generator, shape: tuple[int, ...]) -> Complex:
     """
     re, im = rng.standard_normal((2, *shape)) / np.sqrt(2)
     return np.asarray(re + 1j * im)
+
+
+@register("static")
+@dataclass(frozen=True)
+class StaticSources(LineScenario):
+    """Static sources at chosen directions.
+
+    Parameters
+    ----------
+    doas : sequence of float
+        Directions, degrees from broadside.
+
+    Examples
+    --------
+    >>> trial = StaticSources(doas=(-10.0, 20.0), n_steps=3).sample(np.random.default_rng(0))
+    >>> np.rad2deg(trial.truth[-1]).round(6)
+    array([-10.,  20.])
+    """
+
+    doas: Sequence[float] = (20.0,)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        doas = np.asarray(real("doas", self.doas))
+        if doas.ndim != 1 or not doas.size or not (np.abs(doas) <= 90).all():
+            raise ValueError(f"doas must be directions in [-90, 90] degrees; got {self.doas}")
+
+    def doa_deg(self) -> Float:
+        """Return the directions, degrees."""
+        return np.tile(np.asarray(self.doas, dtype=np.float64), (self.n_steps, 1))
 
 
 @register("svalse_scenario2")

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
+
+import numpy as np
 
 Range = tuple[float, float]
 
@@ -69,38 +72,49 @@ SOME_STILL = Coverage((0.65, 0.80), (0.93, 0.975))
 CONSERVATIVE = Coverage((0.65, 0.87), (0.93, 0.985))
 FIGURE_CHANGES = {"fig4": -0.8, "fig5": -0.4, "fig6": -0.4}
 
-SCENES = [
-    CalibrationScene("walk", 20.0, {"n_sources": 1}, HONEST),
-    *(
-        CalibrationScene(
-            "walk", snr_db, {"n_sources": 4}, HONEST if snr_db == 20 else None, change=0.1
-        )
-        for snr_db in (10.0, 20.0, 40.0)
-    ),
-    CalibrationScene("switch", 20.0, limits=HONEST, change=0.1),
-    CalibrationScene("switch", 10.0, change=0.1),
-    *(
-        CalibrationScene("circle", snr_db, {}, FEW_FREEDOM[snr_db], change=0.0)
-        for snr_db in (20.0, 10.0)
-    ),
-    CalibrationScene("circle", 20.0, {"n_snapshots": 10}, ON_CIRCLES, change=0.0),
-    *(
-        CalibrationScene("circle", snr_db, {"n_bins": 10}, ON_CIRCLES, change=0.0)
-        for snr_db in (20.0, 10.0)
-    ),
-    *(
-        CalibrationScene(
-            f"svalse_{figure}",
-            snr_db,
-            limits=CONSERVATIVE,
-            never_stops=SOME_STILL,
-            change=change if snr_db == 20 else None,
-        )
-        for figure, change in FIGURE_CHANGES.items()
-        for snr_db in (10.0, 20.0, 40.0)
-    ),
-    CalibrationScene("svalse_scenario1", 20.0, change=-0.3),
-    CalibrationScene("svalse_scenario2", 20.0, change=-0.8),
-    *(CalibrationScene(f"svalse_{figure}", 0.0) for figure in FIGURE_CHANGES),
-    CalibrationScene("walk", 0.0, {"n_sources": 4}),
-]
+BEAM = 2 / 15  # width of the beam in sine, 15 sensors half a wavelength apart
+
+
+def two_apart(beams: float) -> dict[str, Any]:
+    """Return the parameters of two static sources near broadside, some beam widths apart.
+
+    Examples
+    --------
+    >>> two_apart(0.5)
+    {'doas': (5.74, 9.59)}
+    """
+    sines = np.array([0.1, 0.1 + beams * BEAM])
+    return {"doas": tuple(np.rad2deg(np.arcsin(sines)).round(2).tolist())}
+
+
+def _scenes() -> Iterator[CalibrationScene]:
+    for snr_db in (10.0, 20.0, 40.0):
+        loud = snr_db == 20
+        honest = HONEST if loud else None
+        yield CalibrationScene("static", snr_db, never_stops=honest)
+        yield CalibrationScene("walk", snr_db, {"n_sources": 1}, honest)
+        yield CalibrationScene("walk", snr_db, {"n_sources": 4}, honest, change=0.1)
+        if snr_db < 40:
+            yield CalibrationScene("switch", snr_db, limits=honest, change=0.1)
+            few, data = FEW_FREEDOM[snr_db], ({"n_bins": 5}, {"n_bins": 10}, {"n_snapshots": 10})
+            yield CalibrationScene("circle", snr_db, {}, few, change=0.0)
+            for each in data:
+                yield CalibrationScene("circle", snr_db, each, ON_CIRCLES, change=0.0)
+    for figure, change in FIGURE_CHANGES.items():
+        for snr_db in (10.0, 20.0, 30.0, 40.0):
+            limit = change if snr_db == 20 else None
+            yield CalibrationScene(
+                f"svalse_{figure}", snr_db, {}, CONSERVATIVE, SOME_STILL, change=limit
+            )
+    for snr_db in (10.0, 20.0, 40.0):
+        for scenario, change in (("scenario1", -0.3), ("scenario2", -0.8)):
+            limit = change if snr_db == 20 else None
+            yield CalibrationScene(f"svalse_{scenario}", snr_db, change=limit)
+    for beams in (0.25, 0.5, 1.0, 2.0):
+        yield CalibrationScene("static", 20.0, two_apart(beams))
+    for figure in FIGURE_CHANGES:
+        yield CalibrationScene(f"svalse_{figure}", 0.0)
+    yield CalibrationScene("walk", 0.0, {"n_sources": 4})
+
+
+SCENES = list(_scenes())

@@ -1,6 +1,7 @@
 """Reliability of stated existence, scenes for coverage, their study and plots."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -117,3 +118,9 @@ def test_plots_show_shares_and_intervals() -> None:
     assert len(ax.containers) == 2
     with pytest.raises(ValueError, match="covered must have one share for each of 2 levels"):
         plot_coverage({"walk": [0.5]}, [0.5, 0.9])
+
+
+@pytest.mark.parametrize("doas", [(), 5.0, [[1.0, 2.0]], (91.0,), (np.nan,)])
+def test_static_directions_beyond_endfire_are_refused(doas: Any) -> None:
+    with pytest.raises(ValueError, match=r"doas must be directions in \[-90, 90\] degrees; got"):
+        create("static", doas=doas)
