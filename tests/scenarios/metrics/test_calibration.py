@@ -106,7 +106,7 @@ def test_study_writes_table_claims_and_figures(
     names = {path.name for path in written}
     assert {"calibration.csv", "calibration-coverage.png", "calibration-reliability.png"} <= names
     page = (tmp_path / "calibration.md").read_text()
-    assert page.count("| walk") == 2
+    assert page.count("0 dB | ") == 2
     assert "existence at 10 dB and more" in page
 
 
