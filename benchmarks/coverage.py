@@ -24,7 +24,15 @@ SCENES: dict[str, list[tuple[str, dict[str, Any]]]] = {
     "ssbl": [("walk", {}), ("svalse_fig6", {})],
     "peaks_gnn": [("walk", {}), ("svalse_fig6", {})],
     "interpolation_ekf": [("interpolation_tone", {}), ("interpolation_band", {})],
-    "ar_kalman_qrd_rls": [("ar_fig1", {}), ("ar_fig4", {})],
+    "ar_kalman_qrd_rls": [
+        ("ar_fig1", {}),
+        ("ar_fig5", {}),
+        ("ar_fig5", {"snr_db": 1.0}),
+        ("ar_fig6", {}),
+        ("ar_three_on_three", {}),
+        ("ar_fig4", {}),
+        ("ar_fig4", {"snr_db": 0.0}),
+    ],
     "rss_vb": [("rss_table1_k3", {}), ("rss_crossing", {})],
     "rss_ml": [("rss_table1_k3", {}), ("rss_crossing", {})],
 }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -74,12 +74,14 @@ class ArrayManifold(SingleSourceSnapshot):
                 f"from the centre; got {inner * self.wavelength:.6g} m: directions are ambiguous"
             )
 
-    @property
+    @cached_property
     def distances(self) -> Float:
         """Distances of the pairs from the centre in wavelengths, (n_pairs,), the inner first."""
         left, _, right = _pairs(self.array)
         positions = self.array.positions[:, 0]
-        return np.asarray((positions[right] - positions[left]) / (2 * self.wavelength))
+        distances = np.asarray((positions[right] - positions[left]) / (2 * self.wavelength))
+        distances.setflags(write=False)
+        return distances
 
     @property
     def n_pairs(self) -> int:
@@ -137,12 +139,12 @@ class ArrayManifold(SingleSourceSnapshot):
         d, given = 2 * np.pi * self.distances, np.asarray(phases, dtype=np.float64)
         if given.shape[-1:] != d.shape:
             raise ValueError(f"phases must have shape (..., {len(d)}); got {given.shape}")
-        phi = np.moveaxis(given, -1, 0)
-        num, den = d[0] * phi[0], d[0] ** 2  # equal noise in all phases: weights d²
-        for d_m, phi_m in zip(d[1:], phi[1:], strict=True):
+        num, den = d[0] * given[..., 0], d[0] ** 2  # equal noise in all phases: weights d²
+        for m, d_m in enumerate(d[1:], 1):
+            phi_m = given[..., m]
             turns = np.rint((d_m * num / den - phi_m) / (2 * np.pi))
             num, den = num + d_m * (phi_m + 2 * np.pi * turns), den + d_m**2
-        return np.asarray(np.arcsin(np.clip(num / den, -1.0, 1.0)))
+        return np.asarray(np.arcsin(np.minimum(np.maximum(num / den, -1.0), 1.0)))
 
     @property
     def dim_z(self) -> int:

@@ -120,8 +120,22 @@ def stabilised(coefficients: Float, limit: float = 0.995) -> Float:
     array([[0.995],
            [0.3  ]])
     """
+    lags = np.arange(1, coefficients.shape[-1] + 1)
+    if _all_inside(coefficients / limit**lags):
+        return coefficients  # the usual case, without eigenvalues
     shrink = np.minimum(limit / np.maximum(pole_radius(coefficients), limit), 1.0)
-    return np.asarray(coefficients * shrink[..., None] ** np.arange(1, coefficients.shape[-1] + 1))
+    return np.asarray(coefficients * shrink[..., None] ** lags)
+
+
+def _all_inside(a: Float) -> bool:
+    """Return True if all poles lie within the unit circle: all reflection coefficients do."""
+    while a.shape[-1]:
+        last = a[..., -1:]
+        if not (np.abs(last) < 1).all():
+            return False
+        # a_i <- (a_i + a_p a_(p-i)) / (1 - a_p²)
+        a = (a[..., :-1] + last * a[..., -2::-1]) / (1 - last * last)
+    return True
 
 
 def solve_lyapunov(F: Float, Q: Float) -> Float:

@@ -12,6 +12,10 @@ from numpy.typing import ArrayLike
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.motion_models.autoregressive.sources import AutoregressiveSources
 from arrivals.trackers.autoregressive.belief import SourceBelief
+from arrivals.trackers.autoregressive.direction_covariance import (
+    direction_std,
+    with_direction_covariance,
+)
 from arrivals.trackers.autoregressive.initialization import check_directions, manifold_of
 from arrivals.trackers.autoregressive.interval import finish_interval
 from arrivals.trackers.autoregressive.interval_filter import assumed_noise, filter_interval
@@ -47,6 +51,9 @@ class ARKalmanQRDRLS(BlockProcessor):
         None, the maximum-likelihood directions on a grid for the first 60 snapshots or so with
         power above the gate; all placements are tried: 210 of two sources, 2730 of three and
         32760 of four with different models.
+    doa_std : float
+        Standard deviation of `doa`, rad, if given: its errors count in `std` until later
+        snapshots outweigh it. The default is that of errors up to 5 degrees.
     interval : int
         N, snapshots of an interval.
     inner : int
@@ -80,7 +87,15 @@ class ARKalmanQRDRLS(BlockProcessor):
     all of it is missing. The belief changes at the end of an interval; if the last snapshot of it
     is missing, at the next `predict`. `dt` is the time between snapshots, in any unit.
 
-    Labels are the indices of the sources in `motion`. `std` is NaN. `existence` is 1 for a source
+    `std` counts the noise with the memory of the regression, and the errors of the first
+    directions; intervals without data add a random walk, that which makes λ the best forgetting, as
+    do those of inactive sources. Of still sources at 0 to 30 dB, 64 to 76 % of the errors lie
+    within it and 93 to 97 % within 1.96 of it (24 runs a scene). It does not count exchanged
+    labels, the bias without `correction`, nor the lag behind a moving source, since no rate is
+    estimated: 0.4 to 0.5 degrees for one that moves 40 degrees in 6000 snapshots, of whose errors
+    0, 17 and 76 % lie within the 95 % interval at 30, 10 and 0 dB.
+
+    Labels are the indices of the sources in `motion`. `existence` is 1 for a source
     active in the last interval and 0 for an inactive one if there is a gate, else NaN.
 
     A pair of sensors one of which is missing is left out of that snapshot; so is a snapshot 25 dB
@@ -126,6 +141,7 @@ class ARKalmanQRDRLS(BlockProcessor):
         motion: AutoregressiveSources = AutoregressiveSources(((0.0, 0.0), (0.0, 0.0))),  # noqa: B008  (models are immutable)
         *,
         doa: Sequence[float] | Float | None = None,
+        doa_std: float = 0.05,
         interval: int = 30,
         inner: int = 1,
         gate: float = 0.0,
@@ -136,6 +152,7 @@ class ARKalmanQRDRLS(BlockProcessor):
         self.measurement = instance("measurement", measurement, ArraySnapshot)
         self.motion = instance("motion", motion, AutoregressiveSources)
         self.doa, self.interval = doa, count("interval", interval, 1, 100_000)
+        self.doa_std = positive("doa_std", doa_std)
         self.inner, self.gate = count("inner", inner), not_negative("gate", gate)
         self.memory = positive("memory", memory)
         self.regression = instance("regression", regression, RegressionSettings)
@@ -212,6 +229,9 @@ class ARKalmanQRDRLS(BlockProcessor):
             )
         # inactive sources keep their directions; r and long-term powers
         new = finish_interval(belief, new, filtered, self.noise, self.gate, self.memory)
+        new = with_direction_covariance(
+            belief, new, filtered, model, self.manifold, regression.forgetting, self.inner
+        )
         return new, filtered.X
 
     def state_space(self, belief: SourceBelief, new: SourceBelief) -> StateSpace:
@@ -219,10 +239,6 @@ class ARKalmanQRDRLS(BlockProcessor):
         F, Q = self.layout.transition(new.a), self.layout.process_noise(new.q)
         A = transposed(self.manifold.real_steering(new.doa))
         return StateSpace(F, Q, A, assumed_noise(belief, self.noise))
-
-    def filter_states(self, belief: SourceBelief, y: Float) -> Float:
-        """Return the states in transformed snapshots under the models of `belief`."""
-        return filter_interval(belief, y, self.state_space(belief, belief), self.regression).X
 
     @property
     def estimate(self) -> SourceEstimate:
@@ -232,7 +248,7 @@ class ARKalmanQRDRLS(BlockProcessor):
             return SourceEstimate.empty(coefficients=np.zeros((0, p)))
         return SourceEstimate(
             doa=b.doa[0],
-            std=np.full(n, np.nan),
+            std=direction_std(b.covariance[0], b.doa[0]),
             existence=b.active[0].astype(float) if self.gate > 0 else np.full(n, np.nan),
             amplitude=self.motion.signals(self.x),
             label=np.arange(n),

@@ -18,6 +18,9 @@ from arrivals.trackers.autoregressive.qrd_rls import ridge_rows
 from arrivals.trackers.autoregressive.settings import RegressionSettings
 from arrivals.typing import Bool, Complex, Float, Int
 
+GRID_STD = float(np.deg2rad(5.0) / np.sqrt(12.0))  # rad, uniform in a cell of acquisition
+ACQUISITION = 60  # snapshots for the initial directions
+
 
 @dataclass(frozen=True, eq=False)
 class SourceBelief:
@@ -45,6 +48,10 @@ class SourceBelief:
         Triangular factors of the regressions for the AR coefficients.
     ar_weight : ndarray, shape (...)
         Σ λ_a^age of the samples in `ar_factor`.
+    covariance : ndarray, shape (..., n_sources, n_sources)
+        Covariance of the errors of sin θ.
+    sensitivity : ndarray, shape (..., n_sources, n, n)
+        E (x - mean) meanᵀ of the predicted state per error of the sine of each direction.
     active : ndarray of bool, shape (..., n_sources)
         Sources above the gate in the last interval.
     n : ndarray of int, shape (...)
@@ -61,12 +68,26 @@ class SourceBelief:
     manifold_factor: Float
     ar_factor: Float
     ar_weight: Float
+    covariance: Float
+    sensitivity: Float
     active: Bool
     n: Int
 
 
+def samples_needed(belief: SourceBelief | None, interval: int) -> int:
+    """Return the number of snapshots processed next: an interval, or those of acquisition.
+
+    Examples
+    --------
+    >>> samples_needed(None, 25)
+    75
+    """
+    return interval * (1 if belief is not None else -(-ACQUISITION // interval))
+
+
 def initialize_belief(
     doa: Float,
+    std: float,
     x: Float,
     P: Float,
     motion: AutoregressiveSources,
@@ -79,6 +100,8 @@ def initialize_belief(
     ----------
     doa : ndarray, shape (n_batch, n_sources)
         Directions, rad.
+    std : float
+        Their standard deviation, rad.
     x, P : ndarray, shape (n_batch, n_parts, n), (n_batch, n, n)
     motion : AutoregressiveSources
     manifold : ArrayManifold
@@ -93,6 +116,9 @@ def initialize_belief(
     target = np.delete(manifold.real_steering(doa), manifold.centre, axis=-1)
     ridge = np.broadcast_to(regression.ar_ridge * power[..., None], a.shape)
     rows = ridge_rows(ridge, a[..., None])
+    # var sin(θ + ε) = cos² θ σ² + sin² θ σ⁴ / 2
+    u = np.sin(doa)
+    variance = (1 - u * u) * std**2 + u * u * std**4 / 2
     return SourceBelief(
         x=x,
         P=P,
@@ -104,6 +130,8 @@ def initialize_belief(
         manifold_factor=ridge_rows(regression.ridge * power, target),
         ar_factor=np.concatenate([rows, np.zeros_like(rows[..., :1, :])], axis=-2),
         ar_weight=np.zeros(n_batch),
+        covariance=variance[..., None] * np.eye(doa.shape[-1]),
+        sensitivity=np.zeros((*doa.shape, *P.shape[1:])),
         active=np.ones(doa.shape, dtype=np.bool_),
         n=np.zeros(n_batch, dtype=np.int64),
     )

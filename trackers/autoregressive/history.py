@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 
 from arrivals.motion_models.autoregressive.sources import AutoregressiveSources
 from arrivals.trackers.autoregressive.belief import SourceBelief, to_state_vector
+from arrivals.trackers.autoregressive.direction_covariance import direction_std
 from arrivals.trackers.autoregressive.snapshots import completes_interval
 from arrivals.trackers.estimates import SourceEstimate
 from arrivals.trackers.run import Run
 from arrivals.typing import Complex, Int
 
-FIELDS = ("x", "doa", "a", "q", "r", "active")
+FIELDS = ("x", "doa", "a", "q", "r", "active", "covariance")
 
 
 class History:
@@ -59,6 +60,7 @@ class History:
             "x": np.zeros((*lead, self.motion.dim_x)),
             "a": np.full((*lead, K, p), np.nan),
             "r": np.full(lead, np.nan),
+            "covariance": np.full((*lead, K, K), np.nan),
         }
 
     @property
@@ -77,7 +79,7 @@ class History:
         amplitude[~detected] = complex(np.nan, np.nan)
         fields = {
             "doa": column["doa"],
-            "std": np.full((n_steps, K), np.nan),
+            "std": direction_std(column["covariance"], column["doa"]),
             "existence": column["active"] if self.gated else np.full((n_steps, K), np.nan),
             "amplitude": amplitude,
             "label": np.where(detected[:, None], np.arange(K), -1),

@@ -6,6 +6,7 @@ All arrays have leading batch axes, as in `belief`.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -35,8 +36,14 @@ class FilteredInterval:
         λ and λ_a to the power of the number of snapshots with valid data.
     covariance, ar_covariance : ndarray, shape (..., n, n)
         Covariances of the states, summed with the squares of these weights.
-    missing_covariance : ndarray, shape (..., n_sources, n_sensors)
-        The same sum over the samples that a sensor misses, times its response.
+    missing_covariance : ndarray, shape (..., n, n_sensors)
+        Covariance with the sources, the same sum over the samples that a sensor misses, times its
+        response.
+    precision : ndarray, shape (..., n_sensors, n_sensors)
+        r S⁻¹ = I - A P_ss Aᵀ / r of the innovations, mean with the squares of `weights`; zero where
+        a sensor misses a sample.
+    has_pairs : ndarray of bool, shape (...)
+        True with data of a pair of sensors.
     noise : ndarray, shape (...)
         Mean of E|y - A s|² given the measurements; NaN without measurements.
     """
@@ -51,6 +58,8 @@ class FilteredInterval:
     covariance: Float
     ar_covariance: Float
     missing_covariance: Float
+    precision: Float
+    has_pairs: Bool
     noise: Float
 
 
@@ -78,7 +87,7 @@ def merge_batches(
     """Return the results of the members in `mask` and of the others as those of the batch."""
     fields = {}
     for name, value in vars(first).items():
-        merged = np.empty((len(mask), *value.shape[1:]))
+        merged = np.empty((len(mask), *value.shape[1:]), value.dtype)
         merged[mask], merged[~mask] = value, getattr(second, name)
         fields[name] = merged
     return FilteredInterval(**fields)
@@ -90,19 +99,32 @@ def filter_complete(
     """Filter an interval without missing data at the steady gain."""
     X, P = steady_filter(belief.x, belief.P, y, model)
     A, n_parts, k = model.A, belief.x.shape[-2], model.A.shape[-1]
-    valid = np.ones((*y.shape[:-2], y.shape[-2] // n_parts))
-    w, decay = forgetting_weights(valid, regression.forgetting)
-    v, ar_decay = forgetting_weights(valid, regression.ar_forgetting)
+    lead, n = y.shape[:-2], y.shape[-2] // n_parts
+    w, decay, sum_w = complete_weights(lead, n, regression.forgetting)
+    v, ar_decay, sum_v = complete_weights(lead, n, regression.ar_forgetting)
     errors = y - X[..., :k] @ transposed(A)
-    variance = (A @ P[..., :k, :k] * A).sum(axis=(-2, -1)) / A.shape[-2]
+    APA = A @ P[..., :k, :k] @ transposed(A)
+    variance = np.einsum("...ii->...", APA) / A.shape[-2]
     noise = n_parts * (errors * errors).mean(axis=(-2, -1)) + variance
     return FilteredInterval(
         X, P, y, w, decay, v, ar_decay,
-        (w * w).sum(axis=-1)[..., None, None] * P,
-        (v * v).sum(axis=-1)[..., None, None] * P,
-        np.zeros((*A.shape[:-2], k, A.shape[-2])),
+        sum_w * P,
+        sum_v * P,
+        np.zeros((*P.shape[:-1], A.shape[-2])),
+        np.eye(A.shape[-2]) - APA / model.r,
+        np.ones(lead, dtype=np.bool_),
         noise * (2 / n_parts),
     )  # fmt: skip
+
+
+@lru_cache(maxsize=64)
+def complete_weights(
+    lead: tuple[int, ...], n: int, forgetting: float
+) -> tuple[Float, Float, Float]:
+    """Return `forgetting_weights` of n valid samples, and the sum of their squares (..., 1, 1)."""
+    w, decay = forgetting_weights(np.ones((*lead, n)), forgetting)
+    w.setflags(write=False)
+    return w, decay, (w * w).sum(axis=-1)[..., None, None]
 
 
 def filter_with_gaps(
@@ -112,7 +134,7 @@ def filter_with_gaps(
     X, Ps = exact_filter(belief.x, belief.P, y, model)
     A, n_parts, k = model.A, belief.x.shape[-2], model.A.shape[-1]
     samples = y.reshape(*y.shape[:-2], -1, n_parts, y.shape[-1])
-    valid = np.isfinite(samples).all(axis=-2)
+    valid: Bool = np.asarray(np.isfinite(samples).all(axis=-2))
     any_valid = np.asarray(valid.any(axis=-1), dtype=np.float64)
     w, decay = forgetting_weights(any_valid, regression.forgetting)
     v, ar_decay = forgetting_weights(any_valid, regression.ar_forgetting)
@@ -123,12 +145,20 @@ def filter_with_gaps(
     variance = np.einsum("...mk,...jkl,...ml->...jm", A, P_s, A)
     n = valid.sum(axis=(-2, -1))
     noise = ((errors + variance) * valid).sum(axis=(-2, -1)) / np.where(n > 0, n, np.nan)
+    # V - V A P_ss Aᵀ V / r, V the valid sensors
+    H = valid[..., None] * A[..., None, :, :]
+    precision = (
+        valid[..., None] * np.eye(A.shape[-2]) - H @ P_s @ transposed(H) / model.r[..., None]
+    )
+    share = w * w / np.maximum((w * w).sum(axis=-1, keepdims=True), np.finfo(np.float64).tiny)
     missing = (w * w)[..., None] * ~valid
     return FilteredInterval(
         X, Ps[..., -1, :, :], y, w, decay, v, ar_decay,
         np.einsum("...j,...jkl->...kl", w * w, Ps),
         np.einsum("...j,...jkl->...kl", v * v, Ps),
-        np.einsum("...jm,...jkl,...ml->...km", missing, P_s, A),
+        np.einsum("...jm,...jkl,...ml->...km", missing, Ps[..., :k], A),
+        np.einsum("...j,...jkl->...kl", share, precision),
+        np.asarray(np.delete(valid, A.shape[-2] // 2, axis=-1).any(axis=(-2, -1))),
         noise * (2 / n_parts),
     )  # fmt: skip
 

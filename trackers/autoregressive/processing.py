@@ -17,17 +17,21 @@ from arrivals.measurements import rows
 from arrivals.motion_models.autoregressive.companion_form import CompanionLayout, companion_layout
 from arrivals.motion_models.autoregressive.sources import AutoregressiveSources
 from arrivals.trackers.autoregressive.belief import (
+    GRID_STD,
     SourceBelief,
     initialize_belief,
     repeat_belief,
+    samples_needed,
     to_internal,
     to_signals,
     to_state_covariance,
     to_state_vector,
 )
+from arrivals.trackers.autoregressive.direction_covariance import with_acquisition_errors
 from arrivals.trackers.autoregressive.history import History
 from arrivals.trackers.autoregressive.initialization import acquire_directions, manifold_of
 from arrivals.trackers.autoregressive.interval import SILENCE
+from arrivals.trackers.autoregressive.interval_filter import filter_interval
 from arrivals.trackers.autoregressive.settings import RegressionSettings
 from arrivals.trackers.autoregressive.snapshots import (
     MISSING,
@@ -36,29 +40,17 @@ from arrivals.trackers.autoregressive.snapshots import (
     to_snapshots,
     without_clicks,
 )
+from arrivals.trackers.autoregressive.steady_state import StateSpace
 from arrivals.trackers.base import Tracker
 from arrivals.trackers.run import Run
 from arrivals.typing import Complex, Float
 from arrivals.validation import covariance, positive, real, shaped
 
-ACQUISITION = 60  # snapshots for the initial directions
-
-
-def samples_needed(belief: SourceBelief | None, interval: int) -> int:
-    """Return the number of snapshots processed next: an interval, or those of acquisition.
-
-    Examples
-    --------
-    >>> samples_needed(None, 25)
-    75
-    """
-    return interval * (1 if belief is not None else -(-ACQUISITION // interval))
-
 
 class BlockProcessor(Tracker):
     """Bookkeeping of intervals: pending snapshots, acquisition, runs and batches.
 
-    A method defines `update_interval` and `filter_states`.
+    A method defines `update_interval` and `state_space`.
 
     Attributes
     ----------
@@ -73,6 +65,7 @@ class BlockProcessor(Tracker):
     measurement: ArraySnapshot
     motion: AutoregressiveSources
     doa: Sequence[float] | Float | None
+    doa_std: float
     interval: int
     gate: float
     regression: RegressionSettings
@@ -82,8 +75,8 @@ class BlockProcessor(Tracker):
         """Return the belief after an interval of transformed snapshots, and the states."""
 
     @abstractmethod
-    def filter_states(self, belief: SourceBelief, y: Float) -> Float:
-        """Return the states in transformed snapshots under the models of `belief`."""
+    def state_space(self, belief: SourceBelief, new: SourceBelief) -> StateSpace:
+        """Return F, Q (3) and A_T (5) of `new`, and r of `belief`."""
 
     def restart(self) -> None:
         """Discard all data, and start again from `doa` and the models."""
@@ -178,21 +171,26 @@ class BlockProcessor(Tracker):
     ) -> SourceBelief | None:
         """Process a block of intervals; the first block once it contains usable data."""
         y = self._rows(z, belief)
-        belief = self.initial_belief(y) if belief is None else belief
-        if belief is None:
+        start = self.initial_belief(y) if (first := belief is None) else belief
+        if start is None:
             history.signals.append(self._no_signals(z))
             return None
+        belief = start
         for part in np.split(y, z.shape[1] // self.interval, axis=1):
             belief, X = self.update_interval(belief, part)
-            history.add(belief, end)
             history.signals.append(to_signals(X, self.motion.n_parts, self.motion.n_sources))
+        if first:
+            model, manifold = self.state_space(start, start), self.manifold
+            belief = with_acquisition_errors(start, belief, y, model, manifold, self.regression)
+        history.add(belief, end)
         return belief
 
     def _provisional_signals(self, belief: SourceBelief | None, z: Complex) -> Complex:
         """Return the signals in snapshots that do not fill an interval yet."""
         if belief is None or z.shape[1] == 0:
             return self._no_signals(z)
-        X = self.filter_states(belief, self._rows(z, belief))
+        model = self.state_space(belief, belief)
+        X = filter_interval(belief, self._rows(z, belief), model, self.regression).X
         return to_signals(X, self.motion.n_parts, self.motion.n_sources)
 
     def _no_signals(self, z: Complex) -> Complex:
@@ -215,12 +213,13 @@ class BlockProcessor(Tracker):
             usable = self.usable_rows(y)
             if usable is None:
                 return None
-            doa = np.array([acquire_directions(r, self.motion, self.manifold) for r in usable])
+            std, manifold = GRID_STD, self.manifold
+            doa = np.array([acquire_directions(r, self.motion, manifold) for r in usable])
         else:
-            doa = np.tile(real("doa", self.doa), (n, 1))
+            std, doa = self.doa_std, np.tile(real("doa", self.doa), (n, 1))
         x, P = to_internal(self.x, self.P, self.motion)
         x, P = (np.repeat(value[None], n, axis=0) for value in (x, P))
-        return initialize_belief(doa, x, P, self.motion, self.manifold, self.regression)
+        return initialize_belief(doa, std, x, P, self.motion, self.manifold, self.regression)
 
     def usable_rows(self, y: Float) -> list[Float] | None:
         """Return the complete rows of each sequence; None if a sequence has no usable ones.

@@ -43,9 +43,10 @@ def ridge_rows(weight: ArrayLike, target: Float) -> Float:
         Solution without data.
     """
     n = target.shape[-2]
-    eye = np.broadcast_to(np.eye(n), (*target.shape[:-1], n))
     root = np.sqrt(np.asarray(weight, dtype=np.float64))[..., None]
-    return np.asarray(root * np.concatenate([eye, target], axis=-1))
+    rows = np.empty((*target.shape[:-1], n + target.shape[-1]))
+    rows[..., :n], rows[..., n:] = root * np.eye(n), root * target
+    return rows
 
 
 def forgetting_weights(valid: Float, forgetting: float) -> tuple[Float, Float]:

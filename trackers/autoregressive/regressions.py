@@ -5,6 +5,8 @@ All arrays have leading batch axes, as in `belief`.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from arrivals.measurement_models.manifolds.symmetric_line import ArrayManifold
@@ -29,12 +31,11 @@ def estimate_directions(
 ) -> tuple[Float, Float]:
     """Return the factor of the regression for the rows of A_T, and the directions: (6), (7)."""
     k, n_parts, centre = A.shape[-1], belief.x.shape[-2], manifold.centre
-    target = np.delete(transposed(A), centre, axis=-1)  # the row of ones is never estimated
+    target = without(transposed(A), centre)  # the row of ones is never estimated
     # [√λ^N [R | U]; w_j [s_j | y_j]; [Lᵀ | 0]; √(μ (1 - λ^N)) [I | A_Tᵀ]]   (3.2)
     w = np.repeat(filtered.weights, n_parts, axis=-1)[..., None]
-    y = np.delete(filtered.y, centre, axis=-1)
     old = np.sqrt(filtered.decay)[..., None, None] * belief.manifold_factor
-    stack = [old, w * np.concatenate([filtered.X[..., :k], y], axis=-1)]
+    stack = [old, w * without(filtered.y, centre, filtered.X[..., :k])]
     if regression.correction:
         stack.append(covariance_rows(filtered, k, centre))
     ridge = regression.ridge * (1 - filtered.decay)[..., None] * belief.power
@@ -64,14 +65,27 @@ def covariance_rows(filtered: FilteredInterval, k: int, centre: int) -> Float:
     Where a sensor misses samples, the same errors are in the expected values in their place.
     """
     L = cholesky_root(filtered.covariance[..., :k, :k])
-    missing = np.linalg.solve(L, np.delete(filtered.missing_covariance, centre, axis=-1))
-    return np.concatenate([transposed(L), missing], axis=-1)
+    missing = filtered.missing_covariance[..., :k, :]
+    if missing.any():
+        missing = np.asarray(np.linalg.solve(L, missing), dtype=np.float64)
+    return without(missing, centre, transposed(L))
+
+
+def without(rows: Float, column: int, *before: Float) -> Float:
+    """Return rows without a column, after others."""
+    return np.concatenate([*before, rows[..., :column], rows[..., column + 1 :]], axis=-1)
 
 
 def cholesky_root(C: Float) -> Float:
     """Return a matrix L with L Lᵀ = C, for C made slightly more than positive semidefinite."""
-    eye = np.eye(C.shape[-1])
-    return np.asarray(np.linalg.cholesky(C * (1 + 1e-12 * eye) + TINY * eye))
+    scale, offset = _loading(C.shape[-1])
+    return np.asarray(np.linalg.cholesky(C * scale + offset))
+
+
+@lru_cache(maxsize=64)
+def _loading(n: int) -> tuple[Float, Float]:
+    eye = np.eye(n)
+    return 1 + 1e-12 * eye, TINY * eye
 
 
 def estimate_ar_models(
