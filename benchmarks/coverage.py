@@ -2,8 +2,9 @@
 
     python benchmarks/coverage.py [--runs 20] [--seed 0] [TRACKER ...]
 
-Each tracker on scenes of its own kind: share of errors within the stated 68 and 95 % intervals,
-the squared error over the stated variance (NEES), and the calibration error (ECE) of the existence.
+Each tracker on scenes of its own kind (a `doa_deg` of None is drawn from the tracker's prior):
+share of errors within the stated 68 and 95 % intervals, the squared error over the stated variance
+(NEES), and the calibration error (ECE) of the existence.
 """
 
 import argparse
@@ -23,7 +24,12 @@ SCENES: dict[str, list[tuple[str, dict[str, Any]]]] = {
     "sbl": [("walk", {}), ("svalse_fig6", {})],
     "ssbl": [("walk", {}), ("svalse_fig6", {})],
     "peaks_gnn": [("walk", {}), ("svalse_fig6", {})],
-    "interpolation_ekf": [("interpolation_tone", {}), ("interpolation_band", {})],
+    "interpolation_ekf": [
+        (f"interpolation_{source}", {"doa_deg": None, "variant": variant})
+        for source, variants in (("tone", ("B", "C", "D", "E2")), ("band", ("C", "D", "E2")))
+        for variant in variants
+    ]
+    + [("interpolation_tone", {"doa_deg": 60.0}), ("interpolation_band", {"doa_deg": 60.0})],
     "ar_kalman_qrd_rls": [
         ("ar_fig1", {}),
         ("ar_fig5", {}),
@@ -40,11 +46,19 @@ SCENES: dict[str, list[tuple[str, dict[str, Any]]]] = {
 
 def measure(tracker: str, scene: str, parameters: dict[str, Any], seed: int) -> list[float]:
     """Return the figures of one run; NaN where the tracker does not state what they need."""
+    settings: dict[str, Any] = {}
+    parameters = dict(parameters)
+    if "variant" in parameters:
+        settings["variant"] = parameters.pop("variant")
+    if parameters.get("doa_deg", 0.0) is None:
+        # the tracker's prior: sin β ~ N(0, 15°²)
+        sine = np.random.default_rng([seed, 1]).normal(0.0, np.deg2rad(15.0))
+        parameters["doa_deg"] = float(np.rad2deg(np.arcsin(sine)))
     trial = create(scene, **parameters).sample(np.random.default_rng(seed))
     values = []
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
-        run = trial.tracker(tracker).run(trial.measurements)
+        run = trial.tracker(tracker, **settings).run(trial.measurements)
     for name in COLUMNS:
         try:
             values.append(METRICS[name](trial, run))

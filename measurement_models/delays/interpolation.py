@@ -14,7 +14,7 @@ from arrivals.measurement_models.base import MeasurementModel
 from arrivals.measurement_models.delays.band_filter import BandFilter
 from arrivals.measurement_models.delays.source_correlation import SourceCorrelation
 from arrivals.parameters import FrozenModel
-from arrivals.typing import Float
+from arrivals.typing import Float, Int
 from arrivals.validation import count, instance, items, not_negative, positive, real
 
 
@@ -80,6 +80,7 @@ class DelayInterpolator(FrozenModel):
     r0: Float = field(init=False, repr=False, compare=False)
     noise: Float | float = field(init=False, repr=False, compare=False)
     G: Float = field(init=False, repr=False, compare=False)
+    shifts: Int = field(init=False, repr=False, compare=False)  # `offsets` as an array
 
     def __post_init__(self) -> None:
         instance("correlation", self.correlation, SourceCorrelation)  # type: ignore[type-abstract]  # any
@@ -98,7 +99,8 @@ class DelayInterpolator(FrozenModel):
                 f"loading must be at least 1e-9 for {len(offsets)} taps on this source; got "
                 f"{self.loading}: the correlation matrix is singular"
             )
-        for name, matrix in (("r0", r0), ("noise", noise), ("G", np.linalg.inv(r))):
+        matrices = {"r0": r0, "noise": noise, "G": np.linalg.inv(r), "shifts": np.array(offsets)}
+        for name, matrix in matrices.items():
             matrix.setflags(write=False)
             object.__setattr__(self, name, matrix)
 
@@ -134,7 +136,7 @@ class DelayInterpolator(FrozenModel):
 
     def _lags(self, tau: ArrayLike) -> Float:
         tau = np.asarray(tau, dtype=np.float64)
-        return np.asarray(tau[..., None] - np.array(self.offsets, dtype=np.float64))
+        return np.asarray(tau[..., None] - self.shifts)
 
     def _solved(self, p: Float) -> Float:
         return np.asarray((p[..., None, :] @ self.G)[..., 0, :])
@@ -229,7 +231,8 @@ class InterpolationDelay(MeasurementModel):
         k : int, optional
             Number of a snapshot; the last one with all taps if None.
         """
-        frames = np.atleast_2d(real("frames", frames))
+        if type(frames) is not np.ndarray or frames.dtype != np.float64 or frames.ndim < 2:
+            frames = np.atleast_2d(real("frames", frames))
         k = frames.shape[-2] - 1 - self.latency if k is None else k
         if not self.memory <= k < frames.shape[-2] - self.latency:
             raise ValueError(
@@ -237,8 +240,7 @@ class InterpolationDelay(MeasurementModel):
             )
         n, m = self.dim_z, self.baseline
         first, source = (m, 0) if m > 0 else (0, -m)
-        at = k - np.array(self.interpolator.offsets)
-        taps = np.take(frames[..., source : source + n], at, axis=-2)
+        taps = frames[..., source : source + n].take(k - self.interpolator.shifts, axis=-2)
         return frames[..., k, first : first + n], np.swapaxes(taps, -1, -2)
 
     def linearise(self, delay: ArrayLike) -> tuple[Float, Float]:

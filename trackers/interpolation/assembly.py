@@ -9,7 +9,7 @@ import numpy as np
 from arrivals.measurement_models.delays.delay_line import SourceAtCentre
 from arrivals.motion_models.base import MotionModel
 from arrivals.parameters import FrozenModel
-from arrivals.trackers.interpolation.gating import gate_limit, updated_misfit
+from arrivals.trackers.interpolation.gating import gate_limit, updated_misfit, widened
 from arrivals.trackers.interpolation.updates import (
     DelayObservation,
     JointUpdate,
@@ -17,9 +17,35 @@ from arrivals.trackers.interpolation.updates import (
     predict,
     transition,
 )
-from arrivals.typing import Float
+from arrivals.typing import Bool, Float
 
 MAX_INITIAL_STD = 0.12  # over κ: standard deviation of the delay at the start of a joint filter
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorCovariance:
+    """Covariance of the error of the delay and its rate, beside the filter's own.
+
+    Attributes
+    ----------
+    P : ndarray, shape (..., dim_x, dim_x)
+        The filter's own, to which M belongs.
+    M : ndarray, shape (..., n, n), or None
+        None where it is that of P.
+    """
+
+    P: Float
+    M: Float | None = None
+
+    @property
+    def variance(self) -> Float:
+        """Variance of the error of the delay."""
+        return np.asarray((self.P if self.M is None else self.M)[..., 0, 0])
+
+    def of(self, P: Float) -> ErrorCovariance:
+        """Return the same if it belongs to P; else P is the only one that is known."""
+        known = P is self.P or np.array_equal(P, self.P)
+        return self if known else ErrorCovariance(P)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +109,11 @@ class FilterAssembly(FrozenModel):
             P[self.n_delay :, self.n_delay :] = self.source.covariance
         return x, P
 
+    def initial_error(self, P: Float) -> ErrorCovariance:
+        """Return the covariance of the error before the first snapshot."""
+        pairwise, n = isinstance(self.stage(1), PairwiseUpdate), self.n_delay
+        return ErrorCovariance(P, P[:n, :n].copy() if pairwise else None)
+
     def linearize(
         self, x: Float, P: Float, frames: Float, n: int, misfit: Float
     ) -> DelayObservation:
@@ -101,6 +132,29 @@ class FilterAssembly(FrozenModel):
         if self.acquire is not None and n == self.acquisition:
             x, P = self._replay(x, P, frames[..., -n:, :])
         return x, P, misfit if limit is None else updated_misfit(misfit, e, used)
+
+    def predicted_error(
+        self, error: ErrorCovariance, P: Float, F: Float, Q: Float, missing: Bool
+    ) -> ErrorCovariance:
+        """Return the covariance of the error after a motion to the predicted covariance P."""
+        if error.M is None:
+            return ErrorCovariance(P)
+        n = error.M.shape[-1]
+        M = F[:n, :n] @ error.M @ F[:n, :n].T + Q[:n, :n]
+        return ErrorCovariance(P, widened(M, missing, self.largest_variance))
+
+    def updated_error(
+        self, error: ErrorCovariance, prior: Float, x: Float, P: Float, n: int
+    ) -> ErrorCovariance:
+        """Return the covariance of the error after snapshot n, by the update of P from `prior`."""
+        if error.M is None:
+            return ErrorCovariance(P)
+        stage = self.stage(n)
+        if isinstance(stage, JointUpdate) or self.stage(n + 1) is not stage:
+            return ErrorCovariance(P)
+        k = error.M.shape[-1]
+        own = prior[..., :k, :k], x[..., :k], P[..., :k, :k]
+        return ErrorCovariance(P, stage.updated_error(error.M, *own))
 
     def limit(self, P: Float, n: int, misfit: Float) -> Float | None:
         """Return the limit of the residuals of snapshot n."""

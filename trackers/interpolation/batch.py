@@ -13,6 +13,7 @@ from arrivals.measurement_models.delays.array_samples import ArraySamples
 from arrivals.measurements import real_numbers, rows
 from arrivals.trackers.base import Tracker
 from arrivals.trackers.estimates import DirectionEstimate
+from arrivals.trackers.interpolation.assembly import ErrorCovariance
 from arrivals.trackers.interpolation.gating import widened
 from arrivals.trackers.interpolation.sample_buffer import receive, to_snapshot
 from arrivals.trackers.interpolation.updates import predict, transition
@@ -54,8 +55,8 @@ def run_batch(
     if len({len(sequence) for sequence in sequences}) != 1 or len(sequences[0]) == 0:
         return Tracker.run_batch(self, sequences, dt)
     started = time.perf_counter()
-    x, P = self.trajectory(np.array(sequences), dt)
-    doa, std = directions(self.measurement, x, P)
+    x, _, variance = beliefs(self, np.array(sequences), dt)
+    doa, std = directions(self.measurement, x, variance)
     elapsed = (time.perf_counter() - started) / len(sequences)
     return [direction_run(*each, dt, elapsed) for each in zip(doa, std, x, strict=True)]
 
@@ -79,6 +80,13 @@ def trajectory(
     x : ndarray, shape (..., n_steps, dim_x)
     P : ndarray, shape (..., n_steps, dim_x, dim_x)
     """
+    return beliefs(self, measurements, dt)[:2]
+
+
+def beliefs(
+    self: InterpolationEKF, measurements: ArrayLike, dt: float
+) -> tuple[Float, Float, Float]:
+    """Return those of `trajectory`, and the variances of the errors of delays, (..., n_steps)."""
     snapshots = real_numbers("measurements", measurements)
     if snapshots.ndim < 2 or snapshots.shape[-1] != self.dim_z:
         raise ValueError(
@@ -87,24 +95,29 @@ def trajectory(
     assembly, lead = self.assembly, snapshots.shape[:-2]
     F, Q = transition(assembly.motion, dt)
     x, P = (np.broadcast_to(a, (*lead, *a.shape)) for a in self.belief())
+    M = self.error.of(self.P).M
+    error = ErrorCovariance(P, None if M is None else np.broadcast_to(M, (*lead, *M.shape)))
     channels, buffer = self.channels.broadcast(lead), self.buffer.broadcast(lead)
     n_steps = snapshots.shape[-2]
     xs, Ps = np.empty((*lead, n_steps, len(F))), np.empty((*lead, n_steps, *F.shape))
+    variances = np.empty((*lead, n_steps))
     for k in range(n_steps):
         x, P = predict(x, P, F, Q)
-        P = widened(P, buffer.missing, assembly.largest_variance)
+        P = prior = widened(P, buffer.missing, assembly.largest_variance)
+        error = assembly.predicted_error(error, P, F, Q, buffer.missing)
         channels, buffer = receive(self, channels, buffer, snapshots[..., k, :])
         samples = buffer.scaled(self.measurement)
         x, P, misfit = assembly.update(x, P, samples, buffer.n_snapshots, buffer.misfit)
         buffer = buffer.with_misfit(misfit)
-        xs[..., k, :], Ps[..., k, :, :] = x, P
-    return xs, Ps
+        error = assembly.updated_error(error, prior, x, P, buffer.n_snapshots)
+        xs[..., k, :], Ps[..., k, :, :], variances[..., k] = x, P, error.variance
+    return xs, Ps, variances
 
 
-def directions(measurement: ArraySamples, x: Float, P: Float) -> tuple[Float, Float]:
+def directions(measurement: ArraySamples, x: Float, variance: Float) -> tuple[Float, Float]:
     """Return the directions of beliefs and their standard deviations, rad."""
-    delay, variance = x[..., 0], np.maximum(P[..., 0, 0], 0.0)
-    return measurement.doa(delay), measurement.doa_std(delay, np.sqrt(variance))
+    delay, std = x[..., 0], np.sqrt(np.maximum(variance, 0.0))
+    return measurement.doa(delay), measurement.doa_std(delay, std)
 
 
 def direction_run(doa: Float, std: Float, x: Float, dt: float, elapsed: float) -> Run:

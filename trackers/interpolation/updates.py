@@ -11,7 +11,7 @@ Radhakrishnan, Unnikrishnan and Balakrishnan, (11) and (18)-(23).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -22,6 +22,7 @@ from arrivals.motion_models.base import MotionModel
 from arrivals.parameters import FrozenModel
 from arrivals.trackers.gaussian.equations import joseph, predict_gaussian, update_scalar
 from arrivals.trackers.gaussian.linalg import apply, symmetric
+from arrivals.trackers.interpolation.error_covariance import ScoreTable
 from arrivals.trackers.interpolation.gating import is_used
 from arrivals.typing import Bool, Float
 
@@ -102,6 +103,19 @@ class PairwiseUpdate(FrozenModel):
     def span(self) -> int:
         """Number of snapshots to buffer."""
         return self.latency + 1 + max(model.memory for model in self.baseline_models)
+
+    @cached_property
+    def scores(self) -> ScoreTable:
+        """Moments of the scores of all residuals."""
+        return ScoreTable.of(self.baseline_models, self.kappa, self.sequential)
+
+    def updated_error(self, M: Float, prior: Float, x: Float, P: Float) -> Float:
+        """Return the covariance of the error after a snapshot, as `ScoreTable.updated`."""
+        if len(self.scores.noise) == 1:
+            return self.scores.updated(M, prior, x, P, 0)
+        lengths = {abs(model.baseline) for model in self.baseline_models}
+        n = sum(np.asarray(m == 1 or self._is_unambiguous(m, P), np.int64) for m in lengths)
+        return self.scores.updated(M, prior, x, P, np.maximum(n, 1) - 1)
 
     def update(self, x: Float, P: Float, frames: Float, limit: Float | None) -> DelayUpdate:
         """Update beliefs by the newest of `frames`, (..., span or more, n_sensors).

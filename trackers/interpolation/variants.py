@@ -56,7 +56,9 @@ class Variant(FrozenModel):
     sequential_update : bool
         Update sensor by sensor, with new coefficients at each one, as in the specification; else
         by all sensors of a baseline at once. It makes four times the array calls and acquires the
-        source from larger initial errors; see the notes of `InterpolationEKF`.
+        source from larger initial errors: of 400 trials of a tone at 60° and 5 dB that start at 0°,
+        65 % end within 3° with it and 8 % without for "B", 88 and 64 % for "D", 88 and 93 % for
+        "C".
     aligned : bool
         All baselines use the same snapshot, that of the longest latency.
     extrapolate : bool
