@@ -135,8 +135,7 @@ class DelayInterpolator(FrozenModel):
         return both, self._error(both[..., 0, :], p, noise_ratio)
 
     def _lags(self, tau: ArrayLike) -> Float:
-        tau = np.asarray(tau, dtype=np.float64)
-        return np.asarray(tau[..., None] - self.shifts)
+        return np.asarray(np.asarray(tau, dtype=np.float64)[..., None] - self.shifts)
 
     def _solved(self, p: Float) -> Float:
         return np.asarray((p[..., None, :] @ self.G)[..., 0, :])
