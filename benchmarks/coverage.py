@@ -16,9 +16,19 @@ import numpy as np
 from arrivals.scenarios import create
 from arrivals.scenarios.experiments.workers import parallel_map
 from arrivals.scenarios.metrics import METRICS
+from arrivals.trackers.rss.settings import VariationalSolver
 
 COLUMNS = ("coverage68", "coverage95", "nees", "ece")
-SCENES: dict[str, list[tuple[str, dict[str, Any]]]] = {
+MODES = {"solver": VariationalSolver(covariance="modes")}
+RSS: list[tuple[str, dict[str, Any], dict[str, Any]]] = [
+    ("rss_table1_k3", {}, {}),
+    ("rss_walk", {"n_sources": 1}, {}),
+    ("rss_walk", {}, {}),
+    ("rss_crossing", {}, {}),
+    ("rss_birth_death", {}, {"births": True}),
+]
+# scene, its parameters, and, where there are any, those of the tracker
+SCENES: dict[str, list[tuple[Any, ...]]] = {
     "svalse": [("walk", {"n_sources": 4}), ("svalse_fig6", {})],
     "valse": [("walk", {"n_sources": 4}), ("svalse_fig6", {})],
     "sbl": [("walk", {}), ("svalse_fig6", {})],
@@ -39,14 +49,16 @@ SCENES: dict[str, list[tuple[str, dict[str, Any]]]] = {
         ("ar_fig4", {}),
         ("ar_fig4", {"snr_db": 0.0}),
     ],
-    "rss_vb": [("rss_table1_k3", {}), ("rss_crossing", {})],
-    "rss_ml": [("rss_table1_k3", {}), ("rss_crossing", {})],
+    "rss_vb": [*RSS, ("rss_table1_k3", {}, MODES), ("rss_table1_k7", {}, MODES)],
+    "rss_ml": RSS,
 }
 
 
-def measure(tracker: str, scene: str, parameters: dict[str, Any], seed: int) -> list[float]:
+def measure(
+    tracker: str, scene: str, parameters: dict[str, Any], options: dict[str, Any], seed: int
+) -> list[float]:
     """Return the figures of one run; NaN where the tracker does not state what they need."""
-    settings: dict[str, Any] = {}
+    settings = dict(options)
     parameters = dict(parameters)
     if "variant" in parameters:
         settings["variant"] = parameters.pop("variant")
@@ -76,12 +88,16 @@ def main() -> None:
     arguments = parser.parse_args()
     print(f"{'tracker':18} {'scene':34}", *(f"{name:>11}" for name in COLUMNS))
     for tracker in arguments.trackers or SCENES:
-        for scene, parameters in SCENES[tracker]:
-            jobs = [(tracker, scene, parameters, arguments.seed + n) for n in range(arguments.runs)]
+        for scene, parameters, *more in SCENES[tracker]:
+            options = more[0] if more else {}
+            jobs = [
+                (tracker, scene, parameters, options, arguments.seed + n)
+                for n in range(arguments.runs)
+            ]
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", RuntimeWarning)  # means of nothing but NaN
                 means = np.nanmean(np.array(parallel_map(measure, jobs)), axis=0)
-            label = f"{scene} {parameters or ''}"
+            label = f"{scene} {parameters or ''} {', '.join(options)}"
             print(f"{tracker:18} {label:34}", *(f"{value:11.3f}" for value in means), flush=True)
 
 

@@ -20,7 +20,11 @@ from arrivals.scenarios.simulations.line_arrays import (
     StaticSources,
     ThreeStatic,
 )
-from arrivals.scenarios.simulations.moving_emitters import BirthsAndDeaths, CrossingSources
+from arrivals.scenarios.simulations.moving_emitters import (
+    BirthsAndDeaths,
+    CrossingSources,
+    WalkingSources,
+)
 from arrivals.scenarios.simulations.planar_arrays import Cardioids, Circle, Grating
 from arrivals.scenarios.simulations.random_walks import RandomWalks, SwitchingWalks
 from arrivals.scenarios.simulations.sampled_source import (
@@ -64,5 +68,6 @@ __all__ = [
     "ThreeOnThree",
     "ThreeStatic",
     "TowPastLine",
+    "WalkingSources",
     "ar_signals",
 ]

@@ -9,6 +9,7 @@ import numpy as np
 from arrivals.motion_models import ConstantVelocity, MotionModel
 from arrivals.scenarios.registry import register
 from arrivals.scenarios.simulations.signal_strength import RSSScenario, lattice
+from arrivals.trackers.rss.settings import AmplitudePrior
 from arrivals.typing import Float
 from arrivals.validation import count
 
@@ -82,6 +83,66 @@ class CrossingSources(MovingSources):
         t = np.arange(self.n_steps) - (self.n_steps - 1) / 2
         travel = np.multiply.outer(t, rng.uniform(2.0, 2.5, K))
         return np.asarray(travel[..., None] * along + rng.uniform(-5, 5, K)[:, None] * across)
+
+    def start(self, truth: Float, rng: np.random.Generator) -> tuple[Float | None, Float]:
+        """Draw initial positions with an error, and zero velocities."""
+        x0 = np.zeros((self.n_sources, 4))
+        x0[:, ::2] = truth[0] + self.start_std * rng.standard_normal(truth[0].shape)
+        return x0, np.diag([self.start_std, self.speed_std] * 2) ** 2
+
+
+@register("rss_walk")
+@dataclass(frozen=True)
+class WalkingSources(MovingSources):
+    """Sources that move and vary in power as the tracker assumes: a scene to read coverage in.
+
+    Parameters
+    ----------
+    n_sources, n_sensors, n_snapshots : int
+        As in `RSSScenario`.
+    radius : float, optional
+        As in `RSSScenario`.
+    alpha, noise_db, power_db, power_std_db : float
+        As in `RSSScenario`.
+    n_steps : int
+        As in `MovingSources`.
+    q : float
+        As in `MovingSources`.
+    apart : float
+        Spacing of the initial positions, m.
+    start_std, speed_std : float
+        Standard deviations of the tracker's initial state, m and m/s.
+
+    Examples
+    --------
+    >>> WalkingSources().sample(np.random.default_rng(0)).log_amplitude.shape
+    (30, 3)
+    """
+
+    n_steps: int = 30
+    q: float = 0.02
+    apart: float = 90.0
+    start_std: float = 3.0
+    speed_std: float = 0.5
+
+    def positions(self, rng: np.random.Generator) -> Float:
+        """Draw the tracks."""
+        F, Q = self.motion.F(np.zeros(4), 1.0), self.motion.Q(1.0)
+        x = np.zeros((self.n_steps, self.n_sources, 4))
+        x[0, :, ::2] = lattice(self.n_sources, self.apart, centred=False)
+        x[0, :, 1::2] = self.speed_std * rng.standard_normal((self.n_sources, 2))
+        for step in range(1, self.n_steps):
+            noise = rng.multivariate_normal(np.zeros(4), Q, self.n_sources)
+            x[step] = x[step - 1] @ F.T + noise
+        return np.asarray(x[..., ::2])
+
+    def log_amplitudes(self, rng: np.random.Generator) -> Float:
+        """Draw random walks of u, Np, (n_steps, n_sources)."""
+        steps = np.sqrt(AmplitudePrior().drift) * rng.standard_normal(
+            (self.n_steps, self.n_sources)
+        )
+        steps[0] = super().log_amplitudes(rng)
+        return np.cumsum(steps, axis=0)
 
     def start(self, truth: Float, rng: np.random.Generator) -> tuple[Float | None, Float]:
         """Draw initial positions with an error, and zero velocities."""

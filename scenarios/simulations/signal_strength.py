@@ -37,7 +37,7 @@ class RSSTrial(Trial):
         As in `Trial`.
     motion : MotionModel
         As in `Trial`.
-    log_amplitude : ndarray, shape (n_sources,)
+    log_amplitude : ndarray, shape (n_sources,) or (n_steps, n_sources)
         True u, Np.
     x0 : ndarray, shape (n_sources, n), or None
         Initial states; None for an unknown number of sources.
@@ -145,10 +145,14 @@ class RSSScenario(Scenario):
         """Variance of the log amplitudes, Np²."""
         return float(db_to_neper(self.power_std_db)) ** 2
 
+    def log_amplitudes(self, rng: np.random.Generator) -> Float:
+        """Draw constant u of the sources, Np, (n_sources,)."""
+        return np.asarray(self.mu0 + np.sqrt(self.v0) * rng.standard_normal(self.n_sources))
+
     def sample(self, rng: np.random.Generator) -> RSSTrial:
         """Draw one trial."""
         model, truth = self.network(rng), self.positions(rng)
-        u = self.mu0 + np.sqrt(self.v0) * rng.standard_normal(self.n_sources)
+        u = self.log_amplitudes(rng)
         active: Bool = np.isfinite(truth[..., 0])
         theta = np.where(active[..., None], truth, 0.0)
         z = model.draw(np.where(active, u, -np.inf), theta, rng)

@@ -63,7 +63,8 @@ class RSSML(RSSTracker):
 
     Notes
     -----
-    Belief, detection, labels and covariances are those of `RSSVB`.
+    Belief, detection, labels and covariances are those of `RSSVB` with `covariance="joint"`, and
+    as far off where the posterior has several maxima.
 
     References
     ----------

@@ -255,6 +255,17 @@ class VariationalPosterior(NamedTuple):
     converged: Bool
     prior: Prior
 
+    @classmethod
+    def before(cls, point: ExpansionPoint) -> VariationalPosterior:
+        """Return the factors before the first iteration, to be filled by rows."""
+        u, theta, n = point.u, point.theta, len(point.u)
+        w, P = np.ones_like(u), np.tile(np.eye(2), (*u.shape, 1, 1))
+        prior = Prior(u.copy(), w.copy(), theta.copy(), P.copy())
+        return cls(
+            u.copy(), w, theta.copy(), P, np.zeros(n), point.log_posterior,
+            np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.bool_), prior,
+        )  # fmt: skip
+
 
 def marginals(J: Float) -> Marginals:
     """Return the diagonal blocks of J⁻¹.

@@ -1,0 +1,65 @@
+"""Standard deviations of directions that are peaks on a grid."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from arrivals.trackers.svalse.newton.marginals import student_factor
+from arrivals.typing import Complex, Float
+
+MIN_EIGENVALUE = 1e-3  # of the information scaled to a unit diagonal
+
+
+def grid_deviations(
+    A: Complex, D: Complex, Y: Complex, W: Complex, step: float, largest: float
+) -> Float:
+    """Return standard deviations of directions on a grid, rad, (n_sources,).
+
+    The variance that the snapshots leave to a direction off the grid, all directions, amplitudes
+    and the noise unknown, plus that of a uniform error of rounding to the grid.
+
+    Parameters
+    ----------
+    A, D : ndarray, shape (n_sensors, n_sources)
+        Plane waves a(β) and their slopes da/dβ.
+    Y : ndarray, shape (n_sensors, n_snapshots)
+        Snapshots.
+    W : ndarray, shape (n_sources, n_snapshots)
+        Least-squares amplitudes of the waves.
+    step : float
+        Step of the grid, rad.
+    largest : float
+        Upper bound, the deviation of a uniform direction, rad.
+
+    References
+    ----------
+    Stoica and Nehorai, "MUSIC, maximum likelihood, and Cramer-Rao bound", IEEE Trans. Acoust.,
+    Speech, Signal Process. 37(5), 1989, (4.6), for J with known noise.
+
+    Examples
+    --------
+    A wave without noise is known up to the rounding:
+
+    >>> m = np.arange(4)[:, None]
+    >>> one, slope = np.ones((4, 1), complex), 1j * np.pi * m
+    >>> std = grid_deviations(one, slope, 2 * one, 2 * one[:1], step=0.01, largest=1.0)
+    >>> (std / 0.01).round(3)
+    array([0.289])
+    """
+    (M, N), K = Y.shape, len(W)
+    # σ² = 2 |Y - A W|² / d of d = 2 N (M - K) - K real degrees of freedom
+    freedom = 2.0 * N * (M - K) - K
+    if freedom <= 0:
+        return np.full(K, largest)
+    Q = np.linalg.qr(A)[0]
+    R = Y - A @ W
+    noise = 2 * (R.real**2 + R.imag**2).sum() / freedom
+    noise = max(noise, np.finfo(float).eps * float((Y.real**2 + Y.imag**2).mean()))
+    # J_jk = 2/σ² Re[d_j' (I - Q Q') d_k Σ w_j* w_k]
+    J = 2 / noise * ((D.conj().T @ (D - Q @ (Q.conj().T @ D))) * (W.conj() @ W.T)).real
+    scale = np.sqrt(np.maximum(J.diagonal(), 1 / largest**2))
+    eigenvalues, V = np.linalg.eigh(J / (scale[:, None] * scale))
+    variance = (V**2 / np.maximum(eigenvalues, MIN_EIGENVALUE)).sum(axis=1) / scale**2
+    # v = c(d) (J⁻¹)_jj + Δ²/12
+    variance = student_factor(np.array([freedom])) * variance + step**2 / 12
+    return np.asarray(np.minimum(np.sqrt(variance), largest))
