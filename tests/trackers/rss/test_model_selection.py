@@ -158,6 +158,13 @@ def test_confirmation_and_deletion_take_the_requested_steps() -> None:
         assert tracks.log_odds[0] == -MAX_LOG_ODDS
 
 
+def test_existence_follows_the_whole_evidence_of_a_step() -> None:
+    tracks = TrackTable.certain(0).extended([100.0, 100.0, 100.0], 1)
+    after = tracks.updated(np.array([-100.0, -MAX_LOG_ODDS, 0.0]), 3)
+    np.testing.assert_allclose(after.existence, [0.01, 0.5, 0.99])
+    assert after.active.all()  # the decision to delete takes three steps
+
+
 def n_active(positions: Float) -> list[int]:
     return [int(n) for n in np.isfinite(positions[..., 0]).sum(axis=1)]
 

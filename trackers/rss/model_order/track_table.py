@@ -25,12 +25,16 @@ class TrackTable:
         Whether the log odds have reached ln 99 at least once.
     next_label : int
         Label of the next new source.
+    stated : ndarray, shape (n_sources,)
+        Log odds before the last step plus its whole evidence, within ± ln 99, of which `existence`
+        is the probability: `log_odds` delay decisions, and are too cautious to be stated.
     """
 
     label: Int
     log_odds: Float
     confirmed: Bool
     next_label: int
+    stated: Float
 
     @classmethod
     def certain(cls, n: int) -> TrackTable:
@@ -41,12 +45,15 @@ class TrackTable:
         >>> TrackTable.certain(2).existence
         array([1., 1.])
         """
-        return cls(np.arange(n), np.full(n, np.inf), np.ones(n, dtype=np.bool_), n)
+        certain = np.full(n, np.inf)
+        return cls(np.arange(n), certain, np.ones(n, dtype=np.bool_), n, certain)
 
     @property
     def existence(self) -> Float:
         """Probabilities of existence."""
-        return np.asarray(1 / (1 + np.exp(-self.log_odds)))
+        from scipy.special import expit
+
+        return np.asarray(expit(self.stated))
 
     @property
     def active(self) -> Bool:
@@ -61,8 +68,9 @@ class TrackTable:
     def select(self, rows: Int | Bool) -> TrackTable:
         """Return some of the sources."""
         return TrackTable(
-            self.label[rows], self.log_odds[rows], self.confirmed[rows], self.next_label
-        )
+            self.label[rows], self.log_odds[rows], self.confirmed[rows], self.next_label,
+            self.stated[rows],
+        )  # fmt: skip
 
     def updated(self, evidence: Float, confirm_steps: int) -> TrackTable:
         """Return the table after the log evidence of one step for each source.
@@ -71,11 +79,12 @@ class TrackTable:
         or a deletion takes as many steps.
         """
         limit = 2 * MAX_LOG_ODDS / confirm_steps
-        log_odds = np.clip(self.log_odds, -MAX_LOG_ODDS, MAX_LOG_ODDS)
-        log_odds = log_odds + np.clip(evidence, -limit, limit)
+        before = np.clip(self.log_odds, -MAX_LOG_ODDS, MAX_LOG_ODDS)
+        log_odds = before + np.clip(evidence, -limit, limit)
         log_odds = np.clip(log_odds, -MAX_LOG_ODDS, MAX_LOG_ODDS)
         confirmed = self.confirmed | (log_odds >= MAX_LOG_ODDS - 1e-9)
-        return replace(self, log_odds=log_odds, confirmed=confirmed)
+        stated = np.clip(before + evidence, -MAX_LOG_ODDS, MAX_LOG_ODDS)
+        return replace(self, log_odds=log_odds, confirmed=confirmed, stated=stated)
 
     def extended(self, evidence: list[float], confirm_steps: int) -> TrackTable:
         """Return the table with new sources, given the log evidence for each of them."""
@@ -85,10 +94,12 @@ class TrackTable:
             np.full(n, -MAX_LOG_ODDS),
             np.zeros(n, dtype=np.bool_),
             self.next_label + n,
+            np.full(n, -MAX_LOG_ODDS),
         ).updated(np.array(evidence), confirm_steps)
         return TrackTable(
             np.append(self.label, new.label),
             np.append(self.log_odds, new.log_odds),
             np.append(self.confirmed, new.confirmed),
             new.next_label,
+            np.append(self.stated, new.stated),
         )
