@@ -70,7 +70,7 @@ def circle(n: dict[str, Any], svalse: float, svalse_std: float, valse: float, st
 
 HOP = {"n_bins": 10, "hopping": True}
 TWO: dict[str, Any] = {"n_sources": 2}
-WHOLE = {"memory": "posterior"}
+WHOLE = {"memory": "posterior", "motion": BernoulliVonMises(sigma_doa=np.deg2rad(2.0))}
 SIMULATED = [
     *circle({"snr_db": 20.0}, 6.7, 0.9, 12.6, 0.9, 18.5),
     *circle({"snr_db": 10.0}, 14.0, 1.7, 18.2, 0.4, 19.4),
