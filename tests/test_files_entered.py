@@ -75,7 +75,7 @@ STEPS: list[tuple[Callable[[], tuple[Tracker, Any]], int]] = [
     (kalman, 7),
     (svalse, 23),
     (rss_vb, 14),
-    (interpolation_ekf, 17),
+    (interpolation_ekf, 18),
 ]
 
 

@@ -95,8 +95,7 @@ class InterpolationEKF(GaussianFilter):
     Where the model has a `band`, samples are filtered to it, and missing until the filter settles:
     at the start, after a gap or a click. The filter delays the estimate too.
 
-    `std` is that of the error of the delay `latency` snapshots ago, true if the prior is; `P` takes
-    residuals that share samples to be independent. docs/trackers.md says how many errors it covers.
+    `P` takes residuals to be independent; `std`, of the delay `latency` snapshots ago, does not.
 
     References
     ----------
@@ -175,8 +174,9 @@ class InterpolationEKF(GaussianFilter):
         # x = F x (18) + B u,   P = F P F' + Q   (19)
         x, P = predict(x, P, F, Q)
         P, error = widened(P, self.buffer.missing, assembly.largest_variance), self.error.of(self.P)
+        x = self.add_control(x, u, B)
         self.error = assembly.predicted_error(error, P, F, Q, self.buffer.missing)
-        self.record_prediction(self.add_control(x, u, B), P, dt)
+        self.record_prediction(x, P, dt)
 
     def update(
         self, z: ArrayLike | None, R: ArrayLike | None = None, H: ArrayLike | None = None
