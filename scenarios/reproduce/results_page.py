@@ -22,6 +22,7 @@ PAPERS = {
     "interpolation": "The interpolation-delay filter",
     "rss": "Cevher, Sankaranarayanan and Chellappa, 2008: positions from signal strength",
     "any": "Any array: no published results",
+    "calibration": "Stated deviations and existence: no published results",
 }
 
 
