@@ -1,6 +1,6 @@
 """Coverage of the stated deviations and reliability of the stated existence, tracker by tracker.
 
-    python benchmarks/coverage.py [--runs 20] [--seed 0] [TRACKER ...]
+    python benchmarks/stated_deviations.py [--runs 20] [--seed 0] [TRACKER ...]
 
 Each tracker on scenes of its own kind (a `doa_deg` of None is drawn from the tracker's prior):
 share of errors within the stated 68 and 95 % intervals, the squared error over the stated variance
