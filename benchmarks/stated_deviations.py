@@ -20,34 +20,49 @@ from arrivals.trackers.rss.settings import VariationalSolver
 
 COLUMNS = ("coverage68", "coverage95", "nees", "ece")
 MODES = {"solver": VariationalSolver(covariance="modes")}
-RSS: list[tuple[str, dict[str, Any], dict[str, Any]]] = [
+FROM_PRIOR = {"doa_deg": None}  # 0 ± 15 degrees in sine, the default of the tracker
+Row = tuple[str, dict[str, Any], dict[str, Any]]  # scene, its parameters, those of the tracker
+LINE: list[Row] = [("walk", {}, {}), ("svalse_fig6", {}, {})]
+RSS: list[Row] = [
     ("rss_table1_k3", {}, {}),
     ("rss_walk", {"n_sources": 1}, {}),
     ("rss_walk", {}, {}),
     ("rss_crossing", {}, {}),
     ("rss_birth_death", {}, {"births": True}),
 ]
-# scene, its parameters, and, where there are any, those of the tracker
-SCENES: dict[str, list[tuple[Any, ...]]] = {
-    "svalse": [("walk", {"n_sources": 4}), ("svalse_fig6", {})],
-    "valse": [("walk", {"n_sources": 4}), ("svalse_fig6", {})],
-    "sbl": [("walk", {}), ("svalse_fig6", {})],
-    "ssbl": [("walk", {}), ("svalse_fig6", {})],
-    "peaks_gnn": [("walk", {}), ("svalse_fig6", {})],
+
+
+def near(doa_deg: float) -> dict[str, Any]:
+    """Return the parameters of a tracker that starts at a direction, ± 3 degrees."""
+    return {"doa": float(np.deg2rad(doa_deg)), "std": float(np.deg2rad(3.0))}
+
+
+SCENES: dict[str, list[Row]] = {
+    "svalse": [("walk", {"n_sources": 4}, {}), *LINE],
+    "valse": [("walk", {"n_sources": 4}, {}), *LINE],
+    "sbl": LINE,
+    "ssbl": LINE,
+    "peaks_gnn": LINE,
     "interpolation_ekf": [
-        (f"interpolation_{source}", {"doa_deg": None, "variant": variant})
-        for source, variants in (("tone", ("B", "C", "D", "E2")), ("band", ("C", "D", "E2")))
-        for variant in variants
-    ]
-    + [("interpolation_tone", {"doa_deg": 60.0}), ("interpolation_band", {"doa_deg": 60.0})],
+        *(
+            (f"interpolation_{source}", FROM_PRIOR, {"variant": variant})
+            for source, variants in (("tone", ("B", "C", "D", "E2")), ("band", ("C", "D", "E2")))
+            for variant in variants
+        ),
+        ("interpolation_tone", {"doa_deg": 60.0}, {}),
+        ("interpolation_band", {"doa_deg": 60.0}, {}),
+        ("interpolation_tone", {"doa_deg": 15.0, "snr_db": 20.0}, {"variant": "B"} | near(15.0)),
+        ("interpolation_tone", {"doa_deg": 15.0, "snr_db": 20.0}, {"variant": "C"} | near(15.0)),
+        ("interpolation_band", {"doa_deg": 60.0, "snr_db": 20.0}, {"variant": "C"} | near(60.0)),
+    ],
     "ar_kalman_qrd_rls": [
-        ("ar_fig1", {}),
-        ("ar_fig5", {}),
-        ("ar_fig5", {"snr_db": 1.0}),
-        ("ar_fig6", {}),
-        ("ar_three_on_three", {}),
-        ("ar_fig4", {}),
-        ("ar_fig4", {"snr_db": 0.0}),
+        ("ar_fig1", {}, {}),
+        ("ar_fig5", {}, {}),
+        ("ar_fig5", {"snr_db": 1.0}, {}),
+        ("ar_fig6", {}, {}),
+        ("ar_three_on_three", {}, {}),
+        ("ar_fig4", {}, {}),
+        ("ar_fig4", {"snr_db": 0.0}, {}),
     ],
     "rss_vb": [*RSS, ("rss_table1_k3", {}, MODES), ("rss_table1_k7", {}, MODES)],
     "rss_ml": RSS,
@@ -58,19 +73,14 @@ def measure(
     tracker: str, scene: str, parameters: dict[str, Any], options: dict[str, Any], seed: int
 ) -> list[float]:
     """Return the figures of one run; NaN where the tracker does not state what they need."""
-    settings = dict(options)
-    parameters = dict(parameters)
-    if "variant" in parameters:
-        settings["variant"] = parameters.pop("variant")
-    if parameters.get("doa_deg", 0.0) is None:
-        # the tracker's prior: sin β ~ N(0, 15°²)
+    if parameters == FROM_PRIOR:
         sine = np.random.default_rng([seed, 1]).normal(0.0, np.deg2rad(15.0))
-        parameters["doa_deg"] = float(np.rad2deg(np.arcsin(sine)))
+        parameters = {"doa_deg": float(np.rad2deg(np.arcsin(sine)))}
     trial = create(scene, **parameters).sample(np.random.default_rng(seed))
     values = []
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
-        run = trial.tracker(tracker, **settings).run(trial.measurements)
+        run = trial.tracker(tracker, **options).run(trial.measurements)
     for name in COLUMNS:
         try:
             values.append(METRICS[name](trial, run))
@@ -86,10 +96,9 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=20)
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
-    print(f"{'tracker':18} {'scene':34}", *(f"{name:>11}" for name in COLUMNS))
+    print(f"{'tracker':18} {'scene':62}", *(f"{name:>11}" for name in COLUMNS))
     for tracker in arguments.trackers or SCENES:
-        for scene, parameters, *more in SCENES[tracker]:
-            options = more[0] if more else {}
+        for scene, parameters, options in SCENES[tracker]:
             jobs = [
                 (tracker, scene, parameters, options, arguments.seed + n)
                 for n in range(arguments.runs)
@@ -97,8 +106,9 @@ def main() -> None:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", RuntimeWarning)  # means of nothing but NaN
                 means = np.nanmean(np.array(parallel_map(measure, jobs)), axis=0)
-            label = f"{scene} {parameters or ''} {', '.join(options)}"
-            print(f"{tracker:18} {label:34}", *(f"{value:11.3f}" for value in means), flush=True)
+            named = {name: value for name, value in options.items() if isinstance(value, str)}
+            label = f"{scene} {parameters or ''} {named or ', '.join(options)}"
+            print(f"{tracker:18} {label:62}", *(f"{value:11.3f}" for value in means), flush=True)
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ walk      the same with the walk in direction
 valse     frame by frame
 snr       0 to 40 dB, three and six static sources
 jump      a leap of 40 dB between steps
+existence probabilities of existence carried from step to step, at 0 dB
 """
 
 from __future__ import annotations
@@ -173,6 +174,18 @@ def jumps(runs: int) -> None:
         row(f"{name} from {low:.0f} to {high:.0f} dB", ours, f"specification {known}", None)
 
 
+def carried(runs: int) -> None:
+    """Carry the probability of existence, paired with 1 for active components, at 0 dB."""
+    for name in ("switch", *FIGURES, "svalse_scenario1", "svalse_scenario2"):
+        draws = trials(name, range(1, runs + 1), 0.0)
+        ours, theirs = (
+            scores(draws, draws[0].tracker("svalse", carry_existence=kept))  # type: ignore[arg-type]  # SVALSE
+            for kept in ("probability", "active")
+        )
+        text = difference(ours, theirs)[1]
+        row(f"{name}: {gospa_parts(ours)} - {gospa_parts(theirs)}", text, "", None)
+
+
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(
@@ -180,7 +193,7 @@ def main() -> None:
     )
     parser.add_argument("--runs", type=int, default=20, help="seeds of the figures (20)")
     parser.add_argument("--snr-runs", type=int, default=3, help="seeds for each SNR (3)")
-    chosen = ["accuracy", "walk", "valse", "snr", "jump"]
+    chosen = ["accuracy", "walk", "valse", "snr", "jump", "existence"]
     parser.add_argument("--parts", nargs="+", choices=chosen, default=chosen)
     options = parser.parse_args()
     parts: dict[str, Callable[[], None]] = {
@@ -189,6 +202,7 @@ def main() -> None:
         "valse": lambda: frames(options.runs),
         "snr": lambda: sweep(options.snr_runs),
         "jump": lambda: jumps(40),
+        "existence": lambda: carried(options.runs),
     }
     print("| what | ours | limit | |\n|---|---|---|---|")
     for name in options.parts:

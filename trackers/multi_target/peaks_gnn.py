@@ -66,13 +66,11 @@ class PeaksGNN(DirectionTracker):
     Notes
     -----
     `existence` is NaN. The stated deviations follow from `std` and `motion`: they are true where
-    both are. With 15 sensors at 20 dB a detection by "cbf" is off by 0.1 degrees for one source:
-    the 3 degrees of the default cover 91 and 100 % at 68 and 95 % (0.1 degrees: 73 and 94 %). For
-    four sources it is off by 1.4 degrees, most of it interference, which the curvature of a peak
-    does not show; those 3 degrees cover 82 and 98 %. A track of a line that leaves ±90° ends, as
-    does one after `patience` steps
-    without a detection, those without data included, and one whose standard deviation exceeds
-    that of a uniform direction.
+    both are. The default of 3 degrees covers 91 and 100 % of the errors at 68 and 95 % for one
+    source (`walk`), 68 and 94 % for six (Fig. 6 of SVALSE's paper): most of the error is then
+    interference, which the curvature of a peak does not show. A track of a line that leaves ±90°
+    ends, as does one after `patience` steps without a detection, those without data included, and
+    one whose standard deviation exceeds that of a uniform direction.
 
     References
     ----------

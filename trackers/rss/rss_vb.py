@@ -78,7 +78,7 @@ class RSSVB(RSSTracker):
     covariances are those of one maximum. A wide prior of several sources has others: with three
     sources 30 m apart and a prior of 20 m, of the positions within 10 m the 68 and 95 % ellipses
     contained 41 and 63 % (NEES 15), those of `covariance="modes"` 79 and 96 % (NEES 1.1). Sources
-    that move as assumed, 90 m apart: 65 and 93 %. `existence` is 1 where the number of sources
+    that move as assumed, 90 m apart: 66 and 93 %. `existence` is 1 where the number of sources
     does not change: it is given, or taken for certain once detected.
 
     References
