@@ -45,9 +45,29 @@ class MovingSources(RSSScenario):
         return ConstantVelocity(self.q)
 
 
+@dataclass(frozen=True)
+class StartedSources(MovingSources):
+    """Moving sources whose number and initial positions the tracker is given, with an error.
+
+    Parameters
+    ----------
+    start_std, speed_std : float
+        Standard deviations of the initial state, m and m/s; the initial velocity is zero.
+    """
+
+    start_std: float = 5.0
+    speed_std: float = 2.5
+
+    def start(self, truth: Float, rng: np.random.Generator) -> tuple[Float | None, Float]:
+        """Draw initial positions with an error, and zero velocities."""
+        x0 = np.zeros((self.n_sources, 4))
+        x0[:, ::2] = truth[0] + self.start_std * rng.standard_normal(truth[0].shape)
+        return x0, np.diag([self.start_std, self.speed_std] * 2) ** 2
+
+
 @register("rss_crossing")
 @dataclass(frozen=True)
-class CrossingSources(MovingSources):
+class CrossingSources(StartedSources):
     """Sources at 2 to 2.5 m/s from all sides that pass the centre, and each other, within 10 m.
 
     Parameters
@@ -71,9 +91,6 @@ class CrossingSources(MovingSources):
     (40, 3, 2)
     """
 
-    start_std: float = 5.0
-    speed_std: float = 2.5
-
     def positions(self, rng: np.random.Generator) -> Float:
         """Draw the tracks."""
         K = self.n_sources
@@ -84,16 +101,10 @@ class CrossingSources(MovingSources):
         travel = np.multiply.outer(t, rng.uniform(2.0, 2.5, K))
         return np.asarray(travel[..., None] * along + rng.uniform(-5, 5, K)[:, None] * across)
 
-    def start(self, truth: Float, rng: np.random.Generator) -> tuple[Float | None, Float]:
-        """Draw initial positions with an error, and zero velocities."""
-        x0 = np.zeros((self.n_sources, 4))
-        x0[:, ::2] = truth[0] + self.start_std * rng.standard_normal(truth[0].shape)
-        return x0, np.diag([self.start_std, self.speed_std] * 2) ** 2
-
 
 @register("rss_walk")
 @dataclass(frozen=True)
-class WalkingSources(MovingSources):
+class WalkingSources(StartedSources):
     """Sources that move and vary in power as the tracker assumes: a scene to read coverage in.
 
     Parameters
@@ -143,12 +154,6 @@ class WalkingSources(MovingSources):
         )
         steps[0] = super().log_amplitudes(rng)
         return np.cumsum(steps, axis=0)
-
-    def start(self, truth: Float, rng: np.random.Generator) -> tuple[Float | None, Float]:
-        """Draw initial positions with an error, and zero velocities."""
-        x0 = np.zeros((self.n_sources, 4))
-        x0[:, ::2] = truth[0] + self.start_std * rng.standard_normal(truth[0].shape)
-        return x0, np.diag([self.start_std, self.speed_std] * 2) ** 2
 
 
 @register("rss_birth_death")

@@ -66,15 +66,7 @@ class ConstructedByDimensions(Base):
 
 
 class LinearByDimensions(ConstructedByDimensions):
-    """Base of those whose models are linear until others are assigned.
-
-    Parameters
-    ----------
-    dim_x, dim_z : int
-        Numbers of entries of state and measurement.
-    dim_u : int
-        Number of control inputs; `B` is assigned.
-    """
+    """Base of those whose models are linear until others are assigned, as in `KalmanFilter`."""
 
     def __init__(self, dim_x: int, dim_z: int, dim_u: int = 0) -> None:
         motion, measurement = unit_models(dim_x, dim_z)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from arrivals.scenarios.base import Trial
+from arrivals.scenarios.experiments.statistics import Difference, paired_difference
 from arrivals.scenarios.experiments.workers import parallel_map
 from arrivals.scenarios.metrics.calibration import Reliability, reliability
 from arrivals.scenarios.metrics.consistency import circular_nees, coverage
@@ -128,11 +129,10 @@ def shares(result: Statements) -> list[float]:
     return [coverage(result.error, result.std, level) for level in LEVELS]
 
 
-def change(result: Paired) -> tuple[float, float]:
-    """Return the paired change of GOSPA due to a walk that may stand still, and its error."""
-    difference = result.default.gospa - result.never_stops.gospa
-    n = len(difference)
-    return float(difference.mean()), float(difference.std(ddof=1) / np.sqrt(n)) if n > 1 else np.nan
+def change(result: Paired) -> Difference:
+    """Return the paired change of GOSPA due to a walk that may stand still."""
+    first, second = (dict(enumerate(form.gospa.tolist())) for form in result)
+    return paired_difference(first, second)
 
 
 def _row(scene: CalibrationScene, result: Paired) -> tuple[Any, ...]:
@@ -142,7 +142,7 @@ def _row(scene: CalibrationScene, result: Paired) -> tuple[Any, ...]:
     nees = circular_nees(stated.error, stated.std)
     gospa = float(stated.gospa.mean())
     _, c68, _, c95 = shares(result.never_stops)
-    before = (100 * c68, 100 * c95, *change(result))
+    before = (100 * c68, 100 * c95, *change(result)[:2])
     return (scene.label, *covered, nees, gospa, r.ece, r.brier, r.log_score, *before)
 
 
@@ -172,7 +172,7 @@ def _claims_of(scene: CalibrationScene, result: Paired) -> list[str]:
             text = f"{scene.label}: coverage{note} within {limits}"
             lines.append(verdict(text, limits.holds(c68, c95), f"{c68:.1%} and {c95:.1%}"))
     if scene.change is not None:
-        mean, error = change(result)
+        mean, error, *_ = change(result)
         text = f"{scene.label}: GOSPA changes by at most {scene.change:+g} degrees"
         lines.append(verdict(text, mean <= scene.change, f"{mean:+.2f} ± {error:.2f}"))
     return lines
@@ -200,7 +200,7 @@ def _figures(pooled: Pooled) -> dict[str, Figure]:
 
     from arrivals.plots.calibration import plot_coverage, plot_reliability
 
-    first = Figure(figsize=(8.0, 6.0), layout="constrained")
+    first = Figure(figsize=(8.0, 1.2 + 0.24 * len(pooled)), layout="constrained")
     labelled = {scene.label: shares(result.default) for scene, result in pooled.items()}
     plot_coverage(labelled, LEVELS, ax=first.subplots())
     second = Figure(figsize=(5.0, 4.6), layout="constrained")
