@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,6 +13,22 @@ from arrivals.typing import Float
 from arrivals.validation import positive, time_step
 
 TINY = 1e-300
+
+
+class MixtureStep(NamedTuple):
+    """Mixture of the modes after a prediction or an update.
+
+    Parameters
+    ----------
+    shift, variance : ndarray, shape (...)
+        Shift of the mixture's mean, and its variance.
+    modes : ndarray, shape (3, ..., 2)
+        As in `MoveStopWalk`.
+    """
+
+    shift: Float
+    variance: Float
+    modes: Float
 
 
 @dataclass(frozen=True)
@@ -109,9 +126,7 @@ class MoveStopWalk(FrozenModel):
             return modes
         return np.where(differs[..., None], self.initial(variance), modes)
 
-    def predict(
-        self, modes: Float, step_variance: ArrayLike, dt: float = 1.0
-    ) -> tuple[Float, Float, Float]:
+    def predict(self, modes: Float, step_variance: ArrayLike, dt: float = 1.0) -> MixtureStep:
         """Mix the modes and widen their densities.
 
         Parameters
@@ -124,9 +139,7 @@ class MoveStopWalk(FrozenModel):
 
         Returns
         -------
-        shift, variance : ndarray, shape (...)
-            Shift of the mixture's mean, and its variance.
-        modes : ndarray, shape (3, ..., 2)
+        MixtureStep
         """
         o, P, w = modes
         s, omega = self.stay ** time_step(dt), self.weights
@@ -140,11 +153,9 @@ class MoveStopWalk(FrozenModel):
         q = np.asarray(step_variance, dtype=np.float64)[..., None] * self.relative_variances
         P_k = P_k + q * dt
         shift, variance = _moments(o_k, P_k, c)
-        return shift[..., 0], variance[..., 0], np.stack([o_k - shift, P_k, c])
+        return MixtureStep(shift[..., 0], variance[..., 0], np.stack([o_k - shift, P_k, c]))
 
-    def update(
-        self, modes: Float, deviation: ArrayLike, noise: ArrayLike
-    ) -> tuple[Float, Float, Float]:
+    def update(self, modes: Float, deviation: ArrayLike, noise: ArrayLike) -> MixtureStep:
         """Update the modes by a measurement.
 
         Parameters
@@ -157,9 +168,7 @@ class MoveStopWalk(FrozenModel):
 
         Returns
         -------
-        shift, variance : ndarray, shape (...)
-            Shift of the mixture's mean, and its variance.
-        modes : ndarray, shape (3, ..., 2)
+        MixtureStep
         """
         o, P, w = modes
         delta, R = (np.asarray(each, dtype=np.float64)[..., None] for each in (deviation, noise))
@@ -171,7 +180,7 @@ class MoveStopWalk(FrozenModel):
         # o_k += P_k/S_k e_k,  P_k = P_k R/S_k
         o, P = o + P / S * e, P * R / S
         shift, variance = _moments(o, P, w)
-        return shift[..., 0], variance[..., 0], np.stack([o - shift, P, w])
+        return MixtureStep(shift[..., 0], variance[..., 0], np.stack([o - shift, P, w]))
 
 
 def _moments(o: Float, P: Float, w: Float) -> tuple[Float, Float]:

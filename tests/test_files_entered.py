@@ -52,7 +52,7 @@ def kalman() -> tuple[Tracker, Any]:
 
 
 def svalse() -> tuple[Tracker, Any]:
-    """23: four models of the array and its data, four of the motion, nine of the solver."""
+    """24: four models of the array and its data, four of the motion, ten of the solver."""
     model = ArraySnapshot(SensorArray.ula(15, spacing=0.5), wavelength=1.0, noise=0.05)
     return SVALSE(model), model.simulate([-0.3, 0.4], [1.0, 1.0j], np.random.default_rng(0))
 
@@ -73,7 +73,7 @@ def interpolation_ekf() -> tuple[Tracker, Any]:
 
 STEPS: list[tuple[Callable[[], tuple[Tracker, Any]], int]] = [
     (kalman, 7),
-    (svalse, 23),
+    (svalse, 24),
     (rss_vb, 14),
     (interpolation_ekf, 18),
 ]

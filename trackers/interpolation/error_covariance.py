@@ -34,7 +34,7 @@ class ScoreTable(FrozenModel):
         baseline, the two shortest, and so on.
     slope : ndarray, shape (n_sets,)
         Mean slope of G over E i, 1 where noise biases no delay.
-    bend : ndarray, shape (n_sets,), or None
+    square_frequency : ndarray, shape (n_sets,), or None
         Ω², rad² per sample²: an error d of the delay changes the mean of G by sin(Ωd)/Ω. None if
         the residuals are linearized again after each sensor.
     """
@@ -42,7 +42,7 @@ class ScoreTable(FrozenModel):
     delays: Float
     noise: Float
     slope: Float
-    bend: Float | None
+    square_frequency: Float | None
 
     @classmethod
     def of(
@@ -52,9 +52,9 @@ class ScoreTable(FrozenModel):
         delays = np.linspace(-kappa, kappa, 2 * math.ceil(DENSITY * kappa) + 1)
         lengths = sorted({abs(model.baseline) for model in models})
         sets = [[model for model in models if abs(model.baseline) <= m] for m in lengths]
-        noise, slope, bend = np.swapaxes([score_moments(each, delays) for each in sets], 0, 1)
-        mean_bend = None if sequential else np.maximum(bend.mean(axis=-1), TINY)
-        return cls(delays, noise, slope.mean(axis=-1), mean_bend)
+        noise, slope, square = np.swapaxes([score_moments(each, delays) for each in sets], 0, 1)
+        square_frequency = None if sequential else np.maximum(square.mean(axis=-1), TINY)
+        return cls(delays, noise, slope.mean(axis=-1), square_frequency)
 
     def noise_at(self, delay: Float, row: Int | int) -> Float:
         """Return the noise of row `row` at delays, interpolated."""
@@ -85,11 +85,12 @@ class ScoreTable(FrozenModel):
         g = 1 - own / before
         pull, square = self.slope[row] * g, variance
         linear = pull
-        if self.bend is not None:
+        if self.square_frequency is not None:
             # E d sin(Ωd)/Ω = M exp(-u/2), E (sin(Ωd)/Ω)² = (1 - exp(-2u)) / 2Ω², u = Ω²M,
             # for d ~ (0, M): the statistical linearization
-            u = self.bend[row] * variance
-            linear, square = pull * np.exp(-0.5 * u), np.expm1(-2 * u) / (-2 * self.bend[row])
+            omega2 = self.square_frequency[row]
+            u = omega2 * variance
+            linear, square = pull * np.exp(-0.5 * u), np.expm1(-2 * u) / (-2 * omega2)
         # E (g G/i)² = P g var(G)/i + (λ g)² E (sin(Ωd)/Ω)²
         spread = self.noise_at(x[..., 0], row) * own * g + pull * pull * square
         # M <- M - b c' - c b', b = P₀ / P₀₀: the other elements follow the delay
@@ -102,7 +103,7 @@ class ScoreTable(FrozenModel):
 
 
 def score_moments(models: list[InterpolationDelay], delays: Float) -> tuple[Float, Float, Float]:
-    """Return noise, slope and bend of `ScoreTable` for baselines in use together, (n_delays,).
+    """Return the moments of `ScoreTable` for baselines in use together, (n_delays,) each.
 
     The score is a quadratic form of the samples, with the matrix Q(f) at a frequency, and samples
     have the spectrum S a a' + V I: source and noise. For Gaussian samples, the sum of many scores
@@ -124,8 +125,8 @@ def score_moments(models: list[InterpolationDelay], delays: Float) -> tuple[Floa
         variance += 2 * len(f) * line_form.total**2 @ power**2
     information = (form.information * V).mean(axis=-1) + line_form.information @ power
     slope = line_form.slope @ power
-    bend = np.maximum(line_form.bent @ power / slope, 0.0)
-    return variance / information, slope / information, bend
+    square = np.maximum(line_form.third_derivative @ power / slope, 0.0)
+    return variance / information, slope / information, square
 
 
 class ScoreForm:
@@ -137,9 +138,9 @@ class ScoreForm:
 
     def __init__(self, models: list[InterpolationDelay], delays: Float, f: Float) -> None:
         n, shape = models[0].n_sensors, (len(delays), len(f))
-        self.information, self.slope, self.bent = np.zeros((3, *shape))
+        self.information, self.slope, self.third_derivative = np.zeros((3, *shape))
         diagonal, rows = np.zeros((n, *shape)), np.zeros((n, *shape), dtype=np.complex128)
-        beside: dict[int, Complex] = {}  # entries of Q at sensors so far apart
+        off_diagonal: dict[int, Complex] = {}  # entries of Q at sensors so far apart
         for model in models:
             m, first, source = model.baseline, max(model.baseline, 0), max(-model.baseline, 0)
             targets, sources = (
@@ -156,14 +157,14 @@ class ScoreForm:
             rows[sources] += mixed - own.real
             rows[targets] += np.conj(mixed)
             diagonal[sources] -= own.real
-            entry = beside.get(abs(m), 0.0)
-            beside[abs(m)] = np.asarray(entry + (mixed if m > 0 else np.conj(mixed)))
+            entry = off_diagonal.get(abs(m), 0.0)
+            off_diagonal[abs(m)] = np.asarray(entry + (mixed if m > 0 else np.conj(mixed)))
             self.information += model.dim_z * np.abs(slope) ** 2 / R[:, None]
-            lean = 2 * model.dim_z * (mixed * -1j * phase).real
-            self.slope += lean
-            self.bent += lean * phase**2
+            mean_slope = 2 * model.dim_z * (mixed * -1j * phase).real
+            self.slope += mean_slope
+            self.third_derivative += mean_slope * phase**2
         self.square = (diagonal**2).sum(axis=0)
-        self.square += sum(2 * (n - m) * np.abs(entry) ** 2 for m, entry in beside.items())
+        self.square += sum(2 * (n - m) * np.abs(entry) ** 2 for m, entry in off_diagonal.items())
         self.rows = (np.abs(rows) ** 2).sum(axis=0)
         self.total = rows.sum(axis=0).real
 

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from arrivals.trackers.svalse.newton.marginals import student_factor
+from arrivals.trackers.marginal_variances import marginal_variances, student_factor
 from arrivals.typing import Complex, Float
-
-MIN_EIGENVALUE = 1e-3  # of the information scaled to a unit diagonal
 
 
 def grid_deviations(
@@ -57,9 +55,7 @@ def grid_deviations(
     noise = max(noise, np.finfo(float).eps * float((Y.real**2 + Y.imag**2).mean()))
     # J_jk = 2/σ² Re[d_j' (I - Q Q') d_k Σ w_j* w_k]
     J = 2 / noise * ((D.conj().T @ (D - Q @ (Q.conj().T @ D))) * (W.conj() @ W.T)).real
-    scale = np.sqrt(np.maximum(J.diagonal(), 1 / largest**2))
-    eigenvalues, V = np.linalg.eigh(J / (scale[:, None] * scale))
-    variance = (V**2 / np.maximum(eigenvalues, MIN_EIGENVALUE)).sum(axis=1) / scale**2
     # v = c(d) (J⁻¹)_jj + Δ²/12
-    variance = student_factor(np.array([freedom])) * variance + step**2 / 12
+    factor = student_factor(np.array([freedom]))
+    variance = factor * marginal_variances(J, largest**2) + step**2 / 12
     return np.asarray(np.minimum(np.sqrt(variance), largest))

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import ClassVar, Literal, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.direction_measurement import DirectionMeasurement
 from arrivals.measurement_models.manifolds.manifold import Reference
@@ -31,7 +31,7 @@ from arrivals.trackers.svalse.valse import (
     detected,
     existence_of,
 )
-from arrivals.typing import Bool, Float, Int
+from arrivals.typing import Bool, Complex, Float, Int
 from arrivals.validation import instance, no_control, one_of, time_step
 
 DEFAULT_MOTION = BernoulliVonMises(sigma_doa=np.deg2rad(1.5), still=0.1)
@@ -116,7 +116,7 @@ class SVALSE(VALSE):
     (array([0.5 , 0.51, 0.52]), array([0, 0, 0]))
     """
 
-    moments: NDArray[np.complex128]
+    moments: Complex
     nuisance: Float
     renamed: ClassVar[dict[str, str]] = {"carry": "memory", "snr_db": "solver__snr_db"}
 

@@ -7,8 +7,8 @@ from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.scenarios import create
 from arrivals.scenarios.metrics import METRICS
 from arrivals.trackers import SBL
+from arrivals.trackers.marginal_variances import student_factor
 from arrivals.trackers.sparse_bayes.deviations import grid_deviations
-from arrivals.trackers.svalse.newton.marginals import student_factor
 from arrivals.typing import Complex, Float
 
 M = np.arange(15.0)[:, None]

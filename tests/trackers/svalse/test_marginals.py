@@ -13,14 +13,10 @@ from arrivals.motion_models import BernoulliVonMises
 from arrivals.motion_models.bessel import log_i0
 from arrivals.scenarios import create, mean_gospa
 from arrivals.trackers import SVALSE
+from arrivals.trackers.marginal_variances import student_factor
 from arrivals.trackers.svalse.newton.elbo import Components, Evaluation, evaluate
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
-from arrivals.trackers.svalse.newton.marginals import (
-    marginal_variances,
-    marginals,
-    noise_factor,
-    student_factor,
-)
+from arrivals.trackers.svalse.newton.marginals import angle_variances, marginals, noise_factor
 from arrivals.trackers.svalse.newton.step import newton_step
 from arrivals.typing import Float
 
@@ -64,7 +60,7 @@ def test_marginals_equal_the_specification(solved: Evaluation) -> None:
 def test_variances_equal_those_of_the_exact_posterior(solved: Evaluation) -> None:
     """Angles on a grid, amplitudes integrated out, the noise known: within 1 % (Laplace)."""
     nu, tau = float(solved.nu[0, 0]), float(solved.tau[0, 0])
-    std = np.sqrt(marginal_variances(RESPONSE, solved)[0])
+    std = np.sqrt(angle_variances(RESPONSE, solved)[0])
     axes = [
         m + np.linspace(-6, 6, 41) * s for m, s in zip(solved.components.mu[0], std, strict=True)
     ]
@@ -100,7 +96,7 @@ def test_separated_sources_have_the_variances_of_the_bound() -> None:
     state = evaluation_of(RESPONSE, y[None, None, :, None], components, nu=1e-3)
     for _ in range(20):
         state = newton_step(RESPONSE, state, np.array([False]))
-    variance = marginal_variances(RESPONSE, state)
+    variance = angle_variances(RESPONSE, state)
     np.testing.assert_allclose(variance, state.components.variance, rtol=0.01)
 
 

@@ -8,10 +8,10 @@ known, is integrated out of what is reported. Neither is put back into the ELBO.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 
+from arrivals.trackers.marginal_variances import marginal_variances, student_factor
 from arrivals.trackers.svalse.newton.elbo import Evaluation
 from arrivals.trackers.svalse.newton.expected_response import (
     ExpectedResponse,
@@ -26,10 +26,6 @@ from arrivals.trackers.svalse.newton.step import (
     weights,
 )
 from arrivals.typing import Complex, Float
-
-MIN_EIGENVALUE = 1e-3  # of the Hessian scaled to a unit diagonal
-MIN_FREEDOM = 2.0  # degrees of freedom of a t distribution below which the table ends
-NORMAL_QUANTILES = (0.99445788, 1.95996398)  # at 84 and 97.5 %
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +53,7 @@ def marginals(
     """Return the marginals of the components of each problem."""
     freedom = 2 * noise_freedom(response, evaluation)
     w2 = evaluation.W.real**2 + evaluation.W.imag**2
-    variance = marginal_variances(response, evaluation)
+    variance = angle_variances(response, evaluation)
     factor = noise_factor(evaluation, w2, freedom)
     return ComponentMarginals(
         variance,
@@ -66,11 +62,10 @@ def marginals(
     )
 
 
-def marginal_variances(response: ExpectedResponse, evaluation: Evaluation) -> Float:
+def angle_variances(response: ExpectedResponse, evaluation: Evaluation) -> Float:
     """Return the diagonal of N⁻¹, rad², (B, L): the Laplace approximation, noise known.
 
-    N is the negative Hessian of F with the amplitudes eliminated; eigenvalues below
-    `MIN_EIGENVALUE`, after scaling to a unit diagonal, are clipped.
+    N is the negative Hessian of F with the amplitudes eliminated.
     """
     v, P = weights(evaluation)
     curvature = slopes(response, evaluation, v, P)[1]
@@ -78,12 +73,7 @@ def marginal_variances(response: ExpectedResponse, evaluation: Evaluation) -> Fl
     N = negative_hessian(response, evaluation, P, curvature)
     N = np.where(used[:, :, None] & used[:, None, :], N, 0.0)
     diagonals(N)[...] += ~used
-    # R = N / (d d'),  d_l = √max(N_ll, 1/0.3)
-    d = np.sqrt(np.maximum(diagonals(N), 1 / MAX_ANGLE_VARIANCE))
-    eigenvalues, V = np.linalg.eigh(N / (d[:, :, None] * d[:, None, :]))
-    # v_l = Σ V_li² / λ_i / d_l²
-    variance = (V**2 / np.maximum(eigenvalues, MIN_EIGENVALUE)[:, None, :]).sum(axis=2) / d**2
-    return np.asarray(np.minimum(variance, MAX_ANGLE_VARIANCE))
+    return marginal_variances(N, MAX_ANGLE_VARIANCE)
 
 
 def noise_factor(evaluation: Evaluation, w2: Float, freedom: Float) -> Float:
@@ -116,31 +106,6 @@ def snapshot_noise(evaluation: Evaluation) -> Float:
     residual: Complex = evaluation.Y - evaluation.A.swapaxes(2, 3) @ evaluation.W
     power = (residual.real**2 + residual.imag**2).sum(axis=2, keepdims=True)
     return np.asarray(power / np.maximum(power.mean(axis=3, keepdims=True), 1e-300))
-
-
-def student_factor(freedom: Float) -> Float:
-    """Return c(d), the variance of a normal density that covers as a t of d degrees does.
-
-    The geometric mean of the squared ratios of the quantiles at 68 and 95 % coverage.
-
-    Examples
-    --------
-    >>> student_factor(np.array([4.0, 8.0, 24.0])).round(3)
-    array([1.616, 1.254, 1.075])
-    """
-    inverse, factor = _student_table()
-    return np.interp(1 / np.maximum(freedom, MIN_FREEDOM), inverse, factor)
-
-
-@cache
-def _student_table() -> tuple[Float, Float]:
-    """Return 1/d and c(d) at 256 points."""
-    from scipy.special import stdtrit
-
-    inverse = np.linspace(0.0, 1 / MIN_FREEDOM, 256)
-    d = 1 / np.maximum(inverse, 1e-12)
-    ratios = [stdtrit(d, p) / z for p, z in zip((0.84, 0.975), NORMAL_QUANTILES, strict=True)]
-    return inverse, np.asarray(ratios[0] * ratios[1])
 
 
 def stated_variances(evaluation: Evaluation, variance: Float, factor: Float) -> Float:
