@@ -17,7 +17,7 @@ from arrivals.scenarios.metrics.separation import nmse
 from arrivals.scenarios.metrics.unlabelled_rmse import best_assignment_rmse
 from arrivals.scenarios.reproduce.ar_kalman_plots import draw_figure
 from arrivals.scenarios.reproduce.claims import verdict
-from arrivals.scenarios.reproduce.studies import Report
+from arrivals.scenarios.reproduce.report import Report
 from arrivals.scenarios.simulations.autoregressive_sources import (
     AutoregressiveField,
     FastSource,

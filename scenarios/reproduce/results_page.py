@@ -1,29 +1,93 @@
-"""Results page: the pages of all studies joined, with contents and verdicts."""
+"""Results page: a paragraph on each paper, then the figure, table and claims of every study."""
 
 from __future__ import annotations
 
 import json
 import re
+import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
 
 import arrivals
 from arrivals.files import atomic_write
 
 MARK = "<!-- arrivals "
-HOLD, FAIL = ("Holds", "Reproduced"), ("Does not hold", "Not reproduced", "Not confirmed")
-VERDICTS = (*HOLD, *FAIL, "Not decided")
-# Prefix of a study's name: paper, heading of its section
-PAPERS = {
-    "svalse": "Park, Meyer and Gerstoft, 2023: SVALSE",
-    "swellex96": "Park, Meyer and Gerstoft, 2023: SVALSE at sea",
-    "ar": "Gu, Chan, Zhu and Swamy, 2013, and Magakian's report, 2024: autoregressive sources",
-    "interpolation": "The interpolation-delay filter",
-    "rss": "Cevher, Sankaranarayanan and Chellappa, 2008: positions from signal strength",
-    "any": "Any array: no published results",
-    "calibration": "Stated deviations and existence: no published results",
-}
+SOURCES = ("paper", "ours", "check")
+
+
+class Paper(NamedTuple):
+    """A paper: prefix of its studies' names, heading, citation, and what it proposes."""
+
+    prefix: str
+    heading: str
+    citation: str
+    paragraph: str
+
+
+PAPERS = (
+    Paper(
+        "svalse",
+        "Sequential direction finding: SVALSE",
+        "Y. Park, F. Meyer and P. Gerstoft, *Graph-based sequential beamforming*, JASA 153(1), "
+        "2023",
+        "Directions of an unknown number of sources by variational Bayes, from step to step with a "
+        "Bernoulli-von Mises motion model. The paper has single runs of three scenes, and sweeps "
+        "of the SNR; here each scene has many runs, beside the conventional beamformer (`cbf`), "
+        "its peaks tracked by Kalman filters (`peaks_gnn`), sparse Bayesian learning (`sbl`, and "
+        "`ssbl` with memory) and the method without memory (`valse`).",
+    ),
+    Paper(
+        "swellex96",
+        "SVALSE at sea",
+        "the same paper, Sec. VIII",
+        "A tow past a vertical line of hydrophones; the field is simulated, as the recordings are "
+        "too large to ship.",
+    ),
+    Paper(
+        "ar",
+        "Directions and signals of autoregressive sources",
+        "J.-F. Gu, S. C. Chan, W.-P. Zhu and M. N. S. Swamy, *Joint DOA estimation and source "
+        "signal tracking with Kalman filtering and regularized QRD RLS algorithm*, IEEE Trans. "
+        'Circuits and Systems II 60(1), 2013; H. Magakian, *Paper analysis*, 2024 ("the report")',
+        "A Kalman filter estimates the source signals, regressions estimate directions and "
+        "coefficients from them.",
+    ),
+    Paper(
+        "interpolation",
+        "The interpolation-delay filter",
+        "K. Radhakrishnan, A. Unnikrishnan and K. G. Balakrishnan, *Performance evaluation of an "
+        "algorithm for estimation of DOA using model estimation technique*",
+        "An extended Kalman filter of the delay between sensors, which interpolates between "
+        "samples. B to E2 are forms of the filter, from the paper's two taps (B) to a phasor on "
+        "all sensors (E), and E on the record twice (E2).",
+    ),
+    Paper(
+        "rss",
+        "Positions from signal strength",
+        "V. Cevher, A. C. Sankaranarayanan and R. Chellappa, *Factorized variational "
+        "approximations for acoustic multi source localization*, ICASSP 2008",
+        "A log-normal model of the envelope at each sensor, and a factorised variational posterior "
+        "(VB) of the positions and powers of several sources, against maximum likelihood (ML).",
+    ),
+    Paper("any", "Any array", "no published results", "SVALSE on circles and sparse lines."),
+    Paper(
+        "calibration",
+        "Uncertainties",
+        "no published results",
+        "Whether the stated deviations and probabilities of existence of SVALSE are true.",
+    ),
+)
+OTHERS = Paper("", "Others", "", "")
+ABBREVIATIONS = (
+    "GOSPA is the mean over the steps of the sum of the distances of estimates to sources and half "
+    "the cut-off (10 degrees) for each missed source and each false estimate; RMSE ignores false "
+    "estimates, and counts the cut-off for missed sources. ± is a standard error.\n\n"
+    "Each claim of a paper is decided by the form that it prints and, where they differ, by the "
+    "defaults of this library; differences within two standard errors are not decided."
+)
 
 
 def add_stamp(text: str, stamp: Mapping[str, Any]) -> str:
@@ -50,8 +114,10 @@ def read_stamp(page: Path) -> dict[str, Any] | None:
     return stamp if last.startswith(MARK) and isinstance(stamp, dict) else None
 
 
-def write_page(path: Path, names: Sequence[str], folder: Path, command: str) -> None:
-    """Write the pages of several studies as one: contents, then one section a study.
+def write_page(path: Path, names: Sequence[str], folder: Path, command: str) -> list[Path]:
+    """Write the pages of several studies as one, and its tables and pictures beside it.
+
+    They lie in a folder of the page's name without its suffix, unless that is `folder`.
 
     Parameters
     ----------
@@ -60,73 +126,96 @@ def write_page(path: Path, names: Sequence[str], folder: Path, command: str) -> 
     names : sequence of str
         Names of the studies.
     folder : Path
-        Folder of their pages NAME.md.
+        Folder of their pages NAME.md, tables and pictures.
     command : str
         Command line that writes this page.
+
+    Returns
+    -------
+    list of Path
+        Files written.
     """
-    pages = {name: (folder / f"{name}.md").read_text(encoding="utf-8") for name in _ordered(names)}
-    contents, sections, paper = [], [], ""
-    for name, text in pages.items():
-        if paper != _paper(name):
+    if path.parent.resolve() == folder.resolve():
+        beside, written = "", []
+    else:
+        beside, written = f"{path.stem}/", _copy(names, folder, path.with_suffix(""))
+    stamps = {name: read_stamp(folder / f"{name}.md") or {} for name in names}
+    lines: list[str] = []
+    paper = OTHERS
+    for name in sorted(names, key=lambda name: _order(_paper(name))):
+        if paper != _paper(name) or not lines:
             paper = _paper(name)
-            contents += ["", f"**{paper}**", ""]
-            sections += [f"## {paper}", ""]
-        contents.append(f"* [{_title(text)}](#{name}){_verdicts(text)}")
-        sections.append(_section(name, text, read_stamp(folder / f"{name}.md")))
+            lines += [f"## {paper.heading}", "", f"{paper.citation}.", "", paper.paragraph, ""]
+        text = (folder / f"{name}.md").read_text(encoding="utf-8")
+        lines.append(_section(name, text, stamps[name], beside))
     head = (
-        "# Results\n\nOur results beside those of the papers, with one line on each claim. "
-        f"Written by\n\n    {command}\n\nwith arrivals {arrivals.__version__}; figures and CSV "
-        "files are next to each study's own page."
-        f"{' Finished studies are not run again.' if len(names) > 1 else ''}\n"
+        "# Results\n\nOur results beside those of the papers, with a verdict on each claim. "
+        f"Written by\n\n    {command}\n\nwith arrivals {arrivals.__version__}; finished studies "
+        f"are not run again.\n\n{_summary(stamps)}\n{ABBREVIATIONS}\n"
     )
     with atomic_write(path) as file:
-        file.write("\n".join([head.rstrip(), *contents, "", *sections]).rstrip() + "\n")
+        file.write("\n".join([head, *lines]).rstrip() + "\n")
+    return [*written, path]
 
 
-def _ordered(names: Sequence[str]) -> list[str]:
-    """Return the names sorted by paper."""
-    papers = list(PAPERS.values())
-    order = {name: papers.index(_paper(name)) if _paper(name) in papers else 99 for name in names}
-    return sorted(names, key=order.__getitem__)
+def _copy(names: Sequence[str], folder: Path, target: Path) -> list[Path]:
+    target.mkdir(exist_ok=True)
+    copies = []
+    for name in names:
+        for source in (folder / f"{name}.csv", *sorted(folder.glob(f"{name}-*.png"))):
+            with atomic_write(target / source.name, binary=True) as file:
+                shutil.copyfileobj(source.open("rb"), file)
+            copies.append(target / source.name)
+    return copies
 
 
-def _paper(name: str) -> str:
-    return PAPERS.get(name.partition("-")[0], "Others")
+def _summary(stamps: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return the table of claims: how many of each paper hold, do not, and are not decided."""
+    lines = ["| | claims of the paper | hold | do not | not decided | ours hold | checks pass |",
+             "| --- | --- | --- | --- | --- | --- | --- |"]  # fmt: skip
+    for paper in (*PAPERS, OTHERS):
+        mine = [s.get("verdicts", {}) for name, s in stamps.items() if _paper(name) == paper]
+        if mine:
+            paper_s, ours, checks = (
+                np.sum([verdicts.get(source, (0, 0, 0)) for verdicts in mine], axis=0)
+                for source in SOURCES
+            )
+            cells = [paper_s.sum(), *paper_s] if paper_s.any() else ["-"] * 4
+            others = [f"{own[0]} of {own.sum()}" if own.any() else "-" for own in (ours, checks)]
+            heading = f"[{paper.heading}](#{_anchor(paper.heading)})"
+            lines.append(f"| {' | '.join(map(str, [heading, *cells, *others]))} |")
+    return "\n".join(lines) + "\n"
 
 
-def _title(text: str) -> str:
-    return text.partition("\n")[0].removeprefix("# ")
-
-
-def _verdicts(text: str) -> str:
-    r"""Return the numbers of claims that hold and do not, if a page has verdicts.
+def _anchor(heading: str) -> str:
+    """Return the anchor of a heading.
 
     Examples
     --------
-    >>> _verdicts("Holds: a (1).\n\nHolds: b (2).\n\nDoes not hold: c (3).\n")
-    ': 2 claims hold, 1 does not'
+    >>> _anchor("Sequential direction finding: SVALSE")
+    'sequential-direction-finding-svalse'
     """
-    words = [line.partition(": ")[0] for line in text.splitlines()]
-    hold, fail, open_ = (sum(map(words.count, kind)) for kind in (HOLD, FAIL, ("Not decided",)))
-    if hold + fail + open_ == 0:
-        return ""
-    summary = f": {hold} claim{'s' * (hold != 1)} hold{'s' * (hold == 1)}, "
-    summary += f"{fail} do{'es' * (fail == 1)} not"
-    return summary + (f", {open_} not decided" if open_ else "")
+    return re.sub(r"[^a-z0-9 -]", "", heading.lower()).replace(" ", "-")
 
 
-def _section(name: str, text: str, stamp: Mapping[str, Any] | None) -> str:
-    """Return a study's page one level deeper, without figures and stamp; claims as a list."""
+def _order(paper: Paper) -> int:
+    return (*PAPERS, OTHERS).index(paper)
+
+
+def _paper(name: str) -> Paper:
+    prefix = name.partition("-")[0]
+    return next((paper for paper in PAPERS if paper.prefix == prefix), OTHERS)
+
+
+def _section(name: str, text: str, stamp: Mapping[str, Any], beside: str) -> str:
+    """Return a study's page one level deeper, with links to its table and pictures."""
     title, *lines = text.splitlines()
-    kept = [line for line in lines if not line.startswith(("![", MARK))]
+    body = "\n".join(line for line in lines if not line.startswith(MARK)).strip()
+    body = re.sub(r"\n{3,}", "\n\n", re.sub(r"!\[(.*?)\]\((.*?)\)", rf"![\1]({beside}\2)", body))
     origin = ""
-    if stamp is not None:
+    if stamp:
         runs = f"{stamp['runs']} run{'s' * (stamp['runs'] != 1)}"
         origin = f", seed {stamp['seed']}, {runs}, arrivals {stamp['version']}"
-    body = "\n".join(kept).strip()
-    while "\n\n\n" in body:
-        body = body.replace("\n\n\n", "\n\n")
-    for word in VERDICTS:
-        body = body.replace(f"\n{word}: ", f"\n* **{word}**: ")
-    body = re.sub(r"(\n\* \*\*.*)\n(?=\n\* \*\*)", r"\1", body)  # one list
-    return f'<a id="{name}"></a>\n\n##{title}\n\n`arrivals reproduce {name}`{origin}.\n\n{body}\n'
+    table = f"[all columns]({beside}{name}.csv)"
+    return (f'<a id="{name}"></a>\n\n##{title}\n\n`arrivals reproduce {name}`{origin}; {table}.'
+            f"\n\n{body}\n")  # fmt: skip

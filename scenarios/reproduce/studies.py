@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import argparse
-import csv
 import importlib
 import inspect
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import arrivals
 from arrivals.files import atomic_write
 from arrivals.scenarios.experiments.results_file import code_mark
+from arrivals.scenarios.reproduce.claims import Verdict, counts
+from arrivals.scenarios.reproduce.pictures import save_picture
+from arrivals.scenarios.reproduce.report import Report
 from arrivals.scenarios.reproduce.results_page import add_stamp, read_stamp, write_page
-from arrivals.trackers.run import text
 from arrivals.validation import count, one_of
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 PACKAGE = "arrivals.scenarios.reproduce"
 QUICK = 10  # runs of a quick study
@@ -58,68 +55,6 @@ RUNS: dict[str, tuple[int, int]] = {
     "svalse-fig10": (5, 2),
     "swellex96": (4, 1),
 }
-
-
-@dataclass(frozen=True, eq=False)
-class Report:
-    """Results of a study.
-
-    Parameters
-    ----------
-    title : str
-        Heading of the page.
-    columns : sequence of str
-        Names of the table's columns.
-    rows : sequence of tuple
-        Rows of the table: text and numbers, NaN for missing ones.
-    remarks : sequence of str
-        Paragraphs below the table: its columns, and the claims with their verdicts.
-    figures : mapping of str to Figure
-        Figures by name.
-    """
-
-    title: str
-    columns: Sequence[str]
-    rows: Sequence[tuple[Any, ...]]
-    remarks: Sequence[str] = ()
-    figures: Mapping[str, Figure] = field(default_factory=dict)
-
-    def to_csv(self, path: Path) -> None:
-        """Write the table as CSV."""
-        with atomic_write(path) as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(self.columns)
-            writer.writerows(text(row) for row in self.rows)
-
-    def markdown(self, pictures: Sequence[str] = ()) -> str:
-        """Return the page: title, table, remarks and figures.
-
-        Examples
-        --------
-        >>> print(Report("Two", ["name", "RMSE"], [("B", 0.65), ("C", float("nan"))]).markdown())
-        # Two
-        <BLANKLINE>
-        | name | RMSE |
-        | --- | --- |
-        | B | 0.65 |
-        | C | - |
-        <BLANKLINE>
-        """
-        heading = [f"# {self.title}", "", _line(self.columns), _line(["---"] * len(self.columns))]
-        table = [_line([_cell(value) for value in row]) for row in self.rows]
-        remarks = [part for remark in self.remarks for part in ("", remark)]
-        shown = [part for name in pictures for part in ("", f"![{name}]({name})")]
-        return "\n".join([*heading, *table, *remarks, *shown, ""])
-
-
-def _line(cells: Sequence[str]) -> str:
-    return f"| {' | '.join(cells)} |"
-
-
-def _cell(value: Any) -> str:
-    if isinstance(value, float):
-        return "-" if value != value else f"{value:.4g}"
-    return str(value)
 
 
 def reproduce(
@@ -182,21 +117,23 @@ def reproduce(
             raise IsADirectoryError(21, "page must be a file; got a folder", str(page))
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
+    from arrivals.scenarios.reproduce.paper_claims import verdicts_of  # imports all studies
+
     names, written = tuple(STUDIES) if name == "all" else (name,), []
     for one in names:
         n_runs = _runs(one, quick) if runs is None else runs
         stamp = {"runs": n_runs, "seed": seed, "quick": quick, "version": arrivals.__version__,
                  "code": code_mark()}  # fmt: skip
         if name != "all" or not _is_done(one, folder, stamp):
-            _write(one, _report(one, folder, n_runs, seed, jobs, quick), folder, stamp)
+            report = _report(one, folder, n_runs, seed, jobs, quick)
+            _write(one, report, verdicts_of(one, report.results), folder, stamp)
         written += _files(one, folder)
     if name == "all" or page is not None:
         target = folder / "results.md" if page is None else Path(page)
         options = " --quick" if quick else f" --runs {runs}" if runs is not None else ""
         to = "" if page is None else f" --page {_shown(target)}"
         command = f"arrivals reproduce {name}{options} --seed {seed} --out {_shown(folder)}{to}"
-        write_page(target, names, folder, command)
-        written.append(target)
+        written += write_page(target, names, folder, command)
     return written
 
 
@@ -207,8 +144,9 @@ def _shown(path: Path) -> str:
 
 def _is_done(name: str, folder: Path, stamp: Mapping[str, Any]) -> bool:
     """Return True if the page of a study with this stamp exists, and all its files."""
-    page = folder / f"{name}.md"
-    return read_stamp(page) == stamp and all(path.exists() for path in _files(name, folder))
+    found = read_stamp(folder / f"{name}.md") or {}
+    same = {key: value for key, value in found.items() if key != "verdicts"} == stamp
+    return same and all(path.exists() for path in _files(name, folder))
 
 
 def _files(name: str, folder: Path) -> list[Path]:
@@ -233,19 +171,19 @@ def _report(name: str, folder: Path, runs: int, seed: int, jobs: int, quick: boo
         return study(runs, seed, **{key: options[key] for key in options if key in accepted})
 
 
-def _write(name: str, report: Report, folder: Path, stamp: Mapping[str, Any]) -> None:
+def _write(
+    name: str, report: Report, verdicts: Sequence[Verdict], folder: Path, stamp: Mapping[str, Any]
+) -> None:
     """Write a report's table, figures with their origin, and page."""
     report.to_csv(folder / f"{name}.csv")
     files = [f"{name}-{key}.png" for key in report.figures]
     runs = f"{stamp['runs']} run{'s' * (stamp['runs'] != 1)}"
     origin = f"{name}, seed {stamp['seed']}, {runs} · arrivals {stamp['version']}"
     for path, figure in zip(files, report.figures.values(), strict=True):
-        label = f"{report.title} · {origin}"
-        figure.supxlabel(label, x=0.995, ha="right", fontsize=6, color="0.4")
-        with atomic_write(folder / path, binary=True) as file:
-            figure.savefig(file, format="png", dpi=130)
+        save_picture(figure, folder / path, f"{report.title} · {origin}")
+    page = report.markdown(files, verdicts)
     with atomic_write(folder / f"{name}.md") as file:
-        file.write(add_stamp(report.markdown(files), stamp))
+        file.write(add_stamp(page, {**stamp, "verdicts": counts(verdicts)}))
 
 
 def add_reproduce(commands: Any) -> None:

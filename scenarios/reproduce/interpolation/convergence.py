@@ -15,7 +15,7 @@ from arrivals.scenarios.reproduce.interpolation.trials import (
     rms,
     scan_records,
 )
-from arrivals.scenarios.reproduce.studies import Report
+from arrivals.scenarios.reproduce.report import Report
 from arrivals.scenarios.simulations.sampled_source import InterpolationTone
 from arrivals.typing import Float
 

@@ -17,7 +17,7 @@ from arrivals.scenarios.reproduce.interpolation.trials import (
     rms,
     scan_records,
 )
-from arrivals.scenarios.reproduce.studies import Report
+from arrivals.scenarios.reproduce.report import Report
 from arrivals.scenarios.simulations.sampled_source import InterpolationScenario
 
 if TYPE_CHECKING:

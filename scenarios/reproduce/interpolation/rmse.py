@@ -15,7 +15,7 @@ from arrivals.scenarios.reproduce.interpolation.trials import (
     final_directions,
     rms,
 )
-from arrivals.scenarios.reproduce.studies import Report
+from arrivals.scenarios.reproduce.report import Report
 from arrivals.scenarios.simulations.sampled_source import InterpolationScenario
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ from arrivals.scenarios.reproduce.interpolation.trials import (
     final_directions,
     mean_and_variance,
 )
-from arrivals.scenarios.reproduce.studies import Report
+from arrivals.scenarios.reproduce.report import Report
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -15,6 +15,7 @@ import numpy as np
 from arrivals.measurement_models import db_to_neper, neper_to_db
 from arrivals.scenarios.metrics.position_errors import Scores, assign, scores
 from arrivals.scenarios.reproduce.claims import verdict
+from arrivals.scenarios.reproduce.report import Report
 from arrivals.scenarios.reproduce.rss.trials import (
     SOLVERS,
     Draws,
@@ -22,7 +23,6 @@ from arrivals.scenarios.reproduce.rss.trials import (
     draws,
     estimates,
 )
-from arrivals.scenarios.reproduce.studies import Report
 from arrivals.scenarios.simulations.signal_strength import FixedSources, Table1K3, Table1K7
 from arrivals.trackers.rss.inference.map_search import maximize
 from arrivals.trackers.rss.rss_vb import variational_posterior

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,8 +18,8 @@ from arrivals.scenarios.base import Trial
 from arrivals.scenarios.experiments.workers import parallel_map
 from arrivals.scenarios.metrics.gospa import Gospa, mean_gospa
 from arrivals.scenarios.registry import create
-from arrivals.scenarios.reproduce.claims import negative, verdict
-from arrivals.scenarios.reproduce.studies import Report
+from arrivals.scenarios.reproduce.claims import Claim, Decision, below
+from arrivals.scenarios.reproduce.report import Report
 from arrivals.scenarios.simulations.planar_arrays import Circle
 from arrivals.trackers import NewtonSolver
 from arrivals.trackers.run import Run
@@ -109,10 +110,11 @@ def any_array(runs: int, seed: int) -> Report:
         "'beamformer, tracked' is `peaks_gnn` on the beamformer's peaks. VALSE merges components "
         "within 1.5 degrees, as SVALSE does. The sparse line has eight sensors two wavelengths "
         "apart: every source has grating lobes.",
-        *claims(scores[:, :, 0]),
     )
     title = f"Any array: GOSPA over {runs} runs"
-    return Report(title, columns, rows, remarks, {"circle": _draw(seed)})
+    keys = [(case.label, case.method) for case in CASES]
+    results = dict(zip(keys, scores[:, :, 0], strict=True))
+    return Report(title, columns, rows, remarks, {"circle": _draw(seed)}, results=results)
 
 
 # Claims on the same draws: (label, method) of the lower and the higher GOSPA, and the claim
@@ -136,16 +138,14 @@ ORDER = [
 ]  # fmt: skip
 
 
-def claims(gospa: Float) -> list[str]:
-    """Return the verdicts on `ORDER` by paired differences of GOSPA (n_cases, n_runs)."""
-    values = {(case.label, case.method): row for case, row in zip(CASES, gospa, strict=True)}
-    lines = []
-    for low, high, claim in ORDER:
-        d = values[low] - values[high]
-        mean, error = float(d.mean()), float(d.std(ddof=1) / np.sqrt(len(d)))
-        numbers = f"paired difference {mean:.2f} ± {error:.2f} standard error"
-        lines.append(verdict(claim, negative(mean, error), numbers))
-    return lines
+def _decided(low: tuple[str, str], high: tuple[str, str], results: Any) -> Decision:
+    return below(results[low], results[high], "degrees")
+
+
+CLAIMS = tuple(
+    Claim("any-array", "", text, by_ours=partial(_decided, low, high), source="ours")
+    for low, high, text in ORDER
+)
 
 
 def _scores(case: ArrayExperiment, seed: int) -> tuple[float, float, float, float]:

@@ -5,7 +5,8 @@ Each scene is tracked twice: as the scenario says, and with a walk that never st
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -17,9 +18,13 @@ from arrivals.scenarios.metrics.calibration import Reliability, reliability
 from arrivals.scenarios.metrics.consistency import circular_nees, coverage
 from arrivals.scenarios.metrics.registry import METRICS, existence_and_hits, pairs_of
 from arrivals.scenarios.registry import create
-from arrivals.scenarios.reproduce.claims import verdict
-from arrivals.scenarios.reproduce.studies import Report
-from arrivals.scenarios.reproduce.svalse.calibration_scenes import SCENES, CalibrationScene
+from arrivals.scenarios.reproduce.claims import Claim, Decide, Decision
+from arrivals.scenarios.reproduce.report import Report
+from arrivals.scenarios.reproduce.svalse.calibration_scenes import (
+    SCENES,
+    CalibrationScene,
+    Coverage,
+)
 from arrivals.trackers.run import Run
 from arrivals.typing import Bool, Float
 
@@ -109,7 +114,6 @@ def calibration(runs: int, seed: int) -> Report:
         "with the share of estimates within 10 degrees of a source. 'Never stops': by a walk that "
         "never stops, `still=0`; the change of GOSPA from that to the default is paired, with its "
         "standard error.",
-        *claims(pooled),
     )
     return Report(
         f"SVALSE: stated deviations and existence over {runs} runs",
@@ -117,6 +121,8 @@ def calibration(runs: int, seed: int) -> Report:
         [_row(scene, result) for scene, result in pooled.items()],
         remarks,
         _figures(pooled),
+        ("scene", "68 %", "95 %", "NEES", "GOSPA", "GOSPA, change", "its error", "ECE"),
+        pooled,
     )
 
 
@@ -153,45 +159,58 @@ def reliability_of(pooled: Pooled, loud: bool) -> Reliability:
     return reliability(together.existence, together.hit)
 
 
-def claims(pooled: Pooled) -> list[str]:
-    """Return the verdicts on coverage, GOSPA and reliability."""
-    return [
-        *(line for scene, result in pooled.items() for line in _claims_of(scene, result)),
-        *_claims_of_existence(pooled),
-    ]
+# -- claims --------------------------------------------------------------------------------------
 
 
-def _claims_of(scene: CalibrationScene, result: Paired) -> list[str]:
-    lines = []
-    for limits, stated, note in (
-        (scene.limits, result.default, ""),
-        (scene.never_stops, result.never_stops, " by a walk that never stops"),
-    ):
-        if limits is not None:
-            _, c68, _, c95 = shares(stated)
-            text = f"{scene.label}: coverage{note} within {limits}"
-            lines.append(verdict(text, limits.holds(c68, c95), f"{c68:.1%} and {c95:.1%}"))
-    if scene.change is not None:
-        mean, error, *_ = change(result)
-        text = f"{scene.label}: GOSPA changes by at most {scene.change:+g} degrees"
-        lines.append(verdict(text, mean <= scene.change, f"{mean:+.2f} ± {error:.2f}"))
-    return lines
+def covers(scene: CalibrationScene, limits: Coverage, form: int, pooled: Pooled) -> Decision | None:
+    """Decide that the intervals of a form, 0 or 1 of `Paired`, cover within limits."""
+    if scene not in pooled:
+        return None
+    _, c68, _, c95 = shares(pooled[scene][form])
+    return Decision(limits.holds(c68, c95), f"{c68:.1%} and {c95:.1%}")
 
 
-def _claims_of_existence(pooled: Pooled) -> list[str]:
+def changes(scene: CalibrationScene, limit: float, pooled: Pooled) -> Decision | None:
+    """Decide that GOSPA changes by at most a limit."""
+    if scene not in pooled:
+        return None
+    mean, error = change(pooled[scene])
+    return Decision(mean <= limit, f"{mean:+.2f} ± {error:.2f}")
+
+
+def existence_everywhere(pooled: Pooled) -> Decision:
+    """Decide on the calibration error of the existence in every scene at 10 dB and more."""
     parts = {scene.label: result.default for scene, result in pooled.items() if scene.snr_db >= 10}
     eces = {label: reliability(p.existence, p.hit).ece for label, p in parts.items()}
     worst = max(eces, key=lambda label: eces[label])
-    text = "existence in every scene at 10 dB and more: ECE below 0.05"
-    lines = [verdict(text, eces[worst] < 0.05, f"at most {eces[worst]:.3f}: {worst}")]
-    loud = reliability_of(pooled, loud=True)
-    for name, value, limit in (
-        ("Brier score", loud.brier, 0.007),
-        ("log score", loud.log_score, 0.04),
-    ):
+    return Decision(eces[worst] < 0.05, f"at most {eces[worst]:.3f}: {worst}")
+
+
+def existence_score(name: str, limit: float, pooled: Pooled) -> Decision:
+    """Decide on a score of the existence at 10 dB and more, pooled."""
+    value = float(getattr(reliability_of(pooled, loud=True), name))
+    return Decision(value <= limit, f"{value:.4f}")
+
+
+def _claims() -> Iterator[tuple[str, Decide]]:
+    for scene in SCENES:
+        forms = (("", scene.limits), (" by a walk that never stops", scene.never_stops))
+        for form, (note, limits) in enumerate(forms):
+            if limits is not None:
+                text = f"{scene.label}: 68 and 95 % intervals{note} cover {limits}"
+                yield text, partial(covers, scene, limits, form)
+        if scene.change is not None:
+            text = f"{scene.label}: GOSPA changes by at most {scene.change:+g} degrees"
+            yield text, partial(changes, scene, scene.change)
+    yield "existence in every scene at 10 dB and more: ECE below 0.05", existence_everywhere
+    for name, limit in (("brier", 0.007), ("log_score", 0.04)):
         text = f"existence at 10 dB and more, pooled: {name} at most {limit:g}"
-        lines.append(verdict(text, value <= limit, f"{value:.4f}"))
-    return lines
+        yield text, partial(existence_score, name, limit)
+
+
+CLAIMS = tuple(
+    Claim("calibration", "", text, by_ours=decide, source="ours") for text, decide in _claims()
+)
 
 
 def _figures(pooled: Pooled) -> dict[str, Figure]:

@@ -15,7 +15,7 @@ from arrivals.scenarios.experiments.monte_carlo import StudySettings, compute_st
 from arrivals.scenarios.experiments.study import Study
 from arrivals.scenarios.registry import create
 from arrivals.scenarios.reproduce.claims import negative, verdict
-from arrivals.scenarios.reproduce.studies import Report
+from arrivals.scenarios.reproduce.report import Report
 from arrivals.scenarios.reproduce.svalse.calibration_scenes import CONSERVATIVE
 from arrivals.scenarios.reproduce.svalse.plots import draw_parts, draw_runs
 from arrivals.scenarios.reproduce.svalse.published_values import ACTIVATION, PAPER, REBUILT

@@ -14,7 +14,7 @@ from arrivals.scenarios.experiments.monte_carlo import StudySettings, compute_st
 from arrivals.scenarios.experiments.study import Study
 from arrivals.scenarios.registry import create
 from arrivals.scenarios.reproduce.claims import negative, verdict
-from arrivals.scenarios.reproduce.studies import Report
+from arrivals.scenarios.reproduce.report import Report
 from arrivals.scenarios.reproduce.svalse.figures_4_to_7 import NAN, batch_of, table_methods
 from arrivals.scenarios.reproduce.svalse.plots import panels
 from arrivals.scenarios.reproduce.svalse.published_values import SWEEP, SWEPT

@@ -11,7 +11,7 @@ import numpy as np
 from arrivals.scenarios.experiments.workers import parallel_map
 from arrivals.scenarios.metrics.gospa import mean_gospa, mean_rmse
 from arrivals.scenarios.reproduce.claims import negative, verdict
-from arrivals.scenarios.reproduce.studies import Report
+from arrivals.scenarios.reproduce.report import Report
 from arrivals.scenarios.reproduce.swellex96.claims import Claim, claims
 from arrivals.scenarios.reproduce.swellex96.plots import environment_figure, field_figure
 from arrivals.scenarios.simulations.swellex96 import WITHIN_DB, TowPastLine, track

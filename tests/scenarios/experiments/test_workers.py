@@ -16,7 +16,7 @@ from arrivals.scenarios import Study, monte_carlo
 from arrivals.scenarios.experiments.monte_carlo import StudySettings, compute_study
 from arrivals.scenarios.experiments.workers import parallel_map
 from arrivals.scenarios.reproduce import studies as reproduce
-from arrivals.scenarios.reproduce.studies import Report
+from arrivals.scenarios.reproduce.report import Report
 from arrivals.scenarios.simulations import PairsInTurn
 from arrivals.trackers import CBF, Run, register
 

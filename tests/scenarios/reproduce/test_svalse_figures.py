@@ -10,7 +10,8 @@ import pytest
 from arrivals import scenarios
 from arrivals.scenarios import Scenario, Study
 from arrivals.scenarios.reproduce import studies as reproduce
-from arrivals.scenarios.reproduce.studies import RUNS, STUDIES, Report
+from arrivals.scenarios.reproduce.report import Report
+from arrivals.scenarios.reproduce.studies import RUNS, STUDIES
 from arrivals.scenarios.reproduce.svalse import any_array as reproduce_any_array
 from arrivals.scenarios.reproduce.svalse import figures_4_to_7 as reproduce_svalse
 from arrivals.scenarios.reproduce.svalse import figures_8_to_10 as reproduce_svalse_snr
