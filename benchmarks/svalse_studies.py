@@ -17,8 +17,8 @@ from joblib import parallel_config
 from arrivals.scenarios import create
 from arrivals.scenarios.experiments.methods import tracker_name
 from arrivals.scenarios.experiments.monte_carlo import StudySettings, compute_study
-from arrivals.scenarios.reproduce.svalse.figures_4_to_7 import svalse_as_printed, table_methods
 from arrivals.scenarios.reproduce.svalse.figures_8_to_10 import SCENES, SNR_DB, sweep
+from arrivals.scenarios.reproduce.svalse.forms import svalse_paper_form, table_methods
 from arrivals.scenarios.reproduce.svalse.published_values import ACTIVATION, REBUILT, SWEEP, SWEPT
 
 
@@ -73,7 +73,7 @@ def activations(runs: int, out: Path) -> None:
     print("\n| p_d, p_a | GOSPA | rebuilt | missed | false | RMSE | rebuilt | within |")
     print("|---" * 8 + "|")
     settings = [
-        svalse_as_printed(f"{off:g}, {on:g}", p_deactivate=off, p_activate=on)
+        svalse_paper_form(f"{off:g}, {on:g}", p_deactivate=off, p_activate=on)
         for off, on in ACTIVATION
     ]
     cases = {"svalse_fig6": create("svalse_fig6")}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -164,7 +163,7 @@ def _copy(names: Sequence[str], folder: Path, target: Path) -> list[Path]:
     for name in names:
         for source in (folder / f"{name}.csv", *sorted(folder.glob(f"{name}-*.png"))):
             with atomic_write(target / source.name, binary=True) as file:
-                shutil.copyfileobj(source.open("rb"), file)
+                file.write(source.read_bytes())
             copies.append(target / source.name)
     return copies
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -27,7 +27,9 @@ class LineScenario(Scenario):
     Parameters
     ----------
     snr_db : float
-        Summed power of the sources over the noise power, after beamforming of one snapshot, dB.
+        Summed power of the sources over that of the noise, at one sensor, dB: the paper's (69)
+        for sources at different directions, held in every snapshot. Beamforming towards one source
+        gains 10 lg `n_sensors` more.
     n_sensors, n_steps : int
         Numbers of sensors and time steps.
     """
@@ -124,14 +126,26 @@ class StaticSources(LineScenario):
 class SixStatic(LineScenario):
     """Six static sources at -70, -55, -40, 35, 50 and 65 degrees.
 
+    Parameters
+    ----------
+    offset_deg : float
+        Added to all directions, degrees; 0.25 is halfway between the directions of `SBL`.
+
     References
     ----------
     Park, Meyer and Gerstoft, JASA 153(1), 2023, Figs 9 and 10 (scenario 2).
     """
 
+    offset_deg: float = field(default=0.0, kw_only=True)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        number("offset_deg", self.offset_deg)
+
     def doa_deg(self) -> Float:
         """Return the directions, degrees."""
-        return np.tile([-70.0, -55.0, -40.0, 35.0, 50.0, 65.0], (self.n_steps, 1))
+        doa = np.array([-70.0, -55.0, -40.0, 35.0, 50.0, 65.0]) + self.offset_deg
+        return np.tile(doa, (self.n_steps, 1))
 
 
 @register("svalse_scenario1")
@@ -139,14 +153,25 @@ class SixStatic(LineScenario):
 class ThreeStatic(LineScenario):
     """Three static sources at -3, 2 and 60 degrees, of amplitude 10 and random phases.
 
+    Parameters
+    ----------
+    offset_deg : float
+        Added to all directions, degrees; 0.25 is halfway between the directions of `SBL`.
+
     References
     ----------
     Park, Meyer and Gerstoft, JASA 153(1), 2023, Figs 8 and 10 (scenario 1).
     """
 
+    offset_deg: float = field(default=0.0, kw_only=True)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        number("offset_deg", self.offset_deg)
+
     def doa_deg(self) -> Float:
         """Return the directions, degrees."""
-        return np.tile([-3.0, 2.0, 60.0], (self.n_steps, 1))
+        return np.tile(np.array([-3.0, 2.0, 60.0]) + self.offset_deg, (self.n_steps, 1))
 
     def amplitudes(self, rng: np.random.Generator) -> Complex:
         """Draw 10 exp(jφ), φ uniform."""

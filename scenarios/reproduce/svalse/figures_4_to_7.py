@@ -7,59 +7,51 @@ from typing import Any
 
 import numpy as np
 
-from arrivals.motion_models import BernoulliVonMises
 from arrivals.scenarios.base import Scenario
 from arrivals.scenarios.bounds.snapshot import line_bound
-from arrivals.scenarios.experiments.methods import Method, methods, tracker_name
+from arrivals.scenarios.experiments.methods import Method, tracker_name
 from arrivals.scenarios.experiments.monte_carlo import StudySettings, compute_study
 from arrivals.scenarios.experiments.study import Study
+from arrivals.scenarios.experiments.workers import parallel_map
+from arrivals.scenarios.metrics.registry import METRICS
 from arrivals.scenarios.registry import create
-from arrivals.scenarios.reproduce.claims import negative, verdict
 from arrivals.scenarios.reproduce.report import Report
-from arrivals.scenarios.reproduce.svalse.calibration_scenes import CONSERVATIVE
-from arrivals.scenarios.reproduce.svalse.plots import draw_parts, draw_runs
-from arrivals.scenarios.reproduce.svalse.published_values import ACTIVATION, PAPER, REBUILT
-from arrivals.trackers import CoordinateSolver
-
-FAST = ("cbf", "peaks_gnn", "sbl", "ssbl", "valse", "svalse")
-
-
-def as_printed(max_iterations: int) -> dict[str, Any]:
-    """Return the parameters of the paper's form."""
-    solver = CoordinateSolver(tolerance=1e-6, max_iterations=max_iterations)
-    return {"solver": solver, "reference": "first"}
-
-
-def svalse_as_printed(label: str, **probabilities: float) -> Method:
-    """Return SVALSE as published, with its walk in the electrical angle.
-
-    Examples
-    --------
-    >>> svalse_as_printed("no deaths", p_deactivate=0.0).params["motion"].walk.kappa
-    148.0
-    """
-    motion = BernoulliVonMises(**probabilities)
-    return Method("svalse", as_printed(1000) | {"motion": motion}, label)
-
-
-PRINTED = (
-    Method("valse", as_printed(2000), "valse as printed"),
-    svalse_as_printed("svalse as printed"),
+from arrivals.scenarios.reproduce.svalse.decisions import results_of
+from arrivals.scenarios.reproduce.svalse.factor_graph import draw_factor_graph
+from arrivals.scenarios.reproduce.svalse.forms import (
+    FORMS,
+    NAN,
+    PAPER_FORM,
+    PRINTED_7D,
+    activation_label,
+    batch_of,
+    svalse_as_printed,
+    svalse_paper_form,
+    table_methods,
+    valse_as_printed,
+    valse_paper_form,
 )
-SHOWN = ("valse", "svalse", "sbl", "ssbl", "cbf", "peaks_gnn")
-NAN = float("nan")
+from arrivals.scenarios.reproduce.svalse.plots import (
+    DrawnRun,
+    draw_activation,
+    draw_parts,
+    draw_scene,
+)
+from arrivals.scenarios.reproduce.svalse.published_values import ACTIVATION, PAPER, REBUILT
+from arrivals.scenarios.reproduce.svalse.step_metrics import STEP_METRICS
+
+MEASURED = METRICS | STEP_METRICS
 COLUMNS = ("method", "GOSPA", "std of runs", "from", "to", "distance", "missed", "false", "RMSE",
-           "wrong number", "label switches", "track length", "NEES", "in 68 %", "in 95 %",
-           "CPU ms a step", "paper's run", "rebuilt", "its std", "rebuilt RMSE")  # fmt: skip
-
-
-def table_methods(quick: bool) -> list[Method]:
-    """Return the methods of the tables; the published forms take ten times as long."""
-    return methods(FAST if quick else (*FAST, *PRINTED))
+           "std of steps", "found near endfire", "wrong number", "converged", "label switches",
+           "track length", "NEES", "in 68 %", "in 95 %", "CPU ms a step", "paper's run", "rebuilt",
+           "its std", "rebuilt RMSE")  # fmt: skip
+SHOWN = ("method", "GOSPA", "std of runs", "missed", "false", "RMSE", "std of steps", "paper's run")
+RUN_METRICS = ("gospa", "distance", "missed", "false", "rmse", "gospa_std", "found_near_endfire",
+               "cardinality", "converged")  # fmt: skip
 
 
 def fig4(runs: int, seed: int, out: Path | None = None, quick: bool = False) -> Report:
-    """Six sources, of which two move and cross, 20 dB."""
+    """Six sources, of which two move and cross, 20 dB; and the factor graph of SVALSE."""
     return scene("svalse_fig4", "Fig. 4: six sources, two of which cross", runs, seed, out, quick)
 
 
@@ -79,41 +71,40 @@ def scene(
 ) -> Report:
     """Compare all methods on one scene; draw the first run, and the parts of GOSPA."""
     scenario = create(name)
-    settings = StudySettings(out=out, batch=batch_of(runs))
+    settings = StudySettings(MEASURED, out, batch=batch_of(runs))
     study = compute_study({name: scenario}, table_methods(quick), runs, seed, settings)
     rows = [_row(study, name, method) for method in study.methods]
-    claims = [*_order(study), *_as_rebuilt(study, name), *_calibration(study)]
-    lines = [*remarks, *SPREADS, *claims, _bound(scenario, runs, seed)]
-    figures = {
-        "tracks": draw_runs(
-            scenario, seed, methods(SHOWN), [PAPER[name].get(method, NAN) for method in SHOWN]
-        ),
-        "gospa": draw_parts(study, name),
-    }
-    return Report(f"{title}, {runs} runs at 20 dB, degrees", COLUMNS, rows, lines, figures)
+    drawn = first_runs(scenario, seed, quick)
+    rows += [_run_row(one, name) for one in drawn if one.method not in study.methods]
+    lines = [*remarks, SPREADS, FORMS, _scale(scenario, runs, seed)]
+    figures = {"tracks": draw_scene(drawn, PAPER[name]), "gospa": draw_parts(study, name)}
+    if name == "svalse_fig4":
+        figures["graph"] = draw_factor_graph()
+    heading = f"{title}, {runs} runs at 20 dB, degrees"
+    return Report(heading, COLUMNS, rows, lines, figures, SHOWN, results_of(study))
 
 
-def batch_of(runs: int) -> int:
-    """Return the number of runs in a batch: eight batches or more for a few processes.
+def first_runs(scenario: Scenario, seed: int, quick: bool) -> list[DrawnRun]:
+    """Return run 0 by VALSE and SVALSE as printed, and by ours; a quick study has only ours."""
+    printed = [] if quick else [valse_as_printed(), svalse_as_printed()]
+    shown = [*printed, Method("valse"), Method("svalse")]
+    return parallel_map(drawn_run, [(scenario, method, seed) for method in shown])
 
-    Examples
-    --------
-    >>> batch_of(2), batch_of(20), batch_of(1000)
-    (1, 2, 16)
-    """
-    return min(max(1, runs // 8), 16)
+
+def drawn_run(scenario: Scenario, method: Method, seed: int) -> DrawnRun:
+    """Return run 0 of a study by a method."""
+    seed_sequence = np.random.SeedSequence(seed, spawn_key=(0,))
+    trial = scenario.sample(np.random.default_rng(seed_sequence))
+    return DrawnRun(method.label, trial, method.make(trial, seed_sequence).run(trial.measurements))
 
 
 SPREADS = (
-    "From, to: 95 % bootstrap interval of the mean. Label switches: number in a run. Track length: "
-    "number of steps in which a source is detected with one label, without a gap. NEES: squared "
-    "error over stated variance, 1 if consistent; in 68 %, in 95 %: fraction of errors within the "
-    "stated intervals. Deviations count as stated if these fractions are within "
-    f"{CONSERVATIVE}: some sources stand still, and the motion models allow for more.",
-    "Rebuilt: the published programs of SBL and SSBL; VALSE and SVALSE as the paper prints them "
-    "(coordinate ascent, first sensor as phase reference, tolerance 1e-6, a walk in the electrical "
-    "angle). Ours, unless called 'as printed', use joint Newton steps, a phase reference in the "
-    "middle and a walk of 1.5 degrees in direction.",
+    "From, to: 95 % bootstrap interval of the mean. Std of steps: of GOSPA over the steps of a "
+    "run. Found near endfire: share of the sources from 50 degrees on with an estimate within 10 "
+    "degrees. Label switches: number in a run. Track length: number of steps in which a source is "
+    "detected with one label, without a gap. NEES: squared error over stated variance, 1 if "
+    "consistent; in 68 %, in 95 %: fraction of errors within the stated intervals. Rebuilt: the "
+    "published programs of SBL and SSBL; VALSE and SVALSE in the paper's form."
 )
 
 
@@ -126,136 +117,87 @@ def _row(study: Study, name: str, method: str) -> tuple[Any, ...]:
 
     rebuilt = REBUILT[name].get(tracker_name(method))
     reference = (rebuilt.gospa, rebuilt.std, rebuilt.rmse) if rebuilt else (NAN,) * 3
-    metrics = ("distance", "missed", "false", "rmse", "cardinality", "label_switches",
-               "track_length", "nees", "coverage68", "coverage95", "cpu_ms")  # fmt: skip
+    stated = ("label_switches", "track_length", "nees", "coverage68", "coverage95", "cpu_ms")
     return (
         method,
         study.mean("gospa", method),
         study.spread("gospa", method),
         *study.interval("gospa", method),
-        *map(mean, metrics),
+        *map(mean, (*RUN_METRICS[1:], *stated)),
         PAPER[name].get(tracker_name(method), NAN),
         *reference,
     )
 
 
-def _order(study: Study) -> list[str]:
-    lines = []
-    claims = [("svalse", "ssbl"), ("ssbl", "sbl"), ("svalse", "valse"), ("svalse", "peaks_gnn")]
-    if "svalse as printed" in study.methods:
-        claims.append(("svalse as printed", "ssbl"))
-    for better, worse in claims:
-        d = study.paired("gospa", better, worse)
-        numbers = (
-            f"paired difference {d.mean:.2f} ± {d.error:.2f} standard error, "
-            f"below 0 in {d.n_below} of {d.n_runs} runs"
-        )
-        fact = negative(d.mean, d.error)
-        lines.append(verdict(f"{better} has a lower GOSPA than {worse}", fact, numbers))
-    return lines
+def _run_row(drawn: DrawnRun, name: str) -> tuple[Any, ...]:
+    """Return the row of a single run."""
+    gospa, *rest = (MEASURED[metric](drawn.trial, drawn.run) for metric in RUN_METRICS)
+    paper = PAPER[name].get(tracker_name(drawn.method), NAN)
+    return (f"{drawn.method}, run 0", gospa, *[NAN] * 3, *rest, *[NAN] * 6, paper, *[NAN] * 3)
 
 
-def _as_rebuilt(study: Study, name: str) -> list[str]:
-    """Compare the methods that are the rebuilt ones with the rebuilt values."""
-    lines = []
-    for method in study.methods:
-        its = REBUILT[name].get(tracker_name(method))
-        if its is None or method in ("valse", "svalse"):  # these improve on the paper's
-            continue
-        gospa = study.mean("gospa", method)
-        numbers = f"GOSPA {gospa:.2f}, rebuilt {its.gospa:.2f} ± {its.std:.2f}"
-        fact = abs(gospa - its.gospa) <= 2 * its.std
-        lines.append(
-            verdict(f"{method} is within two deviations of its rebuilt form", fact, numbers)
-        )
-    return lines
-
-
-def _calibration(study: Study) -> list[str]:
-    """Check the stated standard deviations of each method that has them."""
-    lines = []
-    for method in study.methods:
-        try:
-            nees, c68, c95 = (study.mean(m, method) for m in ("nees", "coverage68", "coverage95"))
-        except ValueError:  # no standard deviations
-            continue
-        numbers = (
-            f"errors {np.sqrt(nees):.1f} times as large as stated, in rms; the 68 % and 95 % "
-            f"intervals cover {100 * c68:.0f} % and {100 * c95:.0f} %"
-        )
-        fact = CONSERVATIVE.holds(c68, c95)
-        lines.append(
-            verdict(f"{method} states the standard deviations of its errors", fact, numbers)
-        )
-    return lines
-
-
-def _bound(scenario: Scenario, runs: int, seed: int) -> str:
+def _scale(scenario: Scenario, runs: int, seed: int) -> str:
     bound = line_bound(scenario, min(runs, 6), seed)  # type: ignore[arg-type]  # a LineScenario
     return (
         f"Scale: an efficient estimator from one snapshot with a known number of sources would "
         f"have a GOSPA of {bound.gospa:.2f} and an RMSE of {bound.rmse:.2f} (deterministic "
-        f"Cramér-Rao bound, capped at the cut-off)."
+        f"Cramér-Rao bound, capped at the cut-off); methods with memory may be below."
     )
 
 
 # -- Fig. 7 ------------------------------------------------------------------------------------
 
 
-def fig7(runs: int, seed: int, out: Path | None = None) -> Report:
+def fig7(runs: int, seed: int, out: Path | None = None, quick: bool = False) -> Report:
     """Extreme probabilities of birth and death, on the scenario of Fig. 6."""
-    panels = {f"p_d {death:g}, p_a {birth:g}": (death, birth) for death, birth in ACTIVATION}
     trackers = [
-        svalse_as_printed(label, p_deactivate=death, p_activate=birth)
-        for label, (death, birth) in panels.items()
+        svalse_paper_form(activation_label(death, birth), p_deactivate=death, p_activate=birth)
+        for death, birth in ACTIVATION
     ]
     scenario = create("svalse_fig6")
-    settings = StudySettings(out=out, batch=1)
-    study = compute_study({"svalse_fig6": scenario}, trackers, runs, seed, settings)
-    rows = [_activation_row(study, label, *pair) for label, pair in panels.items()]
-    columns = ("p_deactivate", "p_activate", "GOSPA", "std of runs", "missed", "false", "RMSE",
+    metrics = {name: MEASURED[name] for name in ("gospa", "missed", "false", "rmse", "converged")}
+    settings = StudySettings(metrics, out, batch=1)
+    compared = [*trackers, valse_paper_form()]
+    study = compute_study({"svalse_fig6": scenario}, compared, runs, seed, settings)
+    rows = [_activation_row(study, *pair) for pair in ACTIVATION]
+    rows.append((PAPER_FORM["valse"], *_activation_means(study, PAPER_FORM["valse"]),
+                 PAPER["svalse_fig6"]["valse"], *[NAN] * 4))  # fmt: skip
+    shown = [(scenario, method, seed) for method in trackers[:4]]
+    if not quick:
+        shown.append((scenario, svalse_as_printed(PRINTED_7D, p_activate=1.0), seed))
+    drawn = parallel_map(drawn_run, shown)
+    for one in drawn[4:]:
+        gospa, *rest = (metrics[metric](one.trial, one.run) for metric in metrics)
+        known = ACTIVATION[0.25, 1.0]
+        rows.append((one.method, gospa, NAN, *rest, known.paper, known.paper_rmse, *[NAN] * 3))
+    columns = ("p_deactivate, p_activate", "GOSPA", "std of runs", "missed", "false", "RMSE",
                "converged", "paper's run", "paper's RMSE", "rebuilt", "its std",
                "rebuilt RMSE")  # fmt: skip
-    paper = [reference.paper for reference in ACTIVATION.values()]
-    figures = {"tracks": draw_runs(scenario, seed, trackers[:4], paper)}
-    title = f"Fig. 7: probabilities of activation, svalse as printed, {runs} runs at 20 dB, degrees"
-    return Report(title, columns, rows, [*_activation_claims(study), FORCED], figures)
-
-
-CLAIMS = (
-    ("without deaths there are false sources", "false"),
-    ("without memory sources are missed", "missed"),
-    ("without births sources are missed", "missed"),
-    ("with certain births there are false sources", "false"),
-)
-
-
-def _activation_claims(study: Study) -> list[str]:
-    default, lines = study.methods[-1], []
-    for label, (claim, metric) in zip(study.methods, CLAIMS, strict=False):
-        here, usual = study.mean(metric, label), study.mean(metric, default)
-        numbers = f"{metric} {here:.2f}, by default {usual:.2f}"
-        lines.append(verdict(f"{claim} ({label})", here > usual + 1, numbers))
-    for label, reference in zip(study.methods, ACTIVATION.values(), strict=True):
-        gospa = study.mean("gospa", label)
-        numbers = f"GOSPA {gospa:.2f}, rebuilt {reference.gospa:.2f} ± {reference.std:.2f}"
-        fact = abs(gospa - reference.gospa) <= 2 * reference.std
-        lines.append(
-            verdict(f"{label} is within two deviations of the rebuilt form", fact, numbers)
-        )
-    return lines
+    paper = [reference.paper for reference in ACTIVATION.values()][:4]
+    figures = {"tracks": draw_activation(drawn, [*paper, paper[3]])}
+    title = f"Fig. 7: probabilities of activation, paper's form, {runs} runs at 20 dB, degrees"
+    results = results_of(study) | {
+        (f"{metric} of run 0", one.method, ""): np.array([MEASURED[metric](one.trial, one.run)])
+        for one in drawn
+        for metric in ("gospa", "false")
+    }
+    page = tuple(name for name in columns[:9] if name != "converged")
+    return Report(title, columns, rows, [FORCED, FORMS], figures, page, results)
 
 
 FORCED = (
     "With certain births every component is active; merging removes most of them, and the rest "
-    "depends on the integration over the angles: the published program uses mixtures "
-    '(`posterior="mixture"`) in place of quadrature.'
+    "depends on the integration over the angles: the published program has mixtures in place of "
+    "quadrature."
 )
 
 
-def _activation_row(study: Study, label: str, death: float, birth: float) -> tuple[Any, ...]:
-    reference = ACTIVATION[death, birth]
-    means = [study.mean(metric, label) for metric in ("missed", "false", "rmse", "converged")]
-    return (death, birth, study.mean("gospa", label), study.spread("gospa", label), *means,
-            reference.paper, reference.paper_rmse, reference.gospa, reference.std,
-            reference.rmse)  # fmt: skip
+def _activation_means(study: Study, label: str) -> tuple[float, ...]:
+    means = (study.mean(metric, label) for metric in ("missed", "false", "rmse", "converged"))
+    return (study.mean("gospa", label), study.spread("gospa", label), *means)
+
+
+def _activation_row(study: Study, death: float, birth: float) -> tuple[Any, ...]:
+    known, label = ACTIVATION[death, birth], activation_label(death, birth)
+    return (label, *_activation_means(study, label), known.paper, known.paper_rmse, known.gospa,
+            known.std, known.rmse)  # fmt: skip

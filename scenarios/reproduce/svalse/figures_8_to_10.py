@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from arrivals.plots.study import METHOD_COLOURS, plot_metric
 from arrivals.scenarios.bounds.snapshot import LineBound, line_bound
-from arrivals.scenarios.experiments.methods import tracker_name
 from arrivals.scenarios.experiments.monte_carlo import StudySettings, compute_study
 from arrivals.scenarios.experiments.study import Study
+from arrivals.scenarios.metrics.registry import METRICS
 from arrivals.scenarios.registry import create
-from arrivals.scenarios.reproduce.claims import negative, verdict
 from arrivals.scenarios.reproduce.report import Report
-from arrivals.scenarios.reproduce.svalse.figures_4_to_7 import NAN, batch_of, table_methods
+from arrivals.scenarios.reproduce.svalse.decisions import results_of
+from arrivals.scenarios.reproduce.svalse.forms import (
+    FORMS,
+    NAN,
+    PAPER_FORM,
+    batch_of,
+    table_methods,
+)
 from arrivals.scenarios.reproduce.svalse.plots import panels
 from arrivals.scenarios.reproduce.svalse.published_values import SWEEP, SWEPT
+from arrivals.scenarios.reproduce.svalse.step_metrics import STEP_METRICS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,7 +32,11 @@ if TYPE_CHECKING:
 
 SCENES = {"svalse_scenario1": "three static sources", "svalse_scenario2": "six static sources"}
 SNR_DB = tuple(float(snr) for snr in range(0, 45, 5))
-MEASURED = ("gospa", "distance", "missed", "false", "rmse", "converged")
+OFF_GRID_DB = (30.0, 35.0, 40.0)
+OFF_GRID = 0.25  # degrees, halfway between the directions of (S)SBL
+PARTS = ("gospa", "distance", "missed", "false", "rmse", "cardinality", "converged")
+MEASURED = {name: METRICS[name] for name in PARTS} | {"number_bias": STEP_METRICS["number_bias"]}
+SHOWN = (*SWEPT[:2], *PAPER_FORM.values(), "valse", "svalse")  # in the tables of the page
 
 
 @lru_cache(maxsize=2)  # Fig. 10 uses the results of Figs 8 and 9
@@ -34,6 +45,17 @@ def sweep(name: str, runs: int, seed: int, out: Path | None, quick: bool) -> Stu
     cases = {f"{snr:g}": create(name, snr_db=snr) for snr in SNR_DB}
     settings = StudySettings(MEASURED, out, batch=batch_of(runs))
     return compute_study(cases, table_methods(quick), runs, seed, settings)
+
+
+@lru_cache(maxsize=2)
+def off_grid(name: str, runs: int, seed: int, out: Path | None, quick: bool) -> Study:
+    """Run the methods on sources halfway between the directions of (S)SBL, at high SNR."""
+    cases = {
+        f"{snr:g} off grid": create(name, snr_db=snr, offset_deg=OFF_GRID) for snr in OFF_GRID_DB
+    }
+    compared = [method for method in table_methods(quick) if method.label in SHOWN]
+    settings = StudySettings(MEASURED, out, batch=batch_of(runs))
+    return compute_study(cases, compared, runs, seed, settings)
 
 
 def fig8(runs: int, seed: int, out: Path | None = None, quick: bool = False) -> Report:
@@ -49,135 +71,131 @@ def fig9(runs: int, seed: int, out: Path | None = None, quick: bool = False) -> 
 def parts(name: str, figure: str, runs: int, seed: int, out: Path | None, quick: bool) -> Report:
     """Return the table and the figure of one sweep."""
     study = sweep(name, runs, seed, out, quick)
-    rows = [_row(study, name, snr, method) for snr in SNR_DB for method in study.methods]
-    columns = ("snr_db", "method", "GOSPA", "std of runs", "distance", "missed", "false", "RMSE",
-               "rebuilt", "rebuilt RMSE")  # fmt: skip
-    remarks = [*_claims(study, name), BOUND]
-    bounds = _bounds(name, runs, seed)
+    moved = off_grid(name, runs, seed, out, quick)
+    metrics = ("gospa", "distance", "missed", "false", "rmse", "number_bias")
+    columns, rows = wide_table([study, moved], metrics)
+    scale = [bound.gospa for bound in _scale(name, runs, seed).values()]
+    rebuilt = [tuple(pair[0] for pair in four) for four in SWEEP[name].values()]
+    rows = [
+        (*row, scale[n], *rebuilt[n]) if n < len(SNR_DB) else (*row, *[NAN] * 5)
+        for n, row in enumerate(rows)
+    ]
+    columns += ["one snapshot", *(f"{method} rebuilt" for method in SWEPT)]
     title = f"{figure}: GOSPA against the SNR, {SCENES[name]}, {runs} runs, degrees"
-    return Report(title, columns, rows, remarks, {"parts": _draw_parts(study, name, bounds)})
+    figures = {"parts": _draw_parts(study, name, _scale(name, runs, seed))}
+    return Report(title, columns, rows, [SCALE, MOVED, FORMS], figures,
+                  _page(columns), results_of(study, moved))  # fmt: skip
 
 
-BOUND = (
-    "Bound: an efficient estimator from one snapshot with a known number of sources; a method with "
-    "memory may be below it. The rebuilt figures are means of 3 runs."
+def wide_table(
+    studies: Sequence[Study], metrics: Sequence[str]
+) -> tuple[list[str], list[tuple[Any, ...]]]:
+    """Return columns and rows: one row a case, one column a method and metric.
+
+    The first metric has the methods' names as its columns.
+    """
+    methods = studies[0].methods
+    keys = [(metric, method) for metric in metrics for method in methods]
+    columns = ["SNR, dB", *(m if metric == metrics[0] else f"{m} {metric}" for metric, m in keys)]
+    rows = [
+        (case, *(_mean(study, metric, method, case) for metric, method in keys))
+        for study in studies
+        for case in study.cases
+    ]
+    return columns, rows
+
+
+def _mean(study: Study, metric: str, method: str, case: str) -> float:
+    return study.mean(metric, method, case) if method in study.methods else NAN
+
+
+def _page(columns: Sequence[str]) -> tuple[str, ...]:
+    """Return the columns of the page: the SNR, and the methods of the paper."""
+    return (columns[0], *(name for name in (*SHOWN, "one snapshot") if name in columns))
+
+
+SCALE = (
+    "One snapshot: an efficient estimator from one snapshot with a known number of sources "
+    "(deterministic Cramér-Rao bound, capped at the cut-off): a scale; methods with memory may be "
+    "below it. Rebuilt: means of 3 runs of the published programs of SBL and SSBL, and of the "
+    "paper's form of VALSE and SVALSE."
+)
+MOVED = (
+    f"Off grid: all sources moved by {OFF_GRID:g} degrees, halfway between the directions of sbl "
+    "and ssbl, which have one every half degree."
 )
 
 
-def _bounds(name: str, runs: int, seed: int) -> dict[str, LineBound]:
+def _scale(name: str, runs: int, seed: int) -> dict[str, LineBound]:
     made = {f"{snr:g}": create(name, snr_db=snr) for snr in SNR_DB}
     return {case: line_bound(one, min(runs, 6), seed) for case, one in made.items()}  # type: ignore[arg-type]  # lines
 
 
-def _row(study: Study, name: str, snr: float, method: str) -> tuple[Any, ...]:
-    case = f"{snr:g}"
-    means = [study.mean(m, method, case) for m in ("distance", "missed", "false", "rmse")]
-    reference = (
-        SWEEP[name][snr][SWEPT.index(tracker_name(method))]
-        if tracker_name(method) in SWEPT
-        else (NAN, NAN)
-    )
-    gospa, spread = study.mean("gospa", method, case), study.spread("gospa", method, case)
-    return (snr, method, gospa, spread, *means, *reference)
-
-
-def _claims(study: Study, name: str) -> list[str]:
-    def mean(metric: str, method: str, snr: int) -> float:
-        return study.mean(metric, method, f"{snr}")
-
-    def lowest(snr: int) -> bool:
-        four = {method: mean("gospa", method, snr) for method in SWEPT}
-        return min(four, key=four.__getitem__) == "svalse"
-
-    low = [snr for snr in (0, 5, 10, 15, 20) if lowest(snr)]
-    lines = [
-        verdict("svalse has the lowest GOSPA of the four up to 20 dB", len(low) == 5,
-              f"at {', '.join(map(str, low)) or 'no'} dB"),
-        verdict("below 10 dB sbl and ssbl have false directions",
-              mean("false", "ssbl", 5) > 2 * mean("false", "svalse", 5),
-              f"false at 5 dB: ssbl {mean('false', 'ssbl', 5):.1f}, "
-              f"svalse {mean('false', 'svalse', 5):.1f}"),
-        verdict("from 30 dB on, on-grid sources favour ssbl",
-              mean("gospa", "ssbl", 40) < mean("gospa", "svalse", 40),
-              f"at 40 dB: ssbl {mean('gospa', 'ssbl', 40):.2f}, "
-              f"svalse {mean('gospa', 'svalse', 40):.2f}"),
-    ]  # fmt: skip
-    if name == "svalse_scenario2":
-        lines.append(
-            verdict("at 0 dB the RMSE, which ignores false directions, favours ssbl over svalse",
-                  mean("rmse", "ssbl", 0) < mean("rmse", "svalse", 0),
-                  f"{mean('rmse', 'ssbl', 0):.1f} and {mean('rmse', 'svalse', 0):.1f}")
-        )  # fmt: skip
-    return lines
+def _draw_scale(ax: Axes, scale: Mapping[str, float]) -> None:
+    ax.plot(SNR_DB, list(scale.values()), color="black", linewidth=1.0, linestyle=":",
+            label="one snapshot (scale)")  # fmt: skip
 
 
 def _draw_rebuilt(ax: Axes, name: str, part: int) -> None:
     """Draw the rebuilt GOSPA (part 0) or RMSE (1) as crosses, in the methods' colours."""
     for n, method in enumerate(SWEPT):
         values = [reference[n][part] for reference in SWEEP[name].values()]
-        label = "rebuilt" if n == 0 else None
-        ax.plot(SNR_DB, values, "x", color=METHOD_COLOURS[method], markersize=5, label=label)
+        ax.plot(SNR_DB, values, "x", color=METHOD_COLOURS[method], markersize=5)
+    ax.plot([], [], "x", color="0.3", markersize=5, label="rebuilt, in the same colours")
 
 
-def _draw_parts(study: Study, name: str, bounds: dict[str, LineBound]) -> Figure:
-    figure, axes = panels(2, 2, (11.0, 7.5))
-    titles = {"gospa": "GOSPA", "distance": "distance", "missed": "missed", "false": "false"}
+def _draw_parts(study: Study, name: str, scale: Mapping[str, LineBound]) -> Figure:
+    """Draw panels (a) to (d), linear below 0.1 degrees since missed and false reach zero."""
+    figure, axes = panels(2, 2, (11.0, 8.4))
+    titles = {"gospa": "(a) GOSPA", "distance": "(b) distance", "missed": "(c) missed",
+              "false": "(d) false"}  # fmt: skip
     for ax, (metric, title) in zip(axes, titles.items(), strict=True):
-        bound = {case: one.gospa for case, one in bounds.items()} if metric == "gospa" else None
         if metric == "gospa":
             _draw_rebuilt(ax, name, 0)
-        plot_metric(study, metric, x="snr_db", bound=bound, ax=ax)
-        ax.set(xlabel="SNR, dB", ylabel=f"{title}, degrees")
-        legend = ax.get_legend()
-        if metric != "gospa" and legend is not None:
-            legend.remove()
+            _draw_scale(ax, {case: one.gospa for case, one in scale.items()})
+        plot_metric(study, metric, x="snr_db", ax=ax)
+        ax.set(xlabel="SNR, dB", ylabel="degrees")
+        ax.set_title(title, fontsize=10)
+        ax.set_yscale("symlog", linthresh=0.1, linscale=0.4)
+        ax.set_yticks([0, 0.1, 1, 10], ["0", "0.1", "1", "10"])
+        ax.set_ylim(0, 60)
+    _one_legend(figure, axes)
     return figure
+
+
+def _one_legend(figure: Figure, axes: Sequence[Axes]) -> None:
+    """Put the legend of the first panel below all of them."""
+    handles, labels = axes[0].get_legend_handles_labels()
+    for ax in axes:
+        legend = ax.get_legend()
+        if legend is not None:
+            legend.remove()
+    figure.legend(handles, labels, loc="outside upper center", ncols=5, fontsize=8, frameon=False)
 
 
 def fig10(runs: int, seed: int, out: Path | None = None, quick: bool = False) -> Report:
     """RMSE against the SNR, both scenarios."""
     rows: list[tuple[Any, ...]] = []
-    remarks: list[str] = []
-    figure, axes = panels(1, 2, (11.0, 4.2))
-    for ax, name in zip(axes, SCENES, strict=False):
-        study, bounds = sweep(name, runs, seed, out, quick), _bounds(name, runs, seed)
+    results: dict[tuple[str, str, str], Any] = {}
+    figure, axes = panels(1, 2, (11.0, 5.0))
+    for ax, letter, name in zip(axes, "ab", SCENES, strict=False):
+        study, scale = sweep(name, runs, seed, out, quick), _scale(name, runs, seed)
         _draw_rebuilt(ax, name, 1)
-        plot_metric(study, "rmse", x="snr_db", ax=ax,
-                    bound={case: one.rmse for case, one in bounds.items()})  # fmt: skip
-        minimum = min(study.mean("rmse", method, case) for method in study.methods
-                    for case in study.cases)  # fmt: skip
-        ax.set(xlabel="SNR, dB", ylabel="RMSE, degrees", yscale="log", title=SCENES[name])
+        _draw_scale(ax, {case: one.rmse for case, one in scale.items()})
+        plot_metric(study, "rmse", x="snr_db", ax=ax)
+        columns, mine = wide_table([study], ("rmse",))
+        minimum = min(value for row in mine for value in row[1:])
+        ax.set(xlabel="SNR, dB", ylabel="RMSE, degrees", yscale="log")
+        ax.set_title(f"({letter}) {SCENES[name]}", fontsize=10)
         ax.set_ylim(bottom=max(minimum / 3, 1e-4))  # an interval may extend to zero
-        remarks += _rmse_claims(study, SCENES[name])
-        for snr in SNR_DB:
-            rows += [(name, *_rmse_row(study, name, snr, method), bounds[f"{snr:g}"].rmse)
-                     for method in study.methods]  # fmt: skip
-    columns = ("scenario", "snr_db", "method", "RMSE", "std of runs", "rebuilt", "bound")
+        number = name[-1]
+        rebuilt = [tuple(pair[1] for pair in four) for four in SWEEP[name].values()]
+        rows += [(f"{number}: {row[0]}", *row[1:], scale[row[0]].rmse, *known)
+                 for row, known in zip(mine, rebuilt, strict=True)]  # fmt: skip
+        results |= {(metric, method, f"{number}: {case}"): values
+                    for (metric, method, case), values in results_of(study).items()}  # fmt: skip
+    _one_legend(figure, axes)
+    columns[0] = "scenario: SNR, dB"
+    columns += ["one snapshot", *(f"{method} rebuilt" for method in SWEPT)]
     title = f"Fig. 10: RMSE against the SNR, {runs} runs, degrees"
-    return Report(title, columns, rows, (*remarks, BOUND), {"rmse": figure})
-
-
-def _rmse_claims(study: Study, scene: str) -> Iterator[str]:
-    """Check that the RMSE, which ignores false directions, favours ssbl at low SNR only."""
-    for snr, better, worse in ((0, "ssbl", "svalse"), (20, "svalse", "ssbl"), (20, "ssbl", "sbl")):
-        d = study.paired("rmse", better, worse, f"{snr}")
-        values = [study.mean("rmse", method, f"{snr}") for method in (better, worse)]
-        numbers = f"{values[0]:.2f} and {values[1]:.2f}, difference {d.mean:.2f} ± {d.error:.2f}"
-        claim = f"{scene}, {snr} dB: {better} has a lower RMSE than {worse}"
-        yield verdict(claim, negative(d.mean, d.error), numbers)
-
-
-def _rmse_row(study: Study, name: str, snr: float, method: str) -> tuple[Any, ...]:
-    case = f"{snr:g}"
-    reference = (
-        SWEEP[name][snr][SWEPT.index(tracker_name(method))][1]
-        if tracker_name(method) in SWEPT
-        else NAN
-    )
-    return (
-        snr,
-        method,
-        study.mean("rmse", method, case),
-        study.spread("rmse", method, case),
-        reference,
-    )
+    return Report(title, columns, rows, [SCALE, FORMS], {"rmse": figure}, _page(columns), results)

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from string import ascii_lowercase
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from arrivals.plots.bearing_time import NEUTRAL, PALETTE, plot_bearing_time
-from arrivals.scenarios.base import Scenario
-from arrivals.scenarios.experiments.methods import Method, tracker_name
+from arrivals.plots.study import METHOD_COLOURS
+from arrivals.scenarios.base import Trial
+from arrivals.scenarios.experiments.methods import tracker_name
 from arrivals.scenarios.experiments.study import Study
 from arrivals.scenarios.metrics.registry import METRICS
+from arrivals.scenarios.reproduce.svalse.forms import AS_PRINTED
 from arrivals.scenarios.reproduce.svalse.published_values import PAPER, REBUILT
+from arrivals.scenarios.reproduce.svalse.step_metrics import gospa_steps
+from arrivals.trackers.run import Run
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,63 +25,139 @@ if TYPE_CHECKING:
 
 PARTS = {"distance": "#9aa5b1", "missed": "#1f77b4", "false": "#d62728"}
 TRUTH = "#00b050"
+TRUTH_MARKS: dict[str, Any] = {
+    "color": TRUTH, "marker": "o", "markersize": 4.5, "markerfacecolor": "none",
+    "markeredgewidth": 0.8, "linestyle": "",
+}  # fmt: skip
 
 
-def draw_runs(
-    scenario: Scenario, seed: int, shown: Sequence[Method], paper: Sequence[float]
-) -> Figure:
-    """Draw run 0 of a study by several methods over the beam power, the truth in green.
+class DrawnRun(NamedTuple):
+    """A run of a method, and the trial with its truth.
 
     Parameters
     ----------
-    scenario : Scenario
-        Scenario of the study.
-    seed : int
-        Seed of the study.
-    shown : sequence of Method
-        Methods, one panel each.
-    paper : sequence of float
-        The paper's GOSPA of each; NaN if it has none.
-
-    Examples
-    --------
-    >>> from arrivals.scenarios import create
-    >>> figure = draw_runs(create("svalse_fig6", n_steps=2), 0, [Method("cbf")], [np.nan])
-    >>> figure.axes[0].get_title()
-    'cbf: GOSPA 12.6°, RMSE 5.7°'
+    method : str
+        Label.
+    trial : Trial
+    run : Run
     """
-    seed_sequence = np.random.SeedSequence(seed, spawn_key=(0,))
-    trial = scenario.sample(np.random.default_rng(seed_sequence))
-    n_rows = -(-len(shown) // 2)
-    figure, axes = panels(n_rows, 2, (12.0, 2.9 * n_rows + 0.5))
-    for ax, method, value in zip(axes, shown, paper, strict=False):
-        run = method.make(trial, seed_sequence).run(trial.measurements)
-        plot_bearing_time(
-            run, snapshots=trial.measurements, measurement=trial.measurement,  # type: ignore[arg-type]  # complex
-            ax=ax,
-        )  # fmt: skip
-        steps = np.broadcast_to(np.arange(len(trial.truth))[:, None], trial.truth.shape)
-        ax.plot(steps, np.rad2deg(trial.truth), ".", color=TRUTH, markersize=2, zorder=4)
-        published = "" if np.isnan(value) else f" (paper {value:g}°)"
-        gospa, rmse = (METRICS[metric](trial, run) for metric in ("gospa", "rmse"))
-        title = f"{method.label}: GOSPA {gospa:.1f}°{published}, RMSE {rmse:.1f}°"
-        ax.set_title(title, fontsize=10)
-        ax.label_outer()
-    for ax in axes[len(shown):]:  # fmt: skip
+
+    method: str
+    trial: Trial
+    run: Run
+
+
+def draw_scene(drawn: Sequence[DrawnRun], paper: Mapping[str, float]) -> Figure:
+    """Draw Figs 4 to 6: beam and truth, tracks, GOSPA over the steps; and the number of sources.
+
+    Parameters
+    ----------
+    drawn : sequence of DrawnRun
+        The same trial by VALSE and SVALSE, twice if also as printed: that is panels (b) and (c).
+    paper : mapping of str to float
+        The paper's GOSPA by tracker.
+    """
+    figure, axes = panels(3, 2, (12.0, 9.2))
+    trial = drawn[0].trial
+    _draw_beam_and_truth(axes[0], trial)
+    axes[0].set_title("(a) truth, over the beam power", fontsize=10)
+    ours = drawn[-1]
+    for ax, letter, one in zip(axes[1:3], "bc", drawn, strict=False):
+        _draw_run(ax, one)
+        ax.set_title(f"({letter}) {one.method}", fontsize=10)
+    _draw_gospa(axes[3], drawn, paper)
+    last = [axes[4], axes[5]]
+    if len(drawn) > 2:
+        _draw_run(last[0], ours)
+        last.pop(0).set_title(f"(e) {ours.method}, ours", fontsize=10)
+    _draw_number(last.pop(0), drawn)
+    for ax in last:
         ax.set_axis_off()
-    _one_bar(figure, axes[: len(shown)])
+    _one_bar(figure, axes[:2], [ax for ax in axes if ax.collections])
     _name_marks(figure)
     return figure
 
 
-def _one_bar(figure: Figure, axes: Sequence[Axes]) -> None:
+def draw_activation(drawn: Sequence[DrawnRun], paper: Sequence[float]) -> Figure:
+    """Draw Fig. 7: tracks by extreme probabilities.
+
+    Parameters
+    ----------
+    drawn : sequence of DrawnRun
+    paper : sequence of float
+        The paper's GOSPA of each.
+    """
+    n_rows = -(-len(drawn) // 2)
+    figure, axes = panels(n_rows, 2, (12.0, 2.9 * n_rows + 0.5))
+    for ax, letter, one, value in zip(axes, ascii_lowercase, drawn, paper, strict=False):
+        _draw_run(ax, one)
+        gospa = METRICS["gospa"](one.trial, one.run)
+        title = f"({letter}) {one.method}: GOSPA {gospa:.1f}° (paper {value:g}°)"
+        ax.set_title(title, fontsize=10)
+    for ax in axes[len(drawn) :]:
+        ax.set_axis_off()
+    _one_bar(figure, axes, axes)
+    _name_marks(figure)
+    return figure
+
+
+def _draw_run(ax: Axes, one: DrawnRun) -> None:
+    trial = one.trial
+    plot_bearing_time(
+        one.run, snapshots=trial.measurements, measurement=trial.measurement, ax=ax  # type: ignore[arg-type]  # complex
+    )  # fmt: skip
+    _draw_truth(ax, trial)
+    ax.label_outer()
+
+
+def _draw_beam_and_truth(ax: Axes, trial: Trial) -> None:
+    empty = trial.tracker("valse").run(np.full_like(trial.measurements, np.nan))
+    _draw_run(ax, DrawnRun("", trial, empty))
+
+
+def _draw_truth(ax: Axes, trial: Trial) -> None:
+    steps = np.broadcast_to(np.arange(len(trial.truth))[:, None], trial.truth.shape)
+    ax.plot(steps, np.rad2deg(trial.truth), **TRUTH_MARKS, zorder=4)
+
+
+def _draw_gospa(ax: Axes, drawn: Sequence[DrawnRun], paper: Mapping[str, float]) -> None:
+    """Draw panel (d): GOSPA of every step."""
+    for one in drawn:
+        gospa, name = gospa_steps(one.trial, one.run), tracker_name(one.method)
+        printed = one.method in AS_PRINTED.values()
+        published = f" (paper {paper[name]:g}°)" if printed and name in paper else ""
+        label = f"{one.method}: mean {gospa.mean():.2f}°{published}"
+        ax.plot(gospa, marker="o" if printed else "", markersize=3, color=METHOD_COLOURS[name],
+                linestyle="--" if printed else "-", linewidth=1.0, label=label)  # fmt: skip
+    ax.set_title("(d) GOSPA of every step", fontsize=10)
+    ax.set(xlabel="step", ylabel="GOSPA, degrees", ylim=(0, None))
+    ax.legend(fontsize=8, ncols=2, loc="upper center")
+    ax.set_ylim(top=1.35 * ax.get_ylim()[1])
+
+
+def _draw_number(ax: Axes, drawn: Sequence[DrawnRun]) -> None:
+    """Draw the number of estimates over the steps."""
+    there = (~np.isnan(drawn[0].trial.truth)).sum(axis=1)
+    ax.step(np.arange(len(there)), there, where="mid", color=TRUTH, linewidth=4, alpha=0.5,
+            label="sources")  # fmt: skip
+    for one in drawn:
+        printed = one.method in AS_PRINTED.values()
+        ax.step(np.arange(len(there)), one.run.n_found, where="mid", linewidth=1.0,
+                color=METHOD_COLOURS[tracker_name(one.method)], linestyle="--" if printed else "-",
+                label=one.method)  # fmt: skip
+    ax.set_title("number of sources, and of estimates", fontsize=10)
+    ax.set(xlabel="step", ylabel="number", ylim=(0, None))
+    ax.legend(fontsize=8, ncols=3, loc="lower center")
+
+
+def _one_bar(figure: Figure, beside: Sequence[Axes], axes: Sequence[Axes]) -> None:
     """Replace the colour bars of the panels by one: they show the same beam power."""
     beams = [image for ax in axes for image in ax.collections if image.colorbar]
     for image in beams:
         if image.colorbar:
             image.colorbar.remove()
     if beams:
-        bar = figure.colorbar(beams[0], ax=list(axes), shrink=0.6, aspect=40, extend="min")
+        bar = figure.colorbar(beams[0], ax=list(beside), shrink=0.9, aspect=25, extend="min")
         bar.set_label("beam power, dB re maximum")
 
 
@@ -84,7 +165,7 @@ def _name_marks(figure: Figure) -> None:
     from matplotlib.lines import Line2D
 
     marks = [
-        Line2D([], [], marker=".", linestyle="", color=TRUTH, label="truth"),
+        Line2D([], [], **TRUTH_MARKS, label="truth"),
         Line2D([], [], marker="o", markersize=4, linestyle="", color=NEUTRAL, label="estimates"),
         Line2D([], [], linewidth=2, color=PALETTE[0], label="estimates, one colour a label"),
     ]

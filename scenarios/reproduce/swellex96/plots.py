@@ -9,7 +9,7 @@ import numpy as np
 from arrivals.plots.bearing_time import PALETTE
 from arrivals.scenarios.ocean_acoustics.eigenrays import eigenrays
 from arrivals.scenarios.ocean_acoustics.rays import ray_line
-from arrivals.scenarios.reproduce.swellex96.claims import beam
+from arrivals.scenarios.reproduce.swellex96.field import beam
 from arrivals.scenarios.simulations.swellex96 import TowPastLine, environment, line, track
 from arrivals.typing import Complex, Float, Int
 
@@ -86,7 +86,7 @@ def _draw_track(ax: Axes) -> None:
     for step, point in zip(ship["step"][marks], np.stack([x, y], axis=1)[marks], strict=True):
         ax.annotate(f"{step:.0f}", point, (5, -3), textcoords="offset points", fontsize=7)
     ax.plot(0, 0, "^", color="black")
-    ax.set(xlabel="east, km", ylabel="north, km", title="the ship, the array at the origin")
+    ax.set(xlabel="east, km", ylabel="north, km", title="(c) track, the array at the origin")
     ax.set_aspect("equal", adjustable="datalim")
 
 

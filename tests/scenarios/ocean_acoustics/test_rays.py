@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from arrivals.scenarios.ocean_acoustics.eigenrays import eigenrays, path_names
 from arrivals.scenarios.ocean_acoustics.rays import floor_reflection, ray_line, trace_rays
 from arrivals.scenarios.ocean_acoustics.waveguide import BottomLayer, Waveguide
-from arrivals.scenarios.reproduce.swellex96.claims import beam
+from arrivals.scenarios.reproduce.swellex96.field import beam
 from arrivals.scenarios.simulations.swellex96 import TowPastLine, environment
 from arrivals.typing import Float
 

@@ -14,7 +14,7 @@ from arrivals.scenarios import create, mean_gospa
 from arrivals.scenarios.demos.swellex96 import swellex96 as shipped
 from arrivals.scenarios.reproduce.studies import reproduce
 from arrivals.scenarios.reproduce.swellex96 import figures_11_12 as reproduce_swellex
-from arrivals.scenarios.reproduce.swellex96.claims import beam
+from arrivals.scenarios.reproduce.swellex96.field import beam
 from arrivals.scenarios.reproduce.swellex96.figures_11_12 import strong_directions
 from arrivals.scenarios.simulations.swellex96 import TowPastLine, environment, line, track
 from arrivals.trackers import Run

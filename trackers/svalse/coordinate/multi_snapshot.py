@@ -65,7 +65,9 @@ class MultiSnapshotAscent(MultiSnapshotAmplitudes):
         M = Y.shape[1]
         self.settings, self.manifold = settings, manifold
         self._read_manifold()
-        initial = InitialSupport.from_prior(prior, settings.n_components(M))
+        initial = InitialSupport.from_prior(
+            prior, settings.n_components(M), settings.first_existence
+        )
         self.n_moments = 0 if prior is None else prior.n_moments
         power = (Y.real**2 + Y.imag**2).sum(axis=(1, 2)) / (M * Y.shape[2])
         nu = self.initial_noise(Y, power, prior)
@@ -150,7 +152,7 @@ class MultiSnapshotAscent(MultiSnapshotAmplitudes):
             self.g[:, k] -= (j.conj() * Cj).sum(axis=1).real / self.nu
             self.Z[:, k] = self.H[:, k] - (self.J[:, k, None] @ self.W)[:, 0]
             self.flip(k)
-            if k + 1 == self.n_expected:
+            if k + 1 == max(int(self.n_expected), 1):
                 reference = self.reconstruction()
         return reference
 

@@ -21,7 +21,7 @@ from arrivals.trackers.svalse.components import (
 from arrivals.trackers.svalse.coordinate.multi_snapshot import MultiSnapshotAscent
 from arrivals.trackers.svalse.coordinate.single_snapshot import SingleSnapshotAscent
 from arrivals.typing import Complex
-from arrivals.validation import one_of
+from arrivals.validation import number, one_of
 
 PosteriorName = Literal["quadrature", "mixture"]
 
@@ -58,6 +58,10 @@ class CoordinateSolver(SolverSettings):
     descending : bool, optional
         Order of the mixture's factors. None is descending without a prior (VALSE) and ascending
         with one (SVALSE).
+    first_existence : float, optional
+        Probability, in (0, 1), of every component in a step without tracked ones; the paper has
+        0.5 in the first step (section VI.B). None is that of its program: half as many components
+        as sensors, rounded down, and then estimated.
 
     Examples
     --------
@@ -67,11 +71,16 @@ class CoordinateSolver(SolverSettings):
 
     posterior: PosteriorName = "quadrature"
     descending: bool | None = None
+    first_existence: float | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
         one_of("posterior", self.posterior, ("quadrature", "mixture"))
         one_of("descending", self.descending, (None, True, False))
+        if self.first_existence is not None and not 0 < number(
+            "first_existence", self.first_existence
+        ) < 1:
+            raise ValueError(f"first_existence must lie in (0, 1); got {self.first_existence}")
 
     @classmethod
     def paper(cls) -> Self:
@@ -88,16 +97,17 @@ class CoordinateSolver(SolverSettings):
         """Raise ValueError if the mixture does not support such measurements."""
         if self.posterior == "quadrature":
             return
-        if n_moments:
-            raise ValueError(
-                'memory="posterior" requires posterior="quadrature"; got posterior="mixture"'
-            )
-        if manifold.coefficients is not None:
-            raise ValueError(
-                'posterior="mixture" requires a line on a uniform grid, at one wavelength'
-            )
-        if n_snapshots > 1 or len(manifold.nuisance_weights) > 1:
-            raise ValueError('posterior="mixture" requires one snapshot a step')
+        unmet = {
+            'memory="von_mises"': n_moments > 0,
+            "a line on a uniform grid, at one wavelength": manifold.coefficients is not None,
+            "one snapshot a step": n_snapshots > 1 or len(manifold.nuisance_weights) > 1,
+        }
+        for required, is_unmet in unmet.items():
+            if is_unmet:
+                raise ValueError(
+                    f'posterior="mixture" requires {required}: the general form is '
+                    'posterior="quadrature"'
+                )
 
     def solve(
         self, snapshots: Complex, manifold: Manifold, prior: ComponentPrior | None

@@ -30,32 +30,46 @@ class InitialSupport:
     n_tracked : int
     rho : ndarray, shape (L,)
         Prior probabilities of being active.
-    n_expected : int
+    n_expected : float
         Components among which the power is divided at first, K₀.
     estimate_rho : bool
-        Whether ρ is estimated, since no component is tracked.
+        Whether ρ is estimated: no component is tracked, and `first_existence` is None.
     """
 
     prior: ComponentPrior
     n_tracked: int
     rho: Float
-    n_expected: int
+    n_expected: float
     estimate_rho: bool
 
     @classmethod
-    def from_prior(cls, prior: ComponentPrior | None, L: int) -> InitialSupport:
+    def from_prior(
+        cls, prior: ComponentPrior | None, L: int, first_existence: float | None = None
+    ) -> InitialSupport:
         """Return the initial support of a step.
+
+        Parameters
+        ----------
+        prior : ComponentPrior or None
+        L : int
+            Number of components.
+        first_existence : float, optional
+            As in `CoordinateSolver`.
 
         Examples
         --------
         >>> InitialSupport.from_prior(None, 4).rho
         array([0.5, 0.5, 0.5, 0.5])
         """
-        half = max(L // 2, 1)
         if prior is None or len(prior.mu) == 0:
+            half = max(L // 2, 1)
+            # ρ = ⌊L/2⌋/L of the published program; p = 0.5 in section VI.B
+            given = first_existence is not None
+            probability = first_existence if first_existence is not None else half / L
+            n_expected = probability * L if given else half
             noise, none = None if prior is None else prior.noise, np.zeros(0)
-            empty = ComponentPrior(none, none, none, half / L, noise=noise)
-            return cls(empty, 0, np.full(L, half / L), half, estimate_rho=True)
+            empty = ComponentPrior(none, none, none, probability, noise=noise)
+            return cls(empty, 0, np.full(L, probability), n_expected, estimate_rho=not given)
         n = min(len(prior.mu), L)
         rho = np.concatenate([prior.existence[:n], np.full(L - n, prior.birth)])
         return cls(prior, n, rho, int((rho == rho.max()).sum()), estimate_rho=False)

@@ -1,0 +1,193 @@
+"""Functions that decide the claims on SVALSE, from values by metric, method, case and run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from arrivals.scenarios.experiments.study import Study
+from arrivals.scenarios.reproduce.claims import Decide, Decision, below, negative
+from arrivals.scenarios.reproduce.svalse.forms import PAPER_FORM, PRINTED_7D, activation_label
+from arrivals.scenarios.reproduce.svalse.published_values import ACTIVATION
+from arrivals.typing import Float
+
+# By (metric, method, case), one value a run, NaN where it is missing; the case of a study with a
+# single one is ""
+Results: TypeAlias = Mapping[tuple[str, str, str], Float]
+Both: TypeAlias = tuple[Decide, Decide]  # by the paper's form, and by ours
+MIN_RUNS = 5  # for a deviation over runs
+LOW, HIGH = ("0", "5"), ("30", "35", "40")  # cases of Figs 8 and 9: SNR, dB
+OFF_GRID = tuple(f"{snr} off grid" for snr in HIGH)
+ALL = tuple(f"{n}: {snr}" for n in (1, 2) for snr in range(0, 45, 5))  # cases of Fig. 10
+PANELS = tuple(activation_label(*pair) for pair in ACTIVATION)[:4]
+PANEL_GOSPA = {activation_label(*pair): known.paper for pair, known in ACTIVATION.items()}
+DEFAULT = activation_label(0.25, 0.10)
+
+
+def of_scenario(number: int, cases: Sequence[str]) -> tuple[str, ...]:
+    """Return cases of Figs 8 or 9 by their names in Fig. 10.
+
+    Examples
+    --------
+    >>> of_scenario(2, LOW)
+    ('2: 0', '2: 5')
+    """
+    return tuple(f"{number}: {case}" for case in cases)
+
+
+def results_of(study: Study, *more: Study) -> dict[tuple[str, str, str], Float]:
+    """Return the results of studies of the same runs.
+
+    Examples
+    --------
+    >>> from arrivals.scenarios import monte_carlo
+    >>> study = monte_carlo("svalse_fig6", ["cbf"], runs=2, metrics=["gospa"])
+    >>> list(results_of(study))
+    [('gospa', 'cbf', ''), ('cpu_ms', 'cbf', '')]
+    """
+    results: dict[tuple[str, str, str], Float] = {}
+    for one in (study, *more):
+        index = {run: n for n, run in enumerate(one.runs)}
+        for row in one.rows():
+            case = row.case if len(one.cases) > 1 else ""
+            key = row.metric, row.method, case
+            results.setdefault(key, np.full(len(index), np.nan))[index[row.run]] = row.value
+    return results
+
+
+def values(results: Results, metric: str, method: str, cases: Sequence[str]) -> Float | None:
+    """Return the mean over cases of every run; None if a case or the method was left out."""
+    found = [results.get((metric, method, case)) for case in cases]
+    given = [one for one in found if one is not None]
+    return np.mean(given, axis=0) if len(given) == len(found) else None
+
+
+def paper_form(method: str) -> str:
+    """Return the label of the paper's form of VALSE and SVALSE, and that of others unchanged.
+
+    Examples
+    --------
+    >>> paper_form("svalse"), paper_form("sbl")
+    ("svalse paper's form", 'sbl')
+    """
+    return PAPER_FORM.get(method, method)
+
+
+def by_both(decide: Callable[..., Decision | None], *methods: str, **options: Any) -> Both:
+    """Return a function that decides by the paper's form of the methods, and one by ours."""
+    return (
+        partial(decide, *map(paper_form, methods), **options),
+        partial(decide, *methods, **options),
+    )
+
+
+def lower(metric: str, first: str, second: str, *cases: str, unit: str = "degrees") -> Both:
+    """Decide that a metric of one method is below that of another, on average over the cases."""
+    return by_both(_lower, first, second, metric=metric, cases=cases or ("",), unit=unit)
+
+
+def _lower(
+    first: str, second: str, results: Results, *, metric: str, cases: Sequence[str], unit: str
+) -> Decision | None:
+    low, high = (values(results, metric, method, cases) for method in (first, second))
+    if low is None or high is None:
+        return None
+    both = ~np.isnan(low - high)
+    return below(low[both], high[both], unit) if both.any() else None
+
+
+def below_limit(metric: str, method: str, limit: float, *cases: str, unit: str = "degrees") -> Both:
+    """Decide that a metric of a method is below a limit, on average over the cases."""
+    return by_both(_limited, method, metric=metric, limit=limit, cases=cases or ("",), unit=unit)
+
+
+def above_limit(metric: str, method: str, limit: float, *cases: str, unit: str = "degrees") -> Both:
+    """Decide that a metric of a method is above a limit, on average over the cases."""
+    return by_both(
+        _limited, method, metric=metric, limit=limit, cases=cases or ("",), unit=unit, above=True
+    )
+
+
+def _limited(
+    method: str, results: Results, *, metric: str, limit: float, cases: Sequence[str], unit: str,
+    above: bool = False,
+) -> Decision | None:  # fmt: skip
+    here = values(results, metric, method, cases)
+    here = None if here is None else here[~np.isnan(here)]
+    if here is None or not here.size:
+        return None
+    mean, error = float(here.mean()), standard_error(here)
+    sign = -1 if above else 1
+    return Decision(negative(sign * (mean - limit), error), f"{mean:.3g} ± {error:.2g} {unit}")
+
+
+def standard_error(runs: Float) -> float:
+    """Return the standard error of the mean; NaN for one run.
+
+    Examples
+    --------
+    >>> standard_error(np.array([1.0, 3.0]))
+    1.0
+    """
+    return float(runs.std(ddof=1) / np.sqrt(len(runs))) if len(runs) > 1 else float("nan")
+
+
+def published(metric: str, method: str, value: float) -> Decide:
+    """Decide that the paper's run is within two deviations of the runs of its form."""
+    return partial(_published, metric, paper_form(method), value)
+
+
+def _published(metric: str, method: str, value: float, results: Results) -> Decision | None:
+    here = results.get((metric, method, ""))
+    if here is None or len(here) < MIN_RUNS:
+        return None
+    mean, std = float(here.mean()), float(here.std(ddof=1))
+    numbers = f"the paper's run {value:g}, here {mean:.2f}, std of runs {std:.2f} degrees"
+    return Decision(abs(value - mean) <= 2 * std, numbers)
+
+
+def mostly(metric: str, others: Sequence[str], method: str, *cases: str) -> Both:
+    """Decide that a metric of a method is above the sum of its others, on average over cases."""
+    return by_both(_mostly, method, metric=metric, others=others, cases=cases)
+
+
+def _mostly(
+    method: str, results: Results, *, metric: str, others: Sequence[str], cases: Sequence[str]
+) -> Decision | None:
+    part = values(results, metric, method, cases)
+    rest = [values(results, other, method, cases) for other in others]
+    given = [one for one in rest if one is not None]
+    if part is None or len(given) < len(rest):
+        return None
+    return below(np.sum(given, axis=0), part, "degrees")
+
+
+def always_converges(method: str) -> Both:
+    """Decide that all steps of all cases converge within the largest number of iterations."""
+    return by_both(_always_converges, method)
+
+
+def _always_converges(method: str, results: Results) -> Decision | None:
+    shares = {case: float(runs.mean()) for (metric, name, case), runs in results.items()
+              if metric == "converged" and name == method}  # fmt: skip
+    if not shares:
+        return None
+    worst = min(shares, key=lambda case: shares[case])
+    numbers = f"in {np.mean(list(shares.values())):.1%} of the steps"
+    if shares[worst] < 1:
+        numbers += f", at {worst} dB {shares[worst]:.1%}"
+    return Decision(shares[worst] >= 1, numbers)
+
+
+def as_printed_7d(results: Results) -> Decision | None:
+    """Decide that GOSPA of run 0 with certain births, as printed, is within 10 % of the paper's."""
+    here, value = results.get(("gospa of run 0", PRINTED_7D, "")), PANEL_GOSPA[PANELS[3]]
+    if here is None:
+        return None
+    quadrature = results["gospa of run 0", PANELS[3], ""]
+    numbers = f"the paper's run {value:g}, as printed {here[0]:.2f}, by quadrature "
+    numbers += f"{quadrature[0]:.2f} degrees"
+    return Decision(bool(abs(here[0] - value) <= value / 10), numbers)

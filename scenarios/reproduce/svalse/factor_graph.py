@@ -1,0 +1,196 @@
+"""Factor graph of SVALSE and its schedule of messages: Figs 1 to 3 of the paper.
+
+The factors are those of the motion model and of the measurement, the operations the methods of the
+tracker and of its solver, in the order in which they are called.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from arrivals.motion_models import BernoulliVonMises
+from arrivals.scenarios.reproduce.svalse.plots import panels
+from arrivals.trackers.svalse.coordinate.multi_snapshot import MultiSnapshotAscent
+from arrivals.trackers.svalse.svalse import SVALSE
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Point = tuple[float, float]
+BELIEF_PROPAGATION, MEAN_FIELD, PRIOR, LIKELIHOOD = "#1a8a3a", "#1f5fb4", "#cfe0f5", "#cdebd2"
+WIDTH = 6.0  # of a time step
+VARIABLES: dict[str, Point] = {"θ": (2.6, 3.0), "w": (2.6, 1.5), "s": (2.6, -1.0)}
+
+
+class Factor(NamedTuple):
+    """A factor of the joint density (15) in one time step.
+
+    Parameters
+    ----------
+    label : str
+        Density and its parameters.
+    place : tuple of two float
+        In the drawing of a time step.
+    variables : tuple of str
+        Variables of the same step.
+    earlier : str
+        Variable of the step before; empty for none.
+    """
+
+    label: str
+    place: Point
+    variables: tuple[str, ...]
+    earlier: str = ""
+
+
+class Operation(NamedTuple):
+    """An operation of the schedule, and the messages that it passes.
+
+    Parameters
+    ----------
+    method : callable
+        Method that carries it out.
+    equations : str
+    messages : tuple of tuple
+        Ends of the arrows: variables, or places of factors.
+    kind : str
+        Colour: belief propagation or mean field.
+    """
+
+    method: Callable[..., Any]
+    equations: str
+    messages: tuple[tuple[str, str], ...]
+    kind: str
+
+
+def factors(motion: BernoulliVonMises) -> dict[str, Factor]:
+    """Return the factors of one component in one step, by name.
+
+    Examples
+    --------
+    >>> factors(BernoulliVonMises())["walk"].label
+    'walk (61)\nκ = 148'
+    """
+    walk = motion.walk
+    step = f"κ = {walk.kappa:g}" if walk.kappa is not None else f"σ = {walk.sigma_doa:.3g} rad"
+    chain = f"chain (11)\np_a = {motion.p_activate:g}\np_d = {motion.p_deactivate:g}"
+    return {
+        "walk": Factor(f"walk (61)\n{step}", (0.9, 3.0), ("θ",), "θ"),
+        "chain": Factor(chain, (0.9, -1.0), ("s",), "s"),
+        "amplitude": Factor("amplitude (6)\nCN(0, τ)", (2.6, 0.25), ("w", "s")),
+        "likelihood": Factor("likelihood (13)\nν", (4.6, 2.25), ("θ", "w")),
+    }
+
+
+SCHEDULE = (
+    Operation(SVALSE.predict_batch, "(62)-(65)", (("walk", "θ"), ("chain", "s")),
+              BELIEF_PROPAGATION),
+    Operation(MultiSnapshotAscent.initialize, "(66)-(68)", (("likelihood", "θ"),), MEAN_FIELD),
+    Operation(MultiSnapshotAscent.choose_support, "(30), (31), (49)-(57)",
+              (("likelihood", "w"), ("amplitude", "w"), ("amplitude", "s")), MEAN_FIELD),
+    Operation(MultiSnapshotAscent.update_variances, "(58), (59)", (), MEAN_FIELD),
+    Operation(MultiSnapshotAscent.update_angles, "(27), (28), (32)-(48)",
+              (("w", "likelihood"), ("likelihood", "θ")), MEAN_FIELD),
+    Operation(MultiSnapshotAscent.has_converged, "repeat 3 to 6", (), MEAN_FIELD),
+    Operation(SVALSE.store, "q(θ), q(s) to the next step", (("θ", "next walk"), ("s", "next chain")),
+              BELIEF_PROPAGATION),
+)  # fmt: skip
+
+
+def draw_factor_graph(motion: BernoulliVonMises | None = None) -> Figure:
+    """Draw two time steps of the factor graph, and the schedule of messages of a step.
+
+    Parameters
+    ----------
+    motion : BernoulliVonMises, optional
+        The paper's if None.
+
+    Examples
+    --------
+    >>> [ax.get_title() for ax in draw_factor_graph().axes]
+    ['factor graph of component l, two time steps', 'schedule of a time step']
+    """
+    figure, (graph, schedule) = panels(1, 2, (13.0, 5.4))
+    graph.set_box_aspect(0.68)
+    _draw_steps(graph, factors(motion or BernoulliVonMises()))
+    _draw_schedule(schedule, SCHEDULE)
+    graph.set_title("factor graph of component l, two time steps", fontsize=11)
+    schedule.set_title("schedule of a time step", fontsize=11)
+    return figure
+
+
+def _draw_steps(ax: Axes, parts: dict[str, Factor]) -> None:
+    from matplotlib.patches import FancyBboxPatch
+
+    places = VARIABLES | {name: part.place for name, part in parts.items()}
+    for step in (0, 1):
+        for part in parts.values():
+            ends = [_at(VARIABLES[name], step) for name in part.variables]
+            if part.earlier and step:
+                ends.append(_at(VARIABLES[part.earlier], step - 1))
+            for x, y in ends:
+                ax.plot([_at(part.place, step)[0], x], [part.place[1], y], color="0.6", zorder=1)
+        for name, part in parts.items():
+            colour = LIKELIHOOD if name == "likelihood" else PRIOR
+            box = {"boxstyle": "round,pad=0.35", "facecolor": colour, "edgecolor": "0.3"}
+            ax.text(*_at(part.place, step), part.label, bbox=box, ha="center", va="center",
+                    fontsize=8, zorder=3)  # fmt: skip
+        for name, place in VARIABLES.items():
+            ax.plot(*_at(place, step), "o", markersize=25, color="white", markeredgecolor="0.2",
+                    zorder=3)  # fmt: skip
+            ax.text(*_at(place, step), f"${_latin(name)}_l$", ha="center", va="center", zorder=4)
+        ax.add_patch(FancyBboxPatch(_at((0.0, -1.7), step), 5.6, 5.6, boxstyle="round,pad=0.1",
+                                    facecolor="none", edgecolor="0.75", linestyle="--"))  # fmt: skip
+        ax.text(*_at((5.5, -1.6), step), f"step {('t', 't + 1')[step]}, l = 1 ... L", ha="right",
+                fontsize=8, color="0.4")  # fmt: skip
+    places |= {f"next {name}": _at(parts[name].place, 1) for name in ("walk", "chain")}
+    numbers: dict[tuple[str, str, str], list[str]] = {}
+    for number, operation in enumerate(SCHEDULE, 1):
+        for first, last in operation.messages:
+            numbers.setdefault((first, last, operation.kind), []).append(f"{number}")
+    for (first, last, colour), of_edge in numbers.items():
+        _draw_message(ax, places[first], places[last], ", ".join(of_edge), colour)
+    ax.set(xlim=(-0.4, 2 * WIDTH), ylim=(-2.1, 4.2))
+    ax.set_axis_off()
+
+
+def _draw_message(ax: Axes, start: Point, end: Point, number: str, colour: str) -> None:
+    """Draw a message as an arrow on the left of its edge, and its number."""
+    dx, dy = end[0] - start[0], end[1] - start[1]
+    length = (dx**2 + dy**2) ** 0.5
+    across = (-0.17 * dy / length, 0.17 * dx / length)
+    low, high = 0.45, 0.68
+    tail, head = (
+        (start[0] + part * dx + across[0], start[1] + part * dy + across[1])
+        for part in (low, high)
+    )
+    ax.annotate("", head, tail, zorder=5,
+                arrowprops={"arrowstyle": "-|>", "color": colour, "linewidth": 1.4})  # fmt: skip
+    ax.text(tail[0] + 1.6 * across[0], tail[1] + 1.6 * across[1], number, color=colour,
+            ha="center", va="center", fontsize=9, fontweight="bold", zorder=6)  # fmt: skip
+
+
+def _draw_schedule(ax: Axes, schedule: Sequence[Operation]) -> None:
+    """List the operations: name, equations, and the first line of the method's description."""
+    for number, operation in enumerate(schedule, 1):
+        y = 1 - number / (len(schedule) + 1.2)
+        title = f"{number}  {operation.method.__name__}   {operation.equations}"
+        ax.text(0.02, y, title, fontsize=9.5, fontweight="bold", color=operation.kind)
+        first = (inspect.getdoc(operation.method) or "").splitlines()[0]
+        ax.text(0.06, y - 0.045, first, fontsize=8.5, color="0.25")
+    for y, colour, name in ((0.06, BELIEF_PROPAGATION, "belief propagation between the steps"),
+                            (0.01, MEAN_FIELD, "mean field within a step")):  # fmt: skip
+        ax.text(0.02, y, f"→ {name}", color=colour, fontsize=9)
+    ax.set(xlim=(0, 1), ylim=(0, 1))
+    ax.set_axis_off()
+
+
+def _at(place: Point, step: int) -> Point:
+    return place[0] + WIDTH * step, place[1]
+
+
+def _latin(name: str) -> str:
+    return r"\theta" if name == "θ" else name

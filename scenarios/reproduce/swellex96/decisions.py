@@ -1,0 +1,134 @@
+"""Functions that decide the claims on the SWellEx-96 tow, from scores and facts of the field."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from arrivals.scenarios.reproduce.claims import Claim, Decide, Decision, below
+from arrivals.scenarios.reproduce.svalse.decisions import Both, by_both
+from arrivals.scenarios.reproduce.swellex96.field import FieldFacts
+from arrivals.typing import Float
+
+SCORES = ("gospa", "distance", "missed", "false", "rmse", "found", "paths", "near")
+MANY = 0.8  # share of steps that counts as "dominates"
+
+
+class SeaResults(NamedTuple):
+    """What the claims on the tow are decided by.
+
+    Attributes
+    ----------
+    scores : mapping of str to ndarray, shape (n_draws, 8)
+        `SCORES` of each method in steps 1 to 100, which have many close paths; 63 elements.
+    field : FieldFacts
+    """
+
+    scores: Mapping[str, Float]
+    field: FieldFacts
+
+
+def lower(metric: str, first: str, second: str) -> Both:
+    """Decide that a score of one method is below that of another in steps 1 to 100."""
+    return by_both(_lower, first, second, metric=metric)
+
+
+def _lower(first: str, second: str, results: SeaResults, *, metric: str) -> Decision | None:
+    if not {first, second} <= set(results.scores):
+        return None
+    column = SCORES.index(metric)
+    low, high = (results.scores[name][:, column] for name in (first, second))
+    return below(low, high, "degrees")
+
+
+def none_beyond_critical(results: SeaResults) -> Decision:
+    """Decide that less than 1 % of the power comes from beyond the critical angle."""
+    share = results.field.beyond_critical
+    return Decision(share < 0.01, f"{share:.1%} of the power, median of the steps")
+
+
+def angles_grow(results: SeaResults) -> Decision:
+    """Decide that the angles grow in most steps."""
+    share = results.field.growing
+    return Decision(share > MANY, f"in {share:.0%} of the steps up to the closest one")
+
+
+def bottom_dominates(results: SeaResults) -> Decision:
+    """Decide that the path B is the strongest in most steps, at about -15 degrees."""
+    share, (near, far) = results.field.bottom, results.field.bottom_span
+    holds = share > MANY and far < -15 < near
+    return Decision(holds, f"in {share:.0%} of the steps, {near:.0f}° to {far:.0f}°")
+
+
+def direct_is_weaker(results: SeaResults) -> Decision:
+    """Decide that the direct path is weaker, by rays and by modes."""
+    rays, modes = results.field.weaker_rays, results.field.weaker_modes
+    numbers = f"by {rays:.0f} dB (rays), {modes:.0f} dB (modes, beam power), medians"
+    return Decision(min(rays, modes) > 0, numbers)
+
+
+def two_dominate(results: SeaResults) -> Decision:
+    """Decide that BS and BSB are the strongest in most steps."""
+    share = results.field.late_bounces
+    return Decision(share > MANY, f"in {share:.0%} of the steps")
+
+
+def at_their_angles(results: SeaResults) -> Decision:
+    """Decide that BS and BSB pass 15 and -17 degrees in those steps."""
+    spans, step = results.field.late_spans, results.field.nearest_step
+    numbers = "{:.0f}° to {:.0f}° and {:.0f}° to {:.0f}°".format(*spans)
+    return Decision(220 <= step < 250, f"{numbers}; nearest at step {step}")
+
+
+def many_bounces_dominate(results: SeaResults) -> Decision:
+    """Decide that paths of four bounces and more are the strongest in most steps."""
+    share, names = results.field.many_bounces, results.field.succession
+    return Decision(share > MANY, f"in {share:.0%} of the steps; in turn {', '.join(names)}")
+
+
+def pairs_are_close(results: SeaResults) -> Decision:
+    """Decide that pairs of paths are at most about 1 degree apart."""
+    median, most, largest = results.field.pair_gap
+    numbers = f"median {median:.2f}°, 95 % within {most:.2f}°, at most {largest:.1f}°"
+    return Decision(most < 1.5, numbers)
+
+
+def models_agree(results: SeaResults) -> Decision:
+    """Decide that the beam powers of rays and modes are correlated."""
+    field = results.field
+    numbers = (
+        f"correlation {field.correlation:.2f}, median of the steps; level of the rays "
+        f"{field.level:+.1f} dB, std {field.level_std:.1f} dB"
+    )
+    return Decision(field.correlation > 0.8 and abs(field.level) < 3, numbers)
+
+
+def peaks_are_paths(results: SeaResults) -> Decision:
+    """Decide that the highest beam peaks are at strong paths."""
+    above, low, most = results.field.peak_to_path
+    numbers = f"{above:.1f}° from above, {low:.1f}° from below, medians; 90 % within {most:.1f}°"
+    return Decision(max(above, low) < 1, numbers)
+
+
+FIELD: tuple[tuple[str, Decide], ...] = (
+    ("multipath ends at the critical angle of 21.6 degrees: steps 1 to 200", none_beyond_critical),
+    ("the absolute angles increase as the source comes closer", angles_grow),
+    ("modes and rays match visually well", models_agree),
+    ("the beam has significant peaks at the paths", peaks_are_paths),
+    ("about -15 degrees, one bottom bounce (B), is dominant: steps 250 to 339", bottom_dominates),
+    ("the direct path, 12 degrees, is weaker than that: steps 250 to 339", direct_is_weaker),
+    ("a path and that with a bounce above the source are about 1 degree or less apart",
+     pairs_are_close),
+    ("BS and BSB dominate: steps 220 to 249", two_dominate),
+    ("they arrive from 15 and -17 degrees", at_their_angles),
+    ("paths of four bounces and more dominate successively: steps 1 to 200", many_bounces_dominate),
+)  # fmt: skip
+CLAIMS = tuple(
+    Claim("swellex96", "", text, by_ours=lower("gospa", first, second)[1], source="ours")
+    for first, second, text in (
+        ("svalse", "cbf", "SVALSE has a lower GOSPA than the beamformer, steps 1 to 100"),
+        ("svalse", "peaks_gnn", "SVALSE has a lower GOSPA than tracked peaks of the beamformer"),
+        ("svalse", "ssbl", "SVALSE has a lower GOSPA than SSBL"),
+        ("valse", "cbf", "VALSE has a lower GOSPA than the beamformer"),
+    )
+)
