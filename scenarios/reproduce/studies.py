@@ -50,9 +50,9 @@ RUNS: dict[str, tuple[int, int]] = {
     "svalse-fig5": (20, 4),
     "svalse-fig6": (20, 4),
     "svalse-fig7": (6, 2),
-    "svalse-fig8": (5, 2),
-    "svalse-fig9": (5, 2),
-    "svalse-fig10": (5, 2),
+    "svalse-fig8": (20, 2),
+    "svalse-fig9": (20, 2),
+    "svalse-fig10": (20, 2),
     "swellex96": (4, 1),
 }
 

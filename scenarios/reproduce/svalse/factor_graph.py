@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 Point = tuple[float, float]
 BELIEF_PROPAGATION, MEAN_FIELD, PRIOR, LIKELIHOOD = "#1a8a3a", "#1f5fb4", "#cfe0f5", "#cdebd2"
 WIDTH = 6.0  # of a time step
-VARIABLES: dict[str, Point] = {"θ": (2.6, 3.0), "w": (2.6, 1.5), "s": (2.6, -1.0)}
+VARIABLES: dict[str, Point] = {"θ": (2.6, 3.3), "w": (2.6, 1.3), "s": (2.6, -1.0)}
 
 
 class Factor(NamedTuple):
@@ -78,10 +78,10 @@ def factors(motion: BernoulliVonMises) -> dict[str, Factor]:
     step = f"κ = {walk.kappa:g}" if walk.kappa is not None else f"σ = {walk.sigma_doa:.3g} rad"
     chain = f"chain (11)\np_a = {motion.p_activate:g}\np_d = {motion.p_deactivate:g}"
     return {
-        "walk": Factor(f"walk (61)\n{step}", (0.9, 3.0), ("θ",), "θ"),
+        "walk": Factor(f"walk (61)\n{step}", (0.9, 3.3), ("θ",), "θ"),
         "chain": Factor(chain, (0.9, -1.0), ("s",), "s"),
-        "amplitude": Factor("amplitude (6)\nCN(0, τ)", (2.6, 0.25), ("w", "s")),
-        "likelihood": Factor("likelihood (13)\nν", (4.6, 2.25), ("θ", "w")),
+        "amplitude": Factor("amplitude (6)\nCN(0, τ)", (2.6, 0.1), ("w", "s")),
+        "likelihood": Factor("likelihood (13)\nν", (4.7, 2.25), ("θ", "w")),
     }
 
 
@@ -93,7 +93,7 @@ SCHEDULE = (
               (("likelihood", "w"), ("amplitude", "w"), ("amplitude", "s")), MEAN_FIELD),
     Operation(MultiSnapshotAscent.update_variances, "(58), (59)", (), MEAN_FIELD),
     Operation(MultiSnapshotAscent.update_angles, "(27), (28), (32)-(48)",
-              (("w", "likelihood"), ("likelihood", "θ")), MEAN_FIELD),
+              (("likelihood", "θ"),), MEAN_FIELD),
     Operation(MultiSnapshotAscent.has_converged, "repeat 3 to 6", (), MEAN_FIELD),
     Operation(SVALSE.store, "q(θ), q(s) to the next step", (("θ", "next walk"), ("s", "next chain")),
               BELIEF_PROPAGATION),
@@ -114,7 +114,6 @@ def draw_factor_graph(motion: BernoulliVonMises | None = None) -> Figure:
     ['factor graph of component l, two time steps', 'schedule of a time step']
     """
     figure, (graph, schedule) = panels(1, 2, (13.0, 5.4))
-    graph.set_box_aspect(0.68)
     _draw_steps(graph, factors(motion or BernoulliVonMises()))
     _draw_schedule(schedule, SCHEDULE)
     graph.set_title("factor graph of component l, two time steps", fontsize=11)
@@ -158,10 +157,11 @@ def _draw_steps(ax: Axes, parts: dict[str, Factor]) -> None:
 
 
 def _draw_message(ax: Axes, start: Point, end: Point, number: str, colour: str) -> None:
-    """Draw a message as an arrow on the left of its edge, and its number."""
+    """Draw a message as an arrow beside its edge, upwards from it or left, and its number."""
     dx, dy = end[0] - start[0], end[1] - start[1]
     length = (dx**2 + dy**2) ** 0.5
-    across = (-0.17 * dy / length, 0.17 * dx / length)
+    side = 0.17 if dx > 0.0 or dy > 0.0 == dx else -0.17
+    across = (-side * dy / length, side * dx / length)
     low, high = 0.45, 0.68
     tail, head = (
         (start[0] + part * dx + across[0], start[1] + part * dy + across[1])
@@ -176,12 +176,12 @@ def _draw_message(ax: Axes, start: Point, end: Point, number: str, colour: str) 
 def _draw_schedule(ax: Axes, schedule: Sequence[Operation]) -> None:
     """List the operations: name, equations, and the first line of the method's description."""
     for number, operation in enumerate(schedule, 1):
-        y = 1 - number / (len(schedule) + 1.2)
+        y = 1.02 - number / (len(schedule) + 1.6)
         title = f"{number}  {operation.method.__name__}   {operation.equations}"
         ax.text(0.02, y, title, fontsize=9.5, fontweight="bold", color=operation.kind)
         first = (inspect.getdoc(operation.method) or "").splitlines()[0]
         ax.text(0.06, y - 0.045, first, fontsize=8.5, color="0.25")
-    for y, colour, name in ((0.06, BELIEF_PROPAGATION, "belief propagation between the steps"),
+    for y, colour, name in ((0.07, BELIEF_PROPAGATION, "belief propagation between the steps"),
                             (0.01, MEAN_FIELD, "mean field within a step")):  # fmt: skip
         ax.text(0.02, y, f"→ {name}", color=colour, fontsize=9)
     ax.set(xlim=(0, 1), ylim=(0, 1))

@@ -60,7 +60,7 @@ def svalse_as_printed(label: str = AS_PRINTED["svalse"], **probabilities: float)
     >>> svalse_as_printed().params["solver"].first_existence
     0.5
     """
-    params = {"solver": CoordinateSolver.paper().replace(first_existence=0.5), "reference": "first"}
+    params = {"solver": CoordinateSolver.paper(first_existence=0.5), "reference": "first"}
     return Method("svalse", params | {"motion": BernoulliVonMises(**probabilities)}, label)
 
 

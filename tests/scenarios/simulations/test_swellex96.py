@@ -13,11 +13,12 @@ from sklearn.base import clone
 from arrivals.scenarios import create, mean_gospa
 from arrivals.scenarios.demos.swellex96 import swellex96 as shipped
 from arrivals.scenarios.reproduce.studies import reproduce
+from arrivals.scenarios.reproduce.svalse.forms import PAPER_FORM
 from arrivals.scenarios.reproduce.swellex96 import figures_11_12 as reproduce_swellex
 from arrivals.scenarios.reproduce.swellex96.field import beam
 from arrivals.scenarios.reproduce.swellex96.figures_11_12 import strong_directions
 from arrivals.scenarios.simulations.swellex96 import TowPastLine, environment, line, track
-from arrivals.trackers import Run
+from arrivals.trackers import find
 from arrivals.typing import Complex, Float
 
 RANGES = tuple(track()["range_m"].tolist())
@@ -169,28 +170,35 @@ def test_valse_and_svalse_resolve_more_distant_paths_than_the_beamformer() -> No
 def test_swellex96_study_writes_table_claims_and_figures(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Every tenth step, with the beamformer for all six methods, which take a minute."""
-
-    def conventional(scenario: TowPastLine, name: str, seed: int, draw: int) -> tuple[Run, float]:
-        trial = scenario.sample(np.random.default_rng([seed, draw]))
-        return trial.tracker("cbf").run(trial.measurements), 1.0
-
-    monkeypatch.setattr(reproduce_swellex, "track_draw", conventional)
+    """Every tenth step, with the beamformer for all methods, which take minutes."""
+    monkeypatch.setattr(reproduce_swellex, "tracker_of", lambda trial, name: trial.tracker("cbf"))
     monkeypatch.setattr(reproduce_swellex, "step_numbers", lambda runs: np.arange(1, 351, 10))
-    written = reproduce("swellex96", tmp_path, quick=True)
+    written = reproduce("swellex96", tmp_path, runs=1)
     assert [path.suffix for path in written] == [".csv", ".md", ".png", ".png", ".png"]
     with open(tmp_path / "swellex96.csv", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    assert len(rows) == 2 * 6 * 5
-    assert [row["method"] for row in rows[::5]] == list(reproduce_swellex.METHODS) * 2
+    methods = list(reproduce_swellex.METHODS)
+    assert len(rows) == 6 * 5 + 6 + 2
+    assert [row["method"] for row in rows[:30:5]] == methods
+    assert [row["method"] for row in rows[30:]] == [*methods, *PAPER_FORM.values()]
     for row in rows:
         parts = [float(row[key]) for key in ("distance", "missed", "false")]
         assert float(row["GOSPA"]) == pytest.approx(sum(parts))
         assert row["std"] == ""  # of one draw
+    first_100 = [row["GOSPA"] for row in rows if row["steps"] == "1-100"]
+    assert len(set(first_100)) == 1  # the paper's forms have directions of these steps only
     page = (tmp_path / "swellex96.md").read_text(encoding="utf-8")
     assert "every second step" in page
-    assert "Not decided: in steps 1 to 100 svalse has a lower GOSPA than valse" in page
-    assert "| steps 220-249: BS and BSB dominate | 15° and -17° |" in page
+    assert "SVALSE is more accurate than VALSE: GOSPA, steps 1 to 100. **Not decided**" in page
+    assert "BS and BSB dominate: steps 220 to 249. **Holds**" in page
+
+
+def test_paper_form_at_sea_is_coordinate_ascent_from_the_first_element() -> None:
+    trial = TowPastLine(ranges=RANGES[:2]).sample(rng())
+    for name, label in PAPER_FORM.items():
+        tracker: Any = reproduce_swellex.tracker_of(trial, label)
+        assert isinstance(tracker, find(name))
+        assert (tracker.reference, tracker.solver.tolerance) == ("first", 1e-6)
 
 
 # the recorded arrays

@@ -296,7 +296,13 @@ def test_sparse_line_warns_of_two_ambiguous_directions() -> None:
         (
             CIRCLE,
             {"solver": MIXTURE},
-            "requires a line on a uniform grid",
+            "requires a line on a uniform grid, at one wavelength: the general form is "
+            'posterior="quadrature"',
+        ),
+        (
+            ArraySnapshot(SensorArray.ula(8, 0.5), [1.0, 1.1]),
+            {"solver": MIXTURE},
+            "at one wavelength: the general form",
         ),
         (CIRCLE, {"memory": "all"}, "memory must be one of 'von_mises', 'posterior'"),
         (
@@ -307,7 +313,7 @@ def test_sparse_line_warns_of_two_ambiguous_directions() -> None:
         (
             ArraySnapshot(SensorArray.ula(8, 0.5), 1.0),
             {"solver": MIXTURE, "memory": "posterior"},
-            'requires posterior="quadrature"',
+            'requires memory="von_mises": the general form is posterior="quadrature"',
         ),
         (ArraySnapshot(SensorArray.uca(2, 0.5), 1.0), {}, "at least 3 sensors"),
     ],

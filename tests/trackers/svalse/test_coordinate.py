@@ -163,6 +163,28 @@ def test_paper_is_the_published_program() -> None:
     assert (solver.initial_snr_db(prior), solver.initial_snr_db(None)) == (20.0, None)
 
 
+def test_first_existence_is_held_and_divides_the_power_where_no_component_is_tracked() -> None:
+    """Section VI.B: p = 0.5 at first, τ = (‖y‖²/M - ν)/(p L)."""
+    printed = CoordinateSolver.paper(first_existence=0.5)
+    state = printed.initial_state(snapshot(1), MODEL.manifold(), None)
+    power = float((np.abs(snapshot(1)) ** 2).mean())
+    np.testing.assert_allclose(state.rho, 0.5)
+    np.testing.assert_allclose(state.tau, (power - state.nu) / (0.5 * len(state.rho)))
+    state.active[0] = True
+    state.update_rho()
+    np.testing.assert_allclose(state.rho, 0.5)
+    program = CoordinateSolver.paper().initial_state(snapshot(1), MODEL.manifold(), None)
+    assert program.rho[0] == (len(program.rho) // 2) / len(program.rho)
+    tracked = printed.initial_state(snapshot(1), MODEL.manifold(), PRIOR)
+    np.testing.assert_array_equal(tracked.rho[: len(PRIOR.existence)], PRIOR.existence)
+
+
+@pytest.mark.parametrize("value", [0.0, 1.0, float("nan")])
+def test_first_existence_is_a_probability_that_leaves_both_possible(value: float) -> None:
+    with pytest.raises(ValueError, match=r"first_existence must (lie in \(0, 1\)|be)"):
+        CoordinateSolver(first_existence=value)
+
+
 def test_mixture_with_a_noise_floor_is_the_mixture_of_the_fast_form() -> None:
     """A floor far below the noise changes the form of the state, but not the result."""
     fast = CoordinateSolver(posterior="mixture", snr_db=20.0)

@@ -83,15 +83,31 @@ class CoordinateSolver(SolverSettings):
             raise ValueError(f"first_existence must lie in (0, 1); got {self.first_existence}")
 
     @classmethod
-    def paper(cls) -> Self:
+    def paper(cls, first_existence: float | None = None) -> Self:
         """Return the solver of the published programs of SVALSE and VALSE.
+
+        Parameters
+        ----------
+        first_existence : float, optional
+            As in the class: 0.5 as the paper prints it, None as its program has it.
+
+        Returns
+        -------
+        CoordinateSolver
+            A tracker in the paper's form has `reference="first"`, and SVALSE the motion
+            `BernoulliVonMises()`.
 
         Examples
         --------
         >>> CoordinateSolver.paper().replace(posterior="quadrature").tolerance
         1e-06
         """
-        return cls(posterior="mixture", tolerance=1e-6, max_iterations=5000)
+        return cls(
+            posterior="mixture",
+            tolerance=1e-6,
+            max_iterations=5000,
+            first_existence=first_existence,
+        )
 
     def check(self, manifold: Manifold, n_snapshots: int, n_moments: int) -> None:
         """Raise ValueError if the mixture does not support such measurements."""
