@@ -58,8 +58,9 @@ class SVALSE(VALSE):
         direction, and may stand still; the paper's, `BernoulliVonMises()`, has one in the
         electrical angle, 2π d/λ sin β, which lets sources near endfire jump by many degrees.
     solver : NewtonSolver or CoordinateSolver
-        Maximization of the bound, with its settings; see `VALSE`. The paper's choices are
-        `CoordinateSolver.paper()` and `reference="first"`.
+        Maximization of the bound, with its settings; see `VALSE`. The published program's choices
+        are `CoordinateSolver.paper()` and `reference="first"`; the paper prints a probability of
+        0.5 in the first step, `CoordinateSolver.paper(first_existence=0.5)`.
     engine : {"newton", "fast", "coordinate"}, optional
         Shorthand for a solver of that kind ("fast" is "newton") with those settings of `solver`
         that both kinds have; the attribute is None afterwards.

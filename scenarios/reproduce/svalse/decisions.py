@@ -184,10 +184,10 @@ def _always_converges(method: str, results: Results) -> Decision | None:
 
 def as_printed_7d(results: Results) -> Decision | None:
     """Decide that GOSPA of run 0 with certain births, as printed, is within 10 % of the paper's."""
-    here, value = results.get(("gospa of run 0", PRINTED_7D, "")), PANEL_GOSPA[PANELS[3]]
-    if here is None:
+    here, quadrature = (results.get(("gospa", name, "")) for name in (PRINTED_7D, PANELS[3]))
+    if here is None or quadrature is None:
         return None
-    quadrature = results["gospa of run 0", PANELS[3], ""]
+    value = PANEL_GOSPA[PANELS[3]]
     numbers = f"the paper's run {value:g}, as printed {here[0]:.2f}, by quadrature "
     numbers += f"{quadrature[0]:.2f} degrees"
     return Decision(bool(abs(here[0] - value) <= value / 10), numbers)

@@ -73,8 +73,8 @@ def test_sweep_is_computed_once_for_three_figures(
     monkeypatch.setattr(forms, "FAST", ("sbl", "ssbl", "valse", "svalse"))
     reproduce.reproduce("svalse-fig9", tmp_path, runs=2, quick=True)
     rows = table(tmp_path / "svalse-fig9.csv")
-    assert [row["SNR, dB"] for row in rows[8:]] == ["40", *OFF_GRID]
-    assert [float(row["sbl rebuilt"]) for row in rows[:9]] == [
+    assert [row["SNR, dB"] for row in rows] == [f"{snr}" for snr in range(0, 45, 5)]
+    assert [float(row["sbl rebuilt"]) for row in rows] == [
         four[0][0] for four in SWEEP["svalse_scenario2"].values()
     ]
     before = {path: path.stat().st_mtime_ns for path in (tmp_path / "runs").iterdir()}
@@ -84,8 +84,19 @@ def test_sweep_is_computed_once_for_three_figures(
     assert {path: path.stat().st_mtime_ns for path in (tmp_path / "runs").iterdir()} == before
     ssbl = list(report.columns).index("ssbl")
     assert [row[ssbl] for row in report.rows] == [
-        pytest.approx(float(row["ssbl rmse"]), abs=1e-7) for row in rows[:9]
+        pytest.approx(float(row["ssbl rmse"]), abs=1e-7) for row in rows
     ]
+
+
+@pytest.mark.usefixtures("short")
+def test_sources_off_the_grid_are_cases_at_high_snr(tmp_path: Path) -> None:
+    study = reproduce_svalse_snr.off_grid("svalse_scenario1", 1, 0, tmp_path)
+    assert tuple(study.cases) == OFF_GRID
+    assert set(study.methods) == set(reproduce_svalse_snr.SHOWN)
+    truth = scenarios.create("svalse_scenario1", n_steps=1, offset_deg=0.25).sample(
+        np.random.default_rng(0)
+    )
+    np.testing.assert_allclose(np.rad2deg(truth.truth), [[-2.75, 2.25, 60.25]])
 
 
 @pytest.mark.usefixtures("short")
