@@ -10,7 +10,12 @@ import numpy as np
 
 from arrivals.scenarios.experiments.study import Study
 from arrivals.scenarios.reproduce.claims import Decide, Decision, below, negative
-from arrivals.scenarios.reproduce.svalse.forms import PAPER_FORM, PRINTED_7D, activation_label
+from arrivals.scenarios.reproduce.svalse.forms import (
+    FROM_20_DB,
+    PAPER_FORM,
+    PRINTED_7D,
+    activation_label,
+)
 from arrivals.scenarios.reproduce.svalse.published_values import ACTIVATION
 from arrivals.typing import Float
 

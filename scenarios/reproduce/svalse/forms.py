@@ -18,6 +18,7 @@ from arrivals.trackers import CoordinateSolver
 FAST = ("cbf", "peaks_gnn", "sbl", "ssbl", "valse", "svalse")
 PAPER_FORM = {"valse": "valse paper's form", "svalse": "svalse paper's form"}
 AS_PRINTED = {"valse": "valse as printed", "svalse": "svalse as printed"}
+FROM_20_DB = "valse from 20 dB"
 PRINTED_7D = "p_d 0.25, p_a 1 as printed, run 0"
 NAN = float("nan")
 FORMS = (
@@ -35,7 +36,7 @@ def quadrature(max_iterations: int) -> dict[str, Any]:
     return {"solver": solver, "reference": "first"}
 
 
-def svalse_paper_form(label: str, **probabilities: float) -> Method:
+def svalse_paper_form(label: str, max_iterations: int = 1000, **probabilities: float) -> Method:
     """Return SVALSE in the paper's form, with these probabilities of birth and death.
 
     Examples
@@ -44,12 +45,18 @@ def svalse_paper_form(label: str, **probabilities: float) -> Method:
     148.0
     """
     motion = BernoulliVonMises(**probabilities)
-    return Method("svalse", quadrature(1000) | {"motion": motion}, label)
+    return Method("svalse", quadrature(max_iterations) | {"motion": motion}, label)
 
 
 def valse_paper_form() -> Method:
     """Return VALSE in the paper's form."""
     return Method("valse", quadrature(2000), PAPER_FORM["valse"])
+
+
+def valse_from_20_db() -> Method:
+    """Return VALSE in the paper's form, its noise started as SVALSE's (section VI.B)."""
+    params = quadrature(2000)
+    return Method("valse", params | {"solver": params["solver"].replace(snr_db=20.0)}, FROM_20_DB)
 
 
 def svalse_as_printed(label: str = AS_PRINTED["svalse"], **probabilities: float) -> Method:

@@ -68,6 +68,7 @@ def test_runs_that_failed_are_left_out_of_the_pairs() -> None:
 def test_average_over_cases_is_of_all_of_them() -> None:
     results: Any = {("rmse", "svalse", case): n + JITTER for n, case in enumerate(sv.LOW)}
     mean = sv.values(results, "rmse", "svalse", sv.LOW)
+    assert mean is not None
     np.testing.assert_allclose(mean, 0.5 + JITTER)
     assert sv.values(results, "rmse", "svalse", (*sv.LOW, "10")) is None
 
