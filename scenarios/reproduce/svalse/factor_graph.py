@@ -67,7 +67,7 @@ class Operation(NamedTuple):
 
 
 def factors(motion: BernoulliVonMises) -> dict[str, Factor]:
-    """Return the factors of one component in one step, by name.
+    r"""Return the factors of one component in one step, by name.
 
     Examples
     --------
@@ -95,8 +95,8 @@ SCHEDULE = (
     Operation(MultiSnapshotAscent.update_angles, "(27), (28), (32)-(48)",
               (("likelihood", "θ"),), MEAN_FIELD),
     Operation(MultiSnapshotAscent.has_converged, "repeat 3 to 6", (), MEAN_FIELD),
-    Operation(SVALSE.store, "q(θ), q(s) to the next step", (("θ", "next walk"), ("s", "next chain")),
-              BELIEF_PROPAGATION),
+    Operation(SVALSE.store, "q(θ), q(s) to the next step",
+              (("θ", "next walk"), ("s", "next chain")), BELIEF_PROPAGATION),
 )  # fmt: skip
 
 
@@ -141,8 +141,9 @@ def _draw_steps(ax: Axes, parts: dict[str, Factor]) -> None:
             ax.plot(*_at(place, step), "o", markersize=25, color="white", markeredgecolor="0.2",
                     zorder=3)  # fmt: skip
             ax.text(*_at(place, step), f"${_latin(name)}_l$", ha="center", va="center", zorder=4)
-        ax.add_patch(FancyBboxPatch(_at((0.0, -1.7), step), 5.6, 5.6, boxstyle="round,pad=0.1",
-                                    facecolor="none", edgecolor="0.75", linestyle="--"))  # fmt: skip
+        plate = {"facecolor": "none", "edgecolor": "0.75", "linestyle": "--"}
+        corner = _at((0.0, -1.7), step)
+        ax.add_patch(FancyBboxPatch(corner, 5.6, 5.6, boxstyle="round,pad=0.1", **plate))
         ax.text(*_at((5.5, -1.6), step), f"step {('t', 't + 1')[step]}, l = 1 ... L", ha="right",
                 fontsize=8, color="0.4")  # fmt: skip
     places |= {f"next {name}": _at(parts[name].place, 1) for name in ("walk", "chain")}

@@ -20,6 +20,7 @@ PAPER_FORM = {"valse": "valse paper's form", "svalse": "svalse paper's form"}
 AS_PRINTED = {"valse": "valse as printed", "svalse": "svalse as printed"}
 FROM_20_DB = "valse from 20 dB"
 PRINTED_7D = "p_d 0.25, p_a 1 as printed, run 0"
+UNMERGED_7D = "p_d 0.25, p_a 1 without merging, run 0"
 NAN = float("nan")
 FORMS = (
     "Paper's form: coordinate ascent to a tolerance of 1e-6, the first sensor as phase reference, "
@@ -69,6 +70,13 @@ def svalse_as_printed(label: str = AS_PRINTED["svalse"], **probabilities: float)
     """
     params = {"solver": CoordinateSolver.paper(first_existence=0.5), "reference": "first"}
     return Method("svalse", params | {"motion": BernoulliVonMises(**probabilities)}, label)
+
+
+def unmerged_7d() -> Method:
+    """Return the paper's form of Fig. 7(d) without merging, which the paper does not mention."""
+    method = svalse_paper_form(UNMERGED_7D, p_activate=1.0)
+    solver = method.params["solver"].replace(merge=0.0)
+    return Method("svalse", {**method.params, "solver": solver}, UNMERGED_7D)
 
 
 def valse_as_printed() -> Method:

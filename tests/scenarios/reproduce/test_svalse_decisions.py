@@ -20,6 +20,7 @@ from arrivals.scenarios.reproduce.svalse.factor_graph import (
     draw_factor_graph,
     factors,
 )
+from arrivals.scenarios.reproduce.svalse.forms import PRINTED_7D, UNMERGED_7D
 from arrivals.scenarios.reproduce.svalse.step_metrics import STEP_METRICS, gospa_steps
 from arrivals.scenarios.reproduce.swellex96.decisions import SCORES, SeaResults
 from arrivals.scenarios.reproduce.swellex96.field import FieldFacts
@@ -103,6 +104,18 @@ def test_limits_convergence_and_the_largest_part() -> None:
     given = [decision for decision in decisions if decision is not None]
     assert [decision.holds for decision in given] == [True, False, True, False]
     assert given[-1].numbers == "in 97.5% of the steps, at 0 dB 95.0%"
+
+
+@pytest.mark.parametrize(("gospa", "holds"), [(24.0, True), (20.0, False)])
+def test_certain_births_as_printed_are_compared_with_the_paper(gospa: float, holds: bool) -> None:
+    results = {("gospa", label, ""): np.array([value]) for label, value in (
+        (PRINTED_7D, gospa), (UNMERGED_7D, 36.0), (sv.PANELS[3], 17.0))}  # fmt: skip
+    decision = sv.as_printed_7d(results)
+    assert decision is not None
+    assert decision.holds == holds
+    assert "the paper's run 25.79" in decision.numbers
+    results.pop(("gospa", PRINTED_7D, ""))
+    assert sv.as_printed_7d(results) is None
 
 
 def test_every_entry_of_the_table_is_once_there_and_names_its_place() -> None:

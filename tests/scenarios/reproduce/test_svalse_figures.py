@@ -89,6 +89,15 @@ def test_sweep_is_computed_once_for_three_figures(
 
 
 @pytest.mark.usefixtures("short")
+def test_certain_births_as_printed_are_one_run_of_the_full_study(tmp_path: Path) -> None:
+    report = reproduce_svalse.fig7(2, 0, tmp_path)
+    last = [row[0] for row in report.rows[-2:]]
+    assert last == [forms.PRINTED_7D, forms.UNMERGED_7D]
+    assert all(len(row) == len(report.columns) for row in report.rows)
+    assert len(report.results["gospa", forms.PRINTED_7D, ""]) == 1
+
+
+@pytest.mark.usefixtures("short")
 def test_sources_off_the_grid_are_cases_at_high_snr(tmp_path: Path) -> None:
     study = reproduce_svalse_snr.off_grid("svalse_scenario1", 1, 0, tmp_path)
     assert tuple(study.cases) == OFF_GRID
