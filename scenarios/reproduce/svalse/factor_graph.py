@@ -141,7 +141,7 @@ def _draw_steps(ax: Axes, parts: dict[str, Factor]) -> None:
             ax.plot(*_at(place, step), "o", markersize=25, color="white", markeredgecolor="0.2",
                     zorder=3)  # fmt: skip
             ax.text(*_at(place, step), f"${_latin(name)}_l$", ha="center", va="center", zorder=4)
-        plate = {"facecolor": "none", "edgecolor": "0.75", "linestyle": "--"}
+        plate: dict[str, Any] = {"facecolor": "none", "edgecolor": "0.75", "linestyle": "--"}
         corner = _at((0.0, -1.7), step)
         ax.add_patch(FancyBboxPatch(corner, 5.6, 5.6, boxstyle="round,pad=0.1", **plate))
         ax.text(*_at((5.5, -1.6), step), f"step {('t', 't + 1')[step]}, l = 1 ... L", ha="right",

@@ -239,8 +239,9 @@ def _span(doa: Float) -> Span:
 
     Examples
     --------
-    >>> _span(np.deg2rad([-17.0, -12.0]))
-    (-12.0, -17.0)
+    >>> near, far = _span(np.deg2rad([-17.0, -12.0]))
+    >>> round(near), round(far)
+    (-12, -17)
     """
     degrees = np.rad2deg(doa[~np.isnan(doa)])
     near, far = degrees[np.argmin(np.abs(degrees))], degrees[np.argmax(np.abs(degrees))]
