@@ -27,8 +27,8 @@ SVALSE: tuple[Claim, ...] = (
     *(Claim(f"svalse-fig{n}", f"Fig. {n}, caption", f"GOSPA of {method.upper()} in one run",
             sv.published("gospa", method, value))
       for n in (4, 5, 6) for method, value in PAPER[f"svalse_fig{n}"].items()),
-    *(Claim(f"svalse-fig{n}", "Sec. VII.D", "nine of ten sources that stop have no estimate in "
-            "that step", *sv.below_limit("ghosts", "svalse", 0.1, unit="have one")) for n in (5, 6)),
+    *(Claim(f"svalse-fig{n}", "Sec. VII.D", "nine of ten sources that stop have no estimate then",
+            *sv.below_limit("ghosts", "svalse", 0.1, unit="have one")) for n in (5, 6)),
     Claim("svalse-fig4", "Sec. VI.B", "noise that starts at 20 dB lowers the GOSPA of VALSE, whose "
           "own start has random performance", sv.lower("gospa", FROM_20_DB, "valse")[0]),
     *(Claim("svalse-fig7", f"Fig. 7{panel}", text, sv.lower(metric, sv.DEFAULT, other)[0])

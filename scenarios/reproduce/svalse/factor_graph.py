@@ -165,8 +165,7 @@ def _draw_message(ax: Axes, start: Point, end: Point, number: str, colour: str) 
     across = (-side * dy / length, side * dx / length)
     low, high = 0.45, 0.68
     tail, head = (
-        (start[0] + part * dx + across[0], start[1] + part * dy + across[1])
-        for part in (low, high)
+        (start[0] + part * dx + across[0], start[1] + part * dy + across[1]) for part in (low, high)
     )
     ax.annotate("", head, tail, zorder=5,
                 arrowprops={"arrowstyle": "-|>", "color": colour, "linewidth": 1.4})  # fmt: skip

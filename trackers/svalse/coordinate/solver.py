@@ -77,9 +77,10 @@ class CoordinateSolver(SolverSettings):
         super().__post_init__()
         one_of("posterior", self.posterior, ("quadrature", "mixture"))
         one_of("descending", self.descending, (None, True, False))
-        if self.first_existence is not None and not 0 < number(
-            "first_existence", self.first_existence
-        ) < 1:
+        if (
+            self.first_existence is not None
+            and not 0 < number("first_existence", self.first_existence) < 1
+        ):
             raise ValueError(f"first_existence must lie in (0, 1); got {self.first_existence}")
 
     @classmethod
