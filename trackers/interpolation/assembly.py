@@ -111,8 +111,9 @@ class FilterAssembly(FrozenModel):
 
     def initial_error(self, P: Float) -> ErrorCovariance:
         """Return the covariance of the error before the first snapshot."""
-        pairwise, n = isinstance(self.stage(1), PairwiseUpdate), self.n_delay
-        return ErrorCovariance(P, P[:n, :n].copy() if pairwise else None)
+        stage, n = self.stage(1), self.n_delay
+        separate = isinstance(stage, PairwiseUpdate) and not stage.frozen
+        return ErrorCovariance(P, P[:n, :n].copy() if separate else None)
 
     def linearize(
         self, x: Float, P: Float, frames: Float, n: int, misfit: Float

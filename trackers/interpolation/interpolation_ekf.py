@@ -46,11 +46,11 @@ class InterpolationEKF(GaussianFilter):
     motion : MotionModel
         Linear, of a state whose element 0 is the delay: `DelayWalk` or `DelayDrift`.
     variant : str or Variant
-        "B": two taps, the paper's method. "Bw": the same with the noise of the taps in the
-        coefficients. "C": taps that cover ±κ, forwards and backwards along the array. "D":
-        baselines 1, 2, 4 and 7. "E": all sensors at once, with the source waveform in the state;
-        "phasor": the same in closed form, for one tone. "E2": "E" after acquisition by "C". A
-        name selects its `Variant`, whose settings are reached by `variant__offsets` and so on.
+        "B": two taps, the paper's method. "literal": as printed, section 2.4. "Bw": "B" with the
+        noise of the taps in the coefficients. "C": taps that cover ±κ, both ways along the array.
+        "D": baselines 1, 2, 4 and 7. "E": all sensors at once, the source waveform in the state;
+        "phasor": the same in closed form, for one tone. "E2": "E" after acquisition by "C". A name
+        selects its `Variant`, whose settings are reached by `variant__offsets` and so on.
     doa : float
         Initial direction, rad.
     std : float, optional

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import ClassVar, NamedTuple
+from typing import ClassVar, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from arrivals.trackers.interpolation.error_covariance import ScoreTable
 from arrivals.trackers.interpolation.gating import is_used
 from arrivals.typing import Bool, Float
 
+Order: TypeAlias = bool | Literal["frozen", "literal"]  # `sequential_update` of `Variant`
 MAX_PHASE_STD = 0.35  # rad: of the phase of a baseline longer than 1, so that no cycle is lost
 
 
@@ -76,15 +77,17 @@ class PairwiseUpdate(FrozenModel):
         The delay is clipped to ±κ.
     max_frequency : float
         Highest frequency of the source, cycles per sample.
-    sequential, aligned : bool
-        `sequential_update` and `aligned` of `Variant`. A vector update is linear in the delay:
-        e - H (Δ - Δ₀).
+    sequential : bool, "frozen" or "literal"
+        `sequential_update` of `Variant`. A vector update is linear in the delay: e - H (Δ - Δ₀);
+        "frozen" and "literal" use e at each sensor.
+    aligned : bool
+        `aligned` of `Variant`.
     """
 
     baseline_models: tuple[InterpolationDelay, ...]
     kappa: float
     max_frequency: float
-    sequential: bool = False
+    sequential: Order = False
     aligned: bool = False
 
     source: ClassVar[None] = None  # the source is not in the state
@@ -102,12 +105,18 @@ class PairwiseUpdate(FrozenModel):
     @property
     def span(self) -> int:
         """Number of snapshots to buffer."""
-        return self.latency + 1 + max(model.memory for model in self.baseline_models)
+        memory = max(model.memory for model in self.baseline_models)
+        return self.latency + 1 + memory + (self.sequential == "literal")
+
+    @property
+    def frozen(self) -> bool:
+        """True if the coefficients stay the same within a snapshot."""
+        return self.sequential in ("frozen", "literal")
 
     @cached_property
     def scores(self) -> ScoreTable:
         """Moments of the scores of all residuals."""
-        return ScoreTable.of(self.baseline_models, self.kappa, self.sequential)
+        return ScoreTable.of(self.baseline_models, self.kappa, bool(self.sequential))
 
     def updated_error(self, M: Float, prior: Float, x: Float, P: Float) -> Float:
         """Return the covariance of the error after a snapshot, as `ScoreTable.updated`."""
@@ -122,6 +131,8 @@ class PairwiseUpdate(FrozenModel):
 
         Residuals whose squares are beyond `limit` times their variance are left out.
         """
+        if self.frozen:
+            return self._update_frozen(x, P, frames, limit)
         first_baseline = []
         for model in self.baseline_models:
             z, X = self._split(model, frames)
@@ -143,6 +154,24 @@ class PairwiseUpdate(FrozenModel):
             return DelayUpdate(x, P, *first_baseline[0])
         e, used = (np.concatenate(each, axis=-1) for each in zip(*first_baseline, strict=True))
         return DelayUpdate(x, P, e, used)
+
+    def _update_frozen(self, x: Float, P: Float, frames: Float, limit: Float | None) -> DelayUpdate:
+        """Update beliefs sensor by sensor, with the coefficients of the start of the snapshot.
+
+        Section 2.4: every sensor corrects the same residual again, as a, b and a', b' are those of
+        the last snapshot while Δ is updated.
+        """
+        first_baseline = None
+        for model in self.baseline_models:
+            e, H, R, used = self._residuals(x, P, model, *self._split(model, frames), limit)
+            first_baseline = (e, used) if first_baseline is None else first_baseline
+            e, H = np.where(used, e, 0.0), np.where(used, H, 0.0)
+            for j in range(model.dim_z):
+                # K = P H / (H P H + R), Δ = Δ + K e, P = P - K H P   (20)-(23)
+                x, P = update_scalar(x, P, e[..., j : j + 1], H[..., j : j + 1], R)
+                x[..., 0] = np.clip(x[..., 0], -self.kappa, self.kappa)
+        assert first_baseline is not None
+        return DelayUpdate(x, P, *first_baseline)
 
     def linearize(self, x: Float, P: Float, frames: Float, limit: Float | None) -> DelayObservation:
         """Return the residuals of the newest of `frames`, all baselines of a sensor combined.
@@ -172,7 +201,11 @@ class PairwiseUpdate(FrozenModel):
     def _split(self, model: InterpolationDelay, frames: Float) -> tuple[Float, Float]:
         """Return the samples and taps of the snapshot that a baseline uses."""
         latency = self.latency if self.aligned else model.latency
-        return model.split(frames, frames.shape[-2] - 1 - latency)
+        k = frames.shape[-2] - 1 - latency
+        if self.sequential == "literal":
+            # y_j(k) from y_{j-1}(k-1) and y_{j-1}(k-2), with the a and b of (4)   (3), (11)
+            return model.split(frames, k)[0], model.split(frames, k - 1)[1]
+        return model.split(frames, k)
 
     def _residuals(
         self, x: Float, P: Float, model: InterpolationDelay, z: Float, X: Float, limit: Float | None

@@ -17,7 +17,7 @@ from arrivals.measurement_models.delays.interpolation import (
     InterpolationDelay,
     window,
 )
-from arrivals.measurement_models.delays.source_correlation import SourceCorrelation, Tones
+from arrivals.measurement_models.delays.source_correlation import FlatBand, SourceCorrelation, Tones
 from arrivals.messages import shown
 from arrivals.motion_models.base import MotionModel
 from arrivals.motion_models.combined import CombinedMotion
@@ -25,10 +25,10 @@ from arrivals.motion_models.linear import LinearMotion
 from arrivals.parameters import FrozenModel
 from arrivals.trackers.interpolation.assembly import MAX_INITIAL_STD, FilterAssembly
 from arrivals.trackers.interpolation.channel_filters import settling_steps
-from arrivals.trackers.interpolation.updates import JointUpdate, PairwiseUpdate
+from arrivals.trackers.interpolation.updates import JointUpdate, Order, PairwiseUpdate
 from arrivals.validation import count, items, not_negative, one_of, positive
 
-VariantName: TypeAlias = Literal["B", "Bw", "C", "D", "E", "E2", "phasor"]
+VariantName: TypeAlias = Literal["literal", "B", "Bw", "C", "D", "E", "E2", "phasor"]
 
 
 RENAMED = {  # former parameters of InterpolationEKF
@@ -53,9 +53,12 @@ class Variant(FrozenModel):
         Distances, in sensors, between which samples are interpolated.
     bidirectional : bool
         Interpolate backwards along the array too.
-    sequential_update : bool
+    sequential_update : bool, "frozen" or "literal"
         Update sensor by sensor, with new coefficients at each one, as in the specification; else
-        by all sensors of a baseline at once. It makes four times the array calls and acquires the
+        by all sensors of a baseline at once. "frozen": sensor by sensor, with the coefficients of
+        the start of the snapshot, the loop of the paper's section 2.4. "literal": that loop with
+        the index of (3) and (11), which stands one above that of (4): sin β is 1/κ too small.
+        Sensor by sensor makes four times the array calls and acquires the
         source from larger initial errors: of 400 trials of a tone at 60° and 5 dB that start at 0°,
         65 % end within 3° with it and 8 % without for "B", 88 and 64 % for "D", 88 and 93 % for
         "C".
@@ -86,7 +89,7 @@ class Variant(FrozenModel):
     loading: float | None = None
     baselines: Sequence[int] = (1,)
     bidirectional: bool = False
-    sequential_update: bool = False
+    sequential_update: Order = False
     aligned: bool = False
     extrapolate: bool = False
     joint: str | None = None
@@ -101,7 +104,8 @@ class Variant(FrozenModel):
         object.__setattr__(self, "baselines", baselines)
         if self.loading is not None:
             not_negative("loading", self.loading)
-        for name in ("bidirectional", "sequential_update", "aligned", "extrapolate", "acquire"):
+        one_of("sequential_update", self.sequential_update, (False, True, "frozen", "literal"))
+        for name in ("bidirectional", "aligned", "extrapolate", "acquire"):
             one_of(name, getattr(self, name), (False, True))
         if self.joint is not None:
             one_of("joint", self.joint, ("delay_line", "phasor"))
@@ -110,6 +114,7 @@ class Variant(FrozenModel):
 
 
 VARIANTS: dict[str, Variant] = {
+    "literal": Variant(offsets=(0, 1), loading=0.0, sequential_update="literal"),
     "B": Variant(offsets=(0, 1), loading=0.0, sequential_update=True),
     "Bw": Variant(offsets=(0, 1), sequential_update=True),
     "C": Variant(bidirectional=True),
@@ -142,6 +147,8 @@ def assemble_filter(
     gate: float | None,
 ) -> FilterAssembly:
     """Return the filter of a variant for an array, a source and a motion of the delay."""
+    if variant.sequential_update == "literal":
+        _check_literal(measurement, motion, variant)
     kappa = measurement.kappa
     acquisition += settling_steps(measurement.band_filter, measurement.noise_ratio)
     pairwise = PairwiseUpdate(
@@ -209,7 +216,7 @@ def _baseline_models(measurement: ArraySamples, variant: Variant) -> tuple[Inter
             continue
         offsets = variant.offsets if m == 1 else None
         offsets = window(m * kappa) if offsets is None else tuple(offsets)
-        if not variant.extrapolate:
+        if not (variant.extrapolate or variant.sequential_update == "literal"):
             _check_reach(source, offsets, m * kappa)
         taps = DelayInterpolator(source, offsets, loading, measurement.band_filter)
         models += [
@@ -220,6 +227,27 @@ def _baseline_models(measurement: ArraySamples, variant: Variant) -> tuple[Inter
         wanted = f"below the number of grid points, {measurement.n_grid_points}"
         raise ValueError(f"baselines must be {wanted}; got {variant.baselines}")
     return tuple(models)
+
+
+def _check_literal(measurement: ArraySamples, motion: MotionModel, variant: Variant) -> None:
+    """Raise a ValueError for a part that the paper's loop, section 2.4, does not have."""
+    source, n = measurement.correlation, measurement.n_grid_points
+    parts: tuple[tuple[bool, str, object], ...] = (
+        (variant.offsets == (0, 1) and variant.loading == 0, "the taps (0, 1) and loading 0",
+         f"offsets {variant.offsets} and loading {variant.loading}"),
+        (variant.baselines == (1,) and not variant.bidirectional, "baseline 1, forwards",
+         f"baselines {variant.baselines}"),
+        (variant.joint is None, "the delay alone in the state", f"joint={variant.joint!r}"),
+        (motion.dim_x == 1, "the delay alone in the state", shown(motion)),
+        (len(measurement.grid_index) == n, "a uniform line without gaps",
+         f"{len(measurement.grid_index)} sensors at {n} places"),
+        (isinstance(source, FlatBand) or source.order == 2, "a flat band or one tone, as in (4)",
+         shown(source)),
+        (measurement.band_filter is None, "samples as they are", f"band={measurement.band}"),
+    )  # fmt: skip
+    for known, wanted, got in parts:
+        if not known:
+            raise ValueError(f"variant 'literal' requires {wanted}; got {got}: use variant 'B'")
 
 
 def _check_reach(source: SourceCorrelation, offsets: tuple[int, ...], reach: float) -> None:

@@ -27,7 +27,11 @@ SOURCES: dict[str, InterpolationScenario] = {
     "band": InterpolationBand(),
     "qpc": InterpolationCoupled(),
 }
-FILTERS = ("B", "Bw", "C", "D", "E", "E2", "phasor")
+PAPER_FORMS = ("literal", "frozen", "B")  # two taps and the paper's correlation
+FORMS = VARIANTS | {
+    "frozen": VARIANTS["literal"].replace(sequential_update="frozen")  # with the index of (4)
+}
+FILTERS = ("literal", "frozen", "B", "Bw", "C", "D", "E", "E2", "phasor")
 
 
 @cache
@@ -51,15 +55,16 @@ def tracker(
     if method == "E":
         params = {"std": 0.08 / np.cos(np.deg2rad(start_deg))} | params
     source: SourceCorrelation = measurement.correlation
-    if method in ("B", "Bw") and source.order is not None and source.order > 2:
+    if method in (*PAPER_FORMS, "Bw") and source.order is not None and source.order > 2:
         lowest = float(np.min(source.frequencies))  # type: ignore[attr-defined]  # tones
         measurement = measurement.replace(correlation=FlatBand(lowest, source.highest))
     plain = {name: params.pop(name) for name in ("motion", "std") if name in params}
     made = InterpolationEKF(
         measurement,
-        variant=VARIANTS[method].replace(extrapolate=True),
+        variant=FORMS[method].replace(extrapolate=True),
         doa=np.deg2rad(start_deg),
         acquisition=max(12, n_steps // 4),
+        gate=None if method in PAPER_FORMS else 5.0,  # the paper has no gate
         **plain,
     )
     return made.set_params(**params)

@@ -270,7 +270,7 @@ def test_gate_drops_an_impulse() -> None:
 def test_latency_follows_from_the_taps() -> None:
     made = trial()
     latency = {v: filter_b(made).set_params(variant=v).latency for v in VARIANTS}
-    assert latency == {"B": 0, "Bw": 0, "C": 3, "D": 15, "E": 0, "E2": 0, "phasor": 0}
+    assert latency == {"literal": 0, "B": 0, "Bw": 0, "C": 3, "D": 15, "E": 0, "E2": 0, "phasor": 0}
 
 
 def test_band_scenario_has_its_power_in_the_band() -> None:
