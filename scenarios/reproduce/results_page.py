@@ -61,7 +61,7 @@ PAPERS = (
         "algorithm for estimation of DOA using model estimation technique*",
         "An extended Kalman filter of the delay between sensors, which interpolates between "
         "samples. B to E2 are forms of the filter, from the paper's two taps (B) to a phasor on "
-        "all sensors (E), and E on the record twice (E2).",
+        "all sensors (E), and E on the record twice (E2). literal is the paper's loop as printed.",
     ),
     Paper(
         "rss",

@@ -28,6 +28,7 @@ STUDIES: dict[str, str] = {
     "ar-kf": f"{PACKAGE}.ar_kalman:ar_kf",
     "calibration": f"{PACKAGE}.svalse.calibration:calibration",
     "interpolation-table1": f"{PACKAGE}.interpolation.table_1:table1",
+    "interpolation-table2": f"{PACKAGE}.interpolation.table_2:table2",
     "interpolation-convergence": f"{PACKAGE}.interpolation.convergence:convergence",
     "interpolation-rmse": f"{PACKAGE}.interpolation.rmse:rmse_study",
     "interpolation-moving": f"{PACKAGE}.interpolation.moving_source:moving",

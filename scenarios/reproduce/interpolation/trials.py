@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
@@ -144,7 +143,20 @@ def moving_errors(
     span: slice,
     **params: Any,
 ) -> tuple[float, float]:
-    """Return the RMSE over snapshots of `span`, degrees, of a filter and of its smoother.
+    """Return the RMSE of all trials, as those of `moving_runs`."""
+    each = moving_runs(scenario, samples, method, motion, span, **params)
+    return rms(each[0]), rms(each[1])
+
+
+def moving_runs(
+    scenario: InterpolationScenario,
+    samples: Float,
+    method: str,
+    motion: MotionModel,
+    span: slice,
+    **params: Any,
+) -> tuple[Float, Float]:
+    """Return the RMSE over snapshots of `span`, degrees, of a filter and of its smoother, (runs,).
 
     Estimates are compared with the truth of their own snapshot, `latency` ago. "E" is not smoothed
     (NaN): its shifted delay line has a singular covariance.
@@ -154,21 +166,11 @@ def moving_errors(
     x, P = made.trajectory(samples)
     latency = made.latency
 
-    def error(states: Float) -> float:
+    def error(states: Float) -> Float:
         doa = np.rad2deg(model.doa(states[:, latency:, 0]))
-        return rms((doa - truth[: len(truth) - latency])[:, span])
+        e = (doa - truth[: len(truth) - latency])[:, span]
+        return np.asarray(np.sqrt(np.mean(e**2, axis=1)))
 
     if method in ("E", "E2"):
-        return error(x), np.nan
+        return error(x), np.full(len(x), np.nan)
     return error(x), error(smooth(x, P, made.state_motion))
-
-
-def mean_and_variance(values: Sequence[float] | Float) -> tuple[float, float]:
-    """Return the mean and the unbiased variance.
-
-    Examples
-    --------
-    >>> mean_and_variance([1.0, 3.0])
-    (2.0, 2.0)
-    """
-    return float(np.mean(values)), float(np.var(values, ddof=1))

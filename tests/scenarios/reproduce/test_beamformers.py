@@ -97,13 +97,14 @@ def few_cases(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("few_cases")
-@pytest.mark.parametrize("name", ["table1", "convergence", "rmse"])
+@pytest.mark.parametrize("name", ["table1", "table2", "convergence", "rmse"])
 def test_study_writes_table_page_and_figures(name: str, tmp_path: Path) -> None:
     written = reproduce(f"interpolation-{name}", tmp_path / "new", runs=2)
     assert [path.suffix for path in written[:2]] == [".csv", ".md"]
     assert all(path.stat().st_size > 500 for path in written)
     page = written[1].read_text()
-    assert "Not reproduced" in page or "The paper" in page
+    assert "**Claims of the paper**" in page
+    assert "by the paper's form" in page
 
 
 def test_interpolation_scenario_invalid_parameter_is_rejected() -> None:

@@ -1,0 +1,247 @@
+"""Functions that decide the claims on the interpolation-delay filter, from values of every trial.
+
+The paper's form is the one with two taps, "B", beside which the numbers of the loop as printed,
+"literal", are given. Directions and errors are in degrees.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from arrivals.scenarios.reproduce.claims import Decide, Decision, below, negative
+from arrivals.typing import Float
+
+# Values of the trials by the study's case, such as (source, method, direction)
+Results: TypeAlias = Mapping[tuple[Any, ...], Float]
+Both: TypeAlias = tuple[Decide, Decide]  # by the paper's form, and by ours
+LARGEST = 1.93  # largest error of a mean in the paper's table, degrees
+CLOSE = 1.25  # ratio of variances that are "very close"
+NEAR = 2.0  # errors of estimates that have converged, degrees
+
+
+def by_both(decide: Callable[..., Decision | None], ours: str = "E2", **options: Any) -> Both:
+    """Return a function that decides by the paper's form, and one by a form of ours."""
+    return partial(_by_paper, decide, options), partial(decide, ours, **options)
+
+
+def _by_paper(
+    decide: Callable[..., Decision | None], options: Mapping[str, Any], results: Results
+) -> Decision | None:
+    decision, printed = (decide(form, results, **options) for form in ("B", "literal"))
+    if decision is None or printed is None:
+        return decision
+    return Decision(decision.holds, f"{decision.numbers}; as printed {printed.numbers}")
+
+
+def all_of(decisions: Iterable[bool | None]) -> bool | None:
+    """Return True if all hold, False if one does not, else None.
+
+    Examples
+    --------
+    >>> all_of([True, None]), all_of([None, False])
+    (None, False)
+    """
+    found = set(decisions)
+    return False if False in found else None if None in found else True
+
+
+# -- Table 1: results by (source, method, direction) -------------------------------------------
+
+
+def ends_of(results: Results, source: str, method: str) -> dict[float, Float]:
+    """Return the final directions of a method by the true one."""
+    return {key[2]: ends for key, ends in results.items() if key[:2] == (source, method)}
+
+
+def accurate(method: str, results: Results, *, source: str) -> Decision | None:
+    """Decide that the means of all directions are within the paper's largest error."""
+    ends = ends_of(results, source, method)
+    if not ends:
+        return None
+    bias = {doa: float(each.mean()) - doa for doa, each in ends.items()}
+    error = {doa: standard_error(each) for doa, each in ends.items()}
+    worst = max(bias, key=lambda doa: abs(bias[doa]))
+    holds = all_of(negative(abs(bias[doa]) - LARGEST, error[doa]) for doa in ends)
+    numbers = f"{method} {bias[worst]:+.2f} ± {error[worst]:.2f} degrees at {worst:g}"
+    return Decision(holds, numbers)
+
+
+def squares(results: Results, source: str, method: str) -> Float | None:
+    """Return the squared deviations from the mean of each trial, averaged over directions."""
+    ends = ends_of(results, source, method)
+    if not ends:
+        return None
+    each = [(values - values.mean()) ** 2 for values in ends.values()]
+    return np.asarray(np.mean(each, axis=0) * len(each[0]) / (len(each[0]) - 1))
+
+
+def lower_variance(
+    method: str, results: Results, *, source: str, than: str, factor: float = 1.0
+) -> Decision | None:
+    """Decide that the variance, mean of all directions, is below `factor` times another one."""
+    first, second = (squares(results, source, name) for name in (method, than))
+    if first is None or second is None:
+        return None
+    d = first - factor * second
+    numbers = f"{method} {first.mean():.3g}, {than} {second.mean():.3g} degrees²"
+    return Decision(negative(float(d.mean()), standard_error(d)), numbers)
+
+
+def zero_variance(method: str, results: Results, *, cases: Iterable[Any] = ()) -> Decision | None:
+    """Decide that all estimates of a method are equal, in all its cases or in some of a tone."""
+    wanted = set(cases)
+    mine = [
+        values for (source, name, doa), values in results.items()
+        if name == method and (not wanted or (source == "tone" and doa in wanted))
+    ]  # fmt: skip
+    return _all_equal(method, mine)
+
+
+def zero_variance_by_snr(method: str, results: Results) -> Decision | None:
+    """Decide that all errors of a method are equal at every SNR of Fig. 8."""
+    mine = [values for key, values in results.items() if (key[0], key[2]) == ("fig8", method)]
+    return _all_equal(method, mine)
+
+
+def _all_equal(method: str, cases: Sequence[Float]) -> Decision | None:
+    if not cases:
+        return None
+    zero = [bool(np.ptp(values) < 1e-9) for values in cases]
+    highest = max(float(values.var(ddof=1)) for values in cases)
+    numbers = f"{method} in {sum(zero)} of {len(zero)} cases, at most {highest:.3g} degrees²"
+    return Decision(all(zero), numbers)
+
+
+def percentage_within(
+    method: str, results: Results, *, source: str, low: float, high: float
+) -> Decision | None:
+    """Decide that the errors of the means, percent of the direction, are within a range."""
+    ends = ends_of(results, source, method)
+    if not ends:
+        return None
+    percent = [100 * (float(each.mean()) / doa - 1) for doa, each in ends.items()]
+    error = [100 * standard_error(each) / doa for doa, each in ends.items()]
+    holds = all_of(_within(p, e, low, high) for p, e in zip(percent, error, strict=True))
+    return Decision(holds, f"{method} {min(percent):.2f} to {max(percent):.2f} %")
+
+
+def variances_within(
+    method: str, results: Results, *, source: str, low: float, high: float
+) -> Decision | None:
+    """Decide that the variances of all directions are within a range."""
+    variances = [float(each.var(ddof=1)) for each in ends_of(results, source, method).values()]
+    if not variances:
+        return None
+    runs = len(next(iter(ends_of(results, source, method).values())))
+    relative = np.sqrt(2 / (runs - 1))  # of normal errors
+    holds = all_of(_within(v, v * relative, low, high) for v in variances)
+    return Decision(holds, f"{method} {min(variances):.3g} to {max(variances):.3g} degrees²")
+
+
+def _within(value: float, error: float, low: float, high: float) -> bool | None:
+    return all_of((negative(low - value, error), negative(value - high, error)))
+
+
+def published_means(
+    method: str, results: Results, *, published: Sequence[tuple[float, float]]
+) -> Decision | None:
+    """Decide that the paper's means are within two standard errors of those of a tone."""
+    ends = ends_of(results, "tone", method)
+    if not ends:
+        return None
+    off, far = [], []
+    for (mean, variance), each in zip(published, ends.values(), strict=False):
+        error = np.sqrt(variance / 100 + each.var(ddof=1) / len(each))  # 100 simulations
+        off.append(mean - float(each.mean()))
+        far.append(abs(off[-1]) > 2 * error + 5e-3)
+    largest = max(off, key=abs)
+    return Decision(
+        not any(far),
+        f"{method}: the paper's are within two standard errors at {len(far) - sum(far)} of "
+        f"{len(far)} directions, {largest:+.2f} degrees away at most",
+    )
+
+
+def smaller_at_75(method: str, results: Results) -> Decision | None:
+    """Decide that the variance at 75 degrees is below that at 15, for a tone."""
+    ends = ends_of(results, "tone", method)
+    if not {15.0, 75.0} <= set(ends):
+        return None
+    first, second = ((ends[doa] - ends[doa].mean()) ** 2 for doa in (75.0, 15.0))
+    decision = below(first, second, "degrees²")
+    return Decision(decision.holds, f"{method} {decision.numbers}")
+
+
+# -- Figs 2 to 8: errors by (figure's case, method, ...) ---------------------------------------
+
+
+def converges(method: str, results: Results, *, doa: float, snr_db: float) -> Decision | None:
+    """Decide that most trials end near the truth."""
+    return mostly_near(method, results, key=("end", doa, snr_db), limit=NEAR, unit="degrees")
+
+
+def mostly_near(
+    method: str, results: Results, *, key: tuple[Any, ...], limit: float, unit: str
+) -> Decision | None:
+    """Decide that more than half of the errors are below a limit."""
+    errors = results.get((*key, method))
+    if errors is None:
+        return None
+    near = np.abs(errors) < limit
+    share = float(near.mean())
+    spread = float(np.sqrt((share * (1 - share) + 0.25 / len(near)) / len(near)))
+    median = f"median {np.median(np.abs(errors)):.2g} {unit}".rstrip()
+    return Decision(negative(0.5 - share, spread), f"{method} {share:.0%}, {median}")
+
+
+def smaller(
+    method: str, results: Results, *, than: str, cases: Sequence[tuple[Any, ...]], unit: str
+) -> Decision | None:
+    """Decide that a figure of a method, mean of several cases, is below that of another one."""
+    found = [[results.get((*case, name)) for case in cases] for name in (method, than)]
+    first, second = ([each for each in one if each is not None] for one in found)
+    if not len(first) == len(second) == len(cases):
+        return None
+    decision = below(np.mean(first, axis=0), np.mean(second, axis=0), unit)
+    return Decision(decision.holds, f"{method} and {than} {decision.numbers}")
+
+
+def rms_below(
+    method: str, results: Results, *, than: str, cases: Sequence[tuple[Any, ...]]
+) -> Decision | None:
+    """Decide that a mean square error, mean of several cases, is below that of another method."""
+    found = [[results.get((*case, name)) for case in cases] for name in (method, than)]
+    first, second = ([each**2 for each in one if each is not None] for one in found)
+    if not len(first) == len(second) == len(cases):
+        return None
+    d = np.mean(first, axis=0) - np.mean(second, axis=0)
+    rms = [float(np.sqrt(np.mean(each))) for each in (first, second)]
+    numbers = f"{method} {rms[0]:.3g}, {than} {rms[1]:.3g} degrees"
+    return Decision(negative(float(d.mean()), standard_error(d)), numbers)
+
+
+def near_bound(
+    method: str, results: Results, *, cases: Sequence[tuple[Any, ...]]
+) -> Decision | None:
+    """Decide that the mean square error is at most `CLOSE` times the square of the bound."""
+    if not all((*case, method) in results for case in cases):
+        return None
+    ratio = np.mean([(results[(*c, method)] / results[(*c, "CRB")]) ** 2 for c in cases], axis=0)
+    error = standard_error(ratio)
+    numbers = f"{ratio.mean():.2f} ± {error:.2f} times that of the bound"
+    return Decision(negative(float(ratio.mean()) - CLOSE, error), numbers)
+
+
+def standard_error(values: Float) -> float:
+    """Return the standard error of the mean; NaN for one value.
+
+    Examples
+    --------
+    >>> standard_error(np.array([1.0, 3.0]))
+    1.0
+    """
+    return float(values.std(ddof=1) / np.sqrt(len(values))) if len(values) > 1 else float("nan")
