@@ -147,8 +147,7 @@ class InterpolationEKF(GaussianFilter):
 
     def restart(self) -> None:
         """Discard all samples, and start again from `doa` and `std`."""
-        assembly = self.assembly
-        delay = float(self.measurement.delay(self.doa))
+        assembly, delay = self.assembly, float(self.measurement.delay(self.doa))
         std = initial_std(assembly, self.doa, self.std)
         self.x, self.P = assembly.initial_belief(delay, std**2, self.rate_std)
         self.initialize_record()
@@ -174,9 +173,9 @@ class InterpolationEKF(GaussianFilter):
         # x = F x (18) + B u,   P = F P F' + Q   (19)
         x, P = predict(x, P, F, Q)
         P, error = widened(P, self.buffer.missing, assembly.largest_variance), self.error.of(self.P)
-        x = self.add_control(x, u, B)
-        self.error = assembly.predicted_error(error, P, F, Q, self.buffer.missing)
-        self.record_prediction(x, P, dt)
+        error = assembly.predicted_error(error, P, F, Q, self.buffer.missing)
+        self.record_prediction(self.add_control(x, u, B), P, dt)
+        self.error = error
 
     def update(
         self, z: ArrayLike | None, R: ArrayLike | None = None, H: ArrayLike | None = None

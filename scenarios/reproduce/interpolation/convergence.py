@@ -32,6 +32,7 @@ SNRS_DB = (-10.0, -5.0, 0.0, 5.0)
 PANELS = (("literal", "B"), ("C", "D", "E"))  # rows of Figs 2 and 3: the paper's form, and ours
 METHODS = (*PANELS[0], *PANELS[1])
 LENGTHS = np.array([4, 6, 8, 10, 14, 20, 30, 40, 60, 80, 100])  # snapshots of the scans
+FAR = 30.0  # degrees, a start two standard deviations away from 60
 COEFFICIENTS = (("fig4", 1, "b"), ("fig5", 0, "a"))
 
 
@@ -161,6 +162,9 @@ def _three_methods(runs: int, seed: int, results: dict[tuple[Any, ...], Float]) 
         results["settled", scan] = settling_lengths(path - 60)
         draw_band(axes[0], LENGTHS, path, scan)
         draw_rmse(axes[1], LENGTHS, path - 60, scan)
+    for method in ("literal", "B", "C"):
+        path = filter_directions(scenario, samples, method, FAR)
+        results["from afar", method] = path[:, -1] - 60
     axes[0].axhline(60, color="black", linewidth=0.8, linestyle="--", label="truth", zorder=4)
     axes[0].fill_between([], [], [], color="0.8", label="80 % of the trials")
     axes[0].set(ylabel="median estimate, degrees", ylim=(15, 75),

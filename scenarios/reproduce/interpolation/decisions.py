@@ -20,6 +20,7 @@ Results: TypeAlias = Mapping[tuple[Any, ...], Float]
 Both: TypeAlias = tuple[Decide, Decide]  # by the paper's form, and by ours
 LARGEST = 1.93  # largest error of a mean in the paper's table, degrees
 CLOSE = 1.25  # ratio of variances that are "very close"
+CUT_OFF = 10.0  # degrees, of errors that are compared by their mean square
 NEAR = 2.0  # errors of estimates that have converged, degrees
 
 
@@ -213,9 +214,15 @@ def smaller(
 def rms_below(
     method: str, results: Results, *, than: str, cases: Sequence[tuple[Any, ...]]
 ) -> Decision | None:
-    """Decide that a mean square error, mean of several cases, is below that of another method."""
+    """Decide that a mean square error, mean of several cases, is below that of another method.
+
+    Errors are cut off at `CUT_OFF`: else the few trials of scans that take a side lobe decide.
+    """
     found = [[results.get((*case, name)) for case in cases] for name in (method, than)]
-    first, second = ([each**2 for each in one if each is not None] for one in found)
+    first, second = (
+        [np.minimum(np.abs(each), CUT_OFF) ** 2 for each in one if each is not None]
+        for one in found
+    )
     if not len(first) == len(second) == len(cases):
         return None
     d = np.mean(first, axis=0) - np.mean(second, axis=0)

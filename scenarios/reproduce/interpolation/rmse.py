@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from arrivals.scenarios.experiments.workers import parallel_map
-from arrivals.scenarios.reproduce.interpolation.decisions import standard_error
+from arrivals.scenarios.reproduce.interpolation.decisions import CUT_OFF, standard_error
 from arrivals.scenarios.reproduce.interpolation.plots import draw_rmse, make_figure
 from arrivals.scenarios.reproduce.interpolation.trials import (
     SOURCES,
@@ -65,6 +65,9 @@ def rmse_study(runs: int, seed: int) -> Report:
         "CRB: the Cramér-Rao bound of unbiased estimates that know nothing of the direction. The "
         "filters know their start, which helps them where few or poor samples do not; for the band "
         "it is the limit of many snapshots.",
+        f"Mean squares of the claims count errors beyond {CUT_OFF:g} degrees as {CUT_OFF:g}: at "
+        "-10 dB a few trials of the scans take a side lobe. As printed, some trials end near "
+        "endfire at 20 dB: every sensor corrects the same error again.",
         "Broad band: the floor of 0.35 degrees of the conventional scan is due to the finite "
         "record, that of B to the two taps.",
     )
@@ -123,7 +126,7 @@ def _draw(results: dict[tuple[Any, ...], Float], name: str, label: str) -> Figur
            xscale="log" if many else "linear")  # fmt: skip
     if many:
         ax.set_xticks(places, [f"{place:g}" for place in places])
-        ax.tick_params(which="minor", bottom=False)
+        ax.tick_params(axis="x", which="minor", bottom=False, labelbottom=False)
     kind = "a band" if name.endswith("band") else "a tone"
     also = ", 5 dB" if many else ", 100 snapshots"
     ax.set_title(f"Fig. {name[3]}: 60 degrees, {kind}{also}")

@@ -39,7 +39,7 @@ TRACKERS: list[tuple[str, MakeTracker, Measurements]] = [
             lambda v=v: InterpolationEKF(TONE.measurement, variant=v, doa=0.9, acquisition=6),
             with_gaps(TONE),
         )
-        for v in ("B", "C", "D", "E2", "phasor")
+        for v in ("literal", "B", "C", "D", "E2", "phasor")
     ],
     *[
         (
