@@ -16,11 +16,19 @@ from arrivals.trackers.autoregressive.direction_covariance import (
     direction_std,
     with_direction_covariance,
 )
-from arrivals.trackers.autoregressive.initialization import check_directions, manifold_of
+from arrivals.trackers.autoregressive.initialization import (
+    check_directions,
+    check_form,
+    manifold_of,
+)
 from arrivals.trackers.autoregressive.interval import finish_interval
 from arrivals.trackers.autoregressive.interval_filter import assumed_noise, filter_interval
 from arrivals.trackers.autoregressive.processing import BlockProcessor
-from arrivals.trackers.autoregressive.regressions import estimate_ar_models, estimate_directions
+from arrivals.trackers.autoregressive.regressions import (
+    estimate_ar_models,
+    estimate_directions,
+    rows_of_factor,
+)
 from arrivals.trackers.autoregressive.settings import NoiseSettings, RegressionSettings
 from arrivals.trackers.autoregressive.snapshots import completes_interval, to_snapshot
 from arrivals.trackers.autoregressive.steady_state import StateSpace
@@ -156,7 +164,7 @@ class ARKalmanQRDRLS(BlockProcessor):
         self.memory = positive("memory", memory)
         self.regression = instance("regression", regression, RegressionSettings)
         self.noise = instance("noise", noise, NoiseSettings)
-        manifold_of(measurement)  # raises for an array that does not fit
+        check_form(regression, manifold_of(measurement))
         if max(self.motion.orders) > self.interval:
             raise ValueError(
                 f"AR orders must be at most the interval, {self.interval} snapshots; "
@@ -217,7 +225,7 @@ class ARKalmanQRDRLS(BlockProcessor):
             model = self.state_space(belief, new)
             filtered = filter_interval(belief, y, model, regression)
             # lines 11-15: rows of A_T by least squares, then directions   (6), (7)
-            rows, doa = estimate_directions(belief, filtered, model.A, self.manifold, regression)
+            rows, doa = estimate_directions(belief, filtered, model, self.manifold, regression)
             # line 10: AR coefficients and innovation variances   (1)
             factor, weight, a, q = estimate_ar_models(
                 belief, new, filtered, self.layout, regression
@@ -228,15 +236,19 @@ class ARKalmanQRDRLS(BlockProcessor):
             )
         # inactive sources keep their directions; r and long-term powers
         new = finish_interval(belief, new, filtered, self.noise, self.gate, self.memory)
-        new = with_direction_covariance(
-            belief, new, filtered, model, self.manifold, regression.forgetting, self.inner
-        )
+        if regression.states_deviations:
+            new = with_direction_covariance(
+                belief, new, filtered, model, self.manifold, regression.forgetting, self.inner
+            )
         return new, filtered.X
 
     def state_space(self, belief: SourceBelief, new: SourceBelief) -> StateSpace:
         """Return F, Q (3) and A_T (5) of `new`, and r of `belief`."""
         F, Q = self.layout.transition(new.a), self.layout.process_noise(new.q)
-        A = transposed(self.manifold.real_steering(new.doa))
+        if self.regression.rows == "estimated":
+            A = rows_of_factor(new.manifold_factor, self.manifold)
+        else:
+            A = transposed(self.manifold.real_steering(new.doa))
         return StateSpace(F, Q, A, assumed_noise(belief, self.noise))
 
     @property

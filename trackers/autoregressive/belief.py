@@ -14,8 +14,8 @@ from arrivals.measurement_models.manifolds.symmetric_line import ArrayManifold
 from arrivals.motion_models.autoregressive.companion_form import companion_layout
 from arrivals.motion_models.autoregressive.sources import AutoregressiveSources
 from arrivals.motion_models.combined import block_diagonal
-from arrivals.trackers.autoregressive.qrd_rls import ridge_rows
 from arrivals.trackers.autoregressive.settings import RegressionSettings
+from arrivals.trackers.gaussian.linalg import ridge_rows
 from arrivals.typing import Bool, Complex, Float, Int
 
 GRID_STD = float(np.deg2rad(5.0) / np.sqrt(12.0))  # rad, uniform in a cell of acquisition
@@ -118,6 +118,7 @@ def initialize_belief(
     rows = ridge_rows(ridge, a[..., None])
     # var sin(θ + ε) = cos² θ σ² + sin² θ σ⁴ / 2
     u = np.sin(doa)
+    std = std if regression.states_deviations else np.nan
     variance = (1 - u * u) * std**2 + u * u * std**4 / 2
     return SourceBelief(
         x=x,

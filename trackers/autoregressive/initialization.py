@@ -12,6 +12,7 @@ from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.manifolds.symmetric_line import ArrayManifold
 from arrivals.motion_models.autoregressive.companion_form import companion_layout, solve_lyapunov
 from arrivals.motion_models.autoregressive.sources import AutoregressiveSources
+from arrivals.trackers.autoregressive.settings import RegressionSettings
 from arrivals.trackers.autoregressive.steady_state import StateSpace, fixed_gain, steady_state
 from arrivals.trackers.gaussian.linalg import transposed
 from arrivals.typing import Float
@@ -21,6 +22,7 @@ GRID = np.deg2rad(np.arange(-70.0, 71.0, 10.0))
 MAX_DISTANCE = 1.0  # wavelengths: the response of pairs farther out is too sharp for the grid
 MIN_NOISE_RATIO = 0.05  # noise over the power of a source: the accuracy of the grid
 MIN_SEPARATION = 1e-6  # rad
+UNAMBIGUOUS = 0.5 * (1 + 1e-6)  # wavelengths from the centre: largest phase half a turn
 CHUNK = 512  # hypotheses filtered at once
 
 
@@ -118,7 +120,25 @@ def acquire_directions(y: Float, sources: AutoregressiveSources, manifold: Array
 def manifold_of(measurement: ArraySnapshot) -> ArrayManifold:
     """Return the real response of a symmetric line; raise a ValueError for any other array."""
     wavelength = measurement.plain_wavelength("ar_kalman_qrd_rls")
+    if measurement.array.dim != 1:
+        raise ValueError(
+            "array must be a line, whose pairs have rows of cosines and sines; got sensors in "
+            f"{measurement.array.dim} dimensions: svalse takes any array"
+        )
     return ArrayManifold(measurement.array, wavelength, measurement.noise)
+
+
+def check_form(regression: RegressionSettings, manifold: ArrayManifold) -> None:
+    """Raise a ValueError if a literal form of the regression cannot resolve the array's pairs."""
+    outer = float(manifold.distances[-1])
+    if regression.pairs == "inner" or outer <= UNAMBIGUOUS:
+        return
+    for name, general in (("angles", "atan2"), ("pairs", "fit")):
+        if (value := getattr(regression, name)) != general:
+            raise ValueError(
+                f"{name}={value!r} requires pairs at most half a wavelength from the centre; got "
+                f"{outer:g} wavelengths: {name}={general!r} resolves them"
+            )
 
 
 def check_directions(doa: ArrayLike, n_sources: int) -> None:

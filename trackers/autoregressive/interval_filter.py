@@ -11,7 +11,6 @@ from functools import lru_cache
 import numpy as np
 
 from arrivals.trackers.autoregressive.belief import SourceBelief, select_beliefs
-from arrivals.trackers.autoregressive.qrd_rls import forgetting_weights
 from arrivals.trackers.autoregressive.settings import NoiseSettings, RegressionSettings
 from arrivals.trackers.autoregressive.steady_state import StateSpace, exact_filter, steady_filter
 from arrivals.trackers.gaussian.linalg import transposed
@@ -171,3 +170,16 @@ def assumed_noise(belief: SourceBelief, settings: NoiseSettings) -> Float:
         r = np.maximum(r, minimum * np.exp(-belief.n / settings.tau))
     half = belief.x.shape[-2] / 2  # of real sources, half of the noise is in the other part
     return np.asarray(half * r[..., None, None])
+
+
+def forgetting_weights(valid: Float, forgetting: float) -> tuple[Float, Float]:
+    """Return √λ^age of samples (..., n) and λ^n, counting only valid samples (1, not 0).
+
+    Examples
+    --------
+    >>> forgetting_weights(np.array([1.0, 0.0, 1.0]), 0.25)
+    (array([0.5, 0. , 1. ]), array(0.0625))
+    """
+    until = np.cumsum(valid, axis=-1)
+    n = until[..., -1:]
+    return valid * forgetting ** ((n - until) / 2), np.asarray(forgetting ** n[..., 0])

@@ -179,7 +179,7 @@ class BlockProcessor(Tracker):
         for part in np.split(y, z.shape[1] // self.interval, axis=1):
             belief, X = self.update_interval(belief, part)
             history.signals.append(to_signals(X, self.motion.n_parts, self.motion.n_sources))
-        if first:
+        if first and self.regression.states_deviations:
             model, manifold = self.state_space(start, start), self.manifold
             belief = with_acquisition_errors(start, belief, y, model, manifold, self.regression)
         history.add(belief, end)

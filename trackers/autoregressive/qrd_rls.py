@@ -2,67 +2,26 @@
 
 from __future__ import annotations
 
+from typing import Self
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurements import numbers
 from arrivals.parameters import Configurable
+from arrivals.trackers.gaussian.linalg import append_rows, ridge_rows, solve_factor, transposed
 from arrivals.typing import Bool, Float
 from arrivals.validation import count, positive, real
+
+TINY = np.finfo(np.float64).tiny
 
 # A factor [R | U] is triangular, (..., n_coef + n_rhs, n_coef + n_rhs): RᵀR is the Gram matrix of
 # the regressors, R⁻¹U the solution, and the block below U the factor of the residuals.
 
-
-def append_rows(factor: Float, *rows: Float) -> Float:
-    """Return the triangular factor of a factor with more rows, (..., n, n).
-
-    Examples
-    --------
-    >>> np.abs(append_rows(np.zeros((1, 1)), np.array([[3.0], [4.0]]))).round(12)
-    array([[5.]])
-    """
-    stack = np.concatenate([factor, *rows], axis=-2)
-    return np.asarray(np.linalg.qr(stack, mode="r"))
+MAX_SWEEPS, SWEEP_TOLERANCE = 1000, 1e-12  # over the coefficients, and their change in one
 
 
-def solve_factor(factor: Float, n_coef: int) -> Float:
-    """Return W = R⁻¹U of a factor: (..., n_coef, n_rhs)."""
-    R, U = factor[..., :n_coef, :n_coef], factor[..., :n_coef, n_coef:]
-    return np.asarray(np.linalg.solve(R, U))
-
-
-def ridge_rows(weight: ArrayLike, target: Float) -> Float:
-    """Return the rows √weight [I | target], (..., n_coef, n_coef + n_rhs).
-
-    Parameters
-    ----------
-    weight : array_like, shape (..., n_coef)
-        One number for each coefficient.
-    target : ndarray, shape (..., n_coef, n_rhs)
-        Solution without data.
-    """
-    n = target.shape[-2]
-    root = np.sqrt(np.asarray(weight, dtype=np.float64))[..., None]
-    rows = np.empty((*target.shape[:-1], n + target.shape[-1]))
-    rows[..., :n], rows[..., n:] = root * np.eye(n), root * target
-    return rows
-
-
-def forgetting_weights(valid: Float, forgetting: float) -> tuple[Float, Float]:
-    """Return √λ^age of samples (..., n) and λ^n, counting only valid samples (1, not 0).
-
-    Examples
-    --------
-    >>> forgetting_weights(np.array([1.0, 0.0, 1.0]), 0.25)
-    (array([0.5, 0. , 1. ]), array(0.0625))
-    """
-    until = np.cumsum(valid, axis=-1)
-    n = until[..., -1:]
-    return valid * forgetting ** ((n - until) / 2), np.asarray(forgetting ** n[..., 0])
-
-
-def huber_weight(error: ArrayLike, threshold: float) -> Float:
+def huber_weight(error: ArrayLike, threshold: ArrayLike) -> Float:
     """Return Huber's weights of errors: 1 up to the threshold, then threshold / |error|.
 
     Examples
@@ -75,7 +34,7 @@ def huber_weight(error: ArrayLike, threshold: float) -> Float:
 
 
 class QRDRLS(Configurable):
-    """Regularized recursive least squares with exponential forgetting, by QR decomposition.
+    r"""Regularized recursive least squares with exponential forgetting, by QR decomposition.
 
     Minimizes Σ λ^age (y - xᵀW)² + μ |W - target|² for each right-hand side, all with the same
     regressors. A block of samples gives the result of the samples one after the other.
@@ -95,7 +54,10 @@ class QRDRLS(Configurable):
         as the old one is forgotten.
     huber : float, optional
         Error beyond which a sample has less weight: the root mean square over its right-hand
-        sides, with the solution before its block.
+        sides, with the solution before its block: the M-estimation of Table I.
+    l1 : float or array_like, shape (n_coef,), optional
+        Weights γ of the weighted L1 regularization of the same table: `solve` minimizes
+        Σ γ_l \|W_l - target_l\| too, of the norms of the rows of W - target.
 
     Attributes
     ----------
@@ -136,20 +98,36 @@ class QRDRLS(Configurable):
         ridge: float = 0.01,
         target: ArrayLike | None = None,
         huber: float | None = None,
+        l1: ArrayLike | None = None,
     ) -> None:
         self.n_coef, self.n_rhs = count("n_coef", n_coef), count("n_rhs", n_rhs)
         self.forgetting, self.ridge = positive("forgetting", forgetting), positive("ridge", ridge)
         if self.forgetting > 1:
             raise ValueError(f"forgetting must lie in (0, 1]; got {forgetting}")
-        self.target, self.huber = target, huber
+        self.target, self.huber, self.l1 = target, huber, l1
         if huber is not None:
             positive("huber", huber)
+        if l1 is not None:
+            self._penalties()
         goal = self._goal()
         # R = √μ I, U = √μ target   (3.1)
         first = ridge_rows(np.full(goal.shape[:-1], self.ridge), goal)
         below = np.zeros((*goal.shape[:-2], self.n_rhs, self.n_coef + self.n_rhs))
         self.factor = np.concatenate([first, below], axis=-2)
         self.weight = np.zeros(goal.shape[:-2])
+
+    @classmethod
+    def from_factor(cls, factor: Float, n_coef: int) -> Self:
+        """Return the regression that continues a factor, for `append` and `solve`, unchecked.
+
+        Parameters
+        ----------
+        factor : ndarray, shape (..., n_coef, n_coef + n_rhs) or with more rows
+        n_coef : int
+        """
+        made = cls.__new__(cls)
+        made.factor, made.n_coef, made.huber, made.l1 = factor, n_coef, None, None
+        return made
 
     def update(
         self,
@@ -186,35 +164,86 @@ class QRDRLS(Configurable):
         if not np.isfinite(X.sum() + Y.sum()):  # a number is missing, or the sum is too large
             valid = np.asarray(np.isfinite(X).all(axis=-1) & np.isfinite(Y).all(axis=-1))
             X, Y = np.where(valid[..., None], X, 0.0), np.where(valid[..., None], Y, 0.0)
-        w, n = self._weights(weights, X, Y, n_parts), X.shape[-2] // n_parts
+        w, n = self._weights(weights, X.shape[-2], n_parts), X.shape[-2] // n_parts
         if valid is not None:
             w = w * valid
-        # [√λ^n [R | U]; √(w λ^age) [x | y]; √(μ (1 - λ^n)) [I | target]]   (3.2)
+        samples = np.concatenate([X, Y], axis=-1)
+        if self.huber is not None:
+            w = w * self.robust_weights(samples, self.huber, n_parts)
+        # [√λ^n [R | U]; √(w λ^age) [x | y]; extra rows; √(μ (1 - λ^n)) [I | target]]   (3.2)
         age = np.repeat(self.forgetting ** np.arange(n - 1, -1, -1.0), n_parts)
         decay = self.forgetting**n
-        data = np.sqrt(w * age)[..., None] * np.concatenate([X, Y], axis=-1)
-        goal = np.broadcast_to(self._goal(), (*X.shape[:-2], self.n_coef, self.n_rhs))
-        rows = [data, ridge_rows(np.full(goal.shape[:-1], self.ridge * (1 - decay)), goal)]
+        rows = [np.sqrt(w * age)[..., None] * samples]
         if extra_rows is not None:
             extra = self._rows("extra_rows", extra_rows, self.n_coef + self.n_rhs, 1)
             if not np.isfinite(extra).all():
                 raise ValueError("extra_rows must be finite; got NaN or infinite numbers")
             rows.append(np.broadcast_to(extra, (*X.shape[:-2], *extra.shape[-2:])))
-        old = np.broadcast_to(self.factor, (*X.shape[:-2], *self.factor.shape[-2:]))
-        self.factor = append_rows(np.sqrt(decay) * old, *rows)
+        goal = np.broadcast_to(self._goal(), (*X.shape[:-2], self.n_coef, self.n_rhs))
+        rows.append(ridge_rows(np.full(goal.shape[:-1], self.ridge * (1 - decay)), goal))
+        self.factor = np.broadcast_to(self.factor, (*X.shape[:-2], *self.factor.shape[-2:]))
+        self.append(np.asarray(decay), *rows)
         self.weight = decay * self.weight + (w * age).sum(axis=-1) / n_parts
 
+    def append(self, decay: Float, *rows: Float) -> None:
+        """Update the factor by rows that have their weights: the core of `update`.
+
+        Parameters
+        ----------
+        decay : ndarray, shape (...)
+            λ^n, of the squares of the old rows.
+        *rows : ndarray, shape (..., n_rows, n_coef + n_rhs)
+            Weighted samples [x | y], ridge rows, and others.
+        """
+        self.factor = append_rows(np.sqrt(decay)[..., None, None] * self.factor, *rows)
+
+    def robust_weights(self, samples: Float, huber: ArrayLike, n_parts: int = 1) -> Float:
+        """Return Huber's weights of samples [x | y] by the errors with the present solution.
+
+        Parameters
+        ----------
+        samples : ndarray, shape (..., n_rows, n_coef + n_rhs)
+        huber : array_like, shape (...)
+            Thresholds.
+        n_parts : int
+            Rows of each sample.
+
+        Returns
+        -------
+        ndarray, shape (..., n_rows)
+        """
+        X, Y = samples[..., : self.n_coef], samples[..., self.n_coef :]
+        error = np.sqrt(n_parts * ((Y - X @ self.solve()) ** 2).mean(axis=-1))
+        return huber_weight(error, np.asarray(huber)[..., None])
+
     def solve(self) -> Float:
-        """Return the solution W = R⁻¹ U.
+        """Return the solution W = R⁻¹ U; with `l1` by sweeps over the coefficients.
 
         Returns
         -------
         ndarray, shape (..., n_coef, n_rhs)
         """
-        return solve_factor(self.factor, self.n_coef)
+        W = solve_factor(self.factor, self.n_coef)
+        if self.l1 is None:
+            return W
+        # v_l = W_l - target_l <- (1 - γ_l / 2|b_l|)₊ b_l / G_ll,  b = RᵀU - G W + G_ll v_l
+        R = self.factor[..., : self.n_coef, : self.n_coef]
+        G, penalty = transposed(R) @ R, self._penalties()
+        B, goal = G @ W, np.broadcast_to(self._goal(), W.shape)
+        for _ in range(MAX_SWEEPS):
+            before = W.copy()
+            for n in range(self.n_coef):
+                G_n, v = G[..., n, None, :], W[..., n, :] - goal[..., n, :]
+                b = B[..., n, :] - (G_n @ W)[..., 0, :] + G_n[..., n] * v
+                size = np.sqrt((b * b).sum(axis=-1, keepdims=True))
+                kept = np.maximum(1 - penalty[n] / (2 * np.maximum(size, TINY)), 0.0)
+                W[..., n, :] = goal[..., n, :] + kept * b / G_n[..., n]
+            if np.abs(W - before).max() <= SWEEP_TOLERANCE:
+                break
+        return W
 
     def residual_power(self) -> Float:
-        """Return the mean square of the errors, the penalty of the ridge included.
+        """Return the mean square of the least-squares errors, the penalty of the ridge included.
 
         Returns
         -------
@@ -224,6 +253,12 @@ class QRDRLS(Configurable):
         below = self.factor[..., self.n_coef :, self.n_coef :]
         weight = np.where(self.weight > 0, self.weight, np.nan)
         return np.asarray((below**2).sum(axis=-2) / weight[..., None])
+
+    def _penalties(self) -> Float:
+        value = np.broadcast_to(real("l1", self.l1), (self.n_coef,))
+        if not ((value >= 0) & (value < np.inf)).all():
+            raise ValueError(f"l1 must be finite, not negative; got {self.l1!r}")
+        return value
 
     def _goal(self) -> Float:
         zeros = np.zeros((self.n_coef, self.n_rhs))
@@ -235,17 +270,13 @@ class QRDRLS(Configurable):
             raise ValueError("target must be finite; got NaN or infinite numbers")
         return goal
 
-    def _weights(self, weights: ArrayLike | None, X: Float, Y: Float, n_parts: int) -> Float:
-        """Return the weights of the rows, (..., n_parts n_samples), with those of Huber."""
-        n = X.shape[-2] // n_parts
+    def _weights(self, weights: ArrayLike | None, n_rows: int, n_parts: int) -> Float:
+        """Return the weights of the rows, (..., n_rows)."""
+        n = n_rows // n_parts
         w = np.ones(n) if weights is None else real("weights", weights)
         if w.shape[-1:] != (n,) or not ((w >= 0) & (w < np.inf)).all():
             raise ValueError(f"weights must be {n} numbers, finite, not negative; got {weights!r}")
-        w = np.repeat(w, n_parts, axis=-1)
-        if self.huber is None:
-            return w
-        error = np.sqrt(n_parts * ((Y - X @ self.solve()) ** 2).mean(axis=-1))
-        return np.asarray(w * huber_weight(error, self.huber))
+        return np.repeat(w, n_parts, axis=-1)
 
     def _rows(self, name: str, value: ArrayLike, n: int, n_parts: int) -> Float:
         """Return samples as real rows, (..., n_parts n_samples, n)."""

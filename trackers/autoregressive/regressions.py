@@ -13,9 +13,10 @@ from arrivals.measurement_models.manifolds.symmetric_line import ArrayManifold
 from arrivals.motion_models.autoregressive.companion_form import CompanionLayout, stabilised
 from arrivals.trackers.autoregressive.belief import SourceBelief
 from arrivals.trackers.autoregressive.interval_filter import FilteredInterval
-from arrivals.trackers.autoregressive.qrd_rls import append_rows, ridge_rows, solve_factor
+from arrivals.trackers.autoregressive.qrd_rls import QRDRLS
 from arrivals.trackers.autoregressive.settings import RegressionSettings
-from arrivals.trackers.gaussian.linalg import transposed
+from arrivals.trackers.autoregressive.steady_state import StateSpace
+from arrivals.trackers.gaussian.linalg import ridge_rows, solve_factor, transposed
 from arrivals.typing import Float
 
 MIN_INNOVATION = 1e-4  # innovation variance over the power of the source
@@ -25,26 +26,77 @@ TINY = np.finfo(np.float64).tiny
 def estimate_directions(
     belief: SourceBelief,
     filtered: FilteredInterval,
-    A: Float,
+    model: StateSpace,
     manifold: ArrayManifold,
     regression: RegressionSettings,
 ) -> tuple[Float, Float]:
     """Return the factor of the regression for the rows of A_T, and the directions: (6), (7)."""
-    k, n_parts, centre = A.shape[-1], belief.x.shape[-2], manifold.centre
-    target = without(transposed(A), centre)  # the row of ones is never estimated
+    k, n_parts, centre = model.A.shape[-1], belief.x.shape[-2], manifold.centre
+    target = without(transposed(model.A), centre)  # the row of ones is never estimated
+    rls = QRDRLS.from_factor(belief.manifold_factor, k)
     # [√λ^N [R | U]; w_j [s_j | y_j]; [Lᵀ | 0]; √(μ (1 - λ^N)) [I | A_Tᵀ]]   (3.2)
-    w = np.repeat(filtered.weights, n_parts, axis=-1)[..., None]
-    old = np.sqrt(filtered.decay)[..., None, None] * belief.manifold_factor
-    stack = [old, w * without(filtered.y, centre, filtered.X[..., :k])]
+    w = np.repeat(filtered.weights, n_parts, axis=-1)
+    samples, share = without(filtered.y, centre, filtered.X[..., :k]), None
+    if regression.huber is not None:
+        threshold = regression.huber * np.sqrt(model.r[..., 0, 0])
+        w, share = with_robust_weights(w, rls.robust_weights(samples, threshold, n_parts))
+    rows = [w[..., None] * samples]
     if regression.correction:
-        stack.append(covariance_rows(filtered, k, centre))
+        rows.append(scaled(covariance_rows(filtered, k, centre), share))
     ridge = regression.ridge * (1 - filtered.decay)[..., None] * belief.power
-    factor = append_rows(*stack, ridge_rows(ridge, target))[..., :k, :]
-    # W = R⁻¹ U, φ_m = atan2(sin row, cos row), θ = arcsin(φ_m / 2π d_m)   (3.4), (7)
+    rls.append(filtered.decay, *rows, ridge_rows(ridge, target))
+    rls.factor = rls.factor[..., :k, :]
+    return rls.factor, directions_of_rows(rls.solve(), belief.doa, manifold, regression)
+
+
+def with_robust_weights(w: Float, huber: Float) -> tuple[Float, Float]:
+    """Return root weights (..., n_rows) times Huber's, and the share of the weight that is left."""
+    robust = w * np.sqrt(huber)
+    whole = np.maximum((w * w).sum(axis=-1), TINY)
+    return robust, np.asarray((robust * robust).sum(axis=-1) / whole)
+
+
+def scaled(rows: Float, share: Float | None) -> Float:
+    """Return rows (..., n, m) of a covariance of which a share (...) of the weight is left."""
+    return rows if share is None else np.sqrt(share)[..., None, None] * rows
+
+
+def directions_of_rows(
+    W: Float, before: Float, manifold: ArrayManifold, regression: RegressionSettings
+) -> Float:
+    """Return the directions of estimated rows of A_T, (..., n_sources, 2 n_pairs): (7).
+
+    Parameters
+    ----------
+    W : ndarray, shape (..., n_sources, 2 n_pairs)
+        Cosine rows of all pairs, then their sine rows.
+    before : ndarray, shape (..., n_sources)
+        Directions before the interval.
+    manifold : ArrayManifold
+    regression : RegressionSettings
+    """
+    M, d = manifold.n_pairs, manifold.distances
+    cosine, sine = W[..., :M], W[..., M:]
+    # φ_m = atan2(sin row, cos row), or the arctangent of their quotient   (3.4), (7)
+    if is_ratio := regression.angles == "ratio":
+        cosine, sine = np.abs(cosine), np.where(cosine < 0, -sine, sine)
+    phases = np.arctan2(sine, cosine)
+    # θ = arcsin(φ_m / 2π d_m)
+    if regression.pairs == "fit":
+        doa = manifold.doa(phases)
+    else:
+        d = d[:1] if regression.pairs == "inner" else d
+        u = phases[..., : len(d)] / (2 * np.pi * d)
+        doa = np.arcsin(np.minimum(np.maximum(u, -1.0), 1.0)).mean(axis=-1)
+    return doa if is_ratio else limit_phase_step(before, doa, float(d[-1]))
+
+
+def rows_of_factor(factor: Float, manifold: ArrayManifold) -> Float:
+    """Return A_T (..., n_sensors, n_sources) with the estimated rows of a regression."""
+    k, centre = factor.shape[-2], manifold.centre
     W = solve_factor(factor, k)
-    M = manifold.n_pairs
-    doa = manifold.doa(np.arctan2(W[..., M:], W[..., :M]))
-    return factor, limit_phase_step(belief.doa, doa, float(manifold.distances[-1]))
+    ones = np.ones((*W.shape[:-1], 1))
+    return transposed(np.concatenate([W[..., :centre], ones, W[..., centre:]], axis=-1))
 
 
 def limit_phase_step(before: Float, after: Float, largest_distance: float) -> Float:
@@ -108,23 +160,28 @@ def estimate_ar_models(
     regression : RegressionSettings
     """
     # [√λ_a^N [R | U]; w_j [s(j-1) ... s(j-p) | s(j)]; Lᵀ; √(μ_a (1 - λ_a^N)) [I | a]]   (4.1, 4.2)
-    w = np.repeat(filtered.ar_weights, belief.x.shape[-2], axis=-1)[..., None, None]
+    n_parts = belief.x.shape[-2]
+    w = np.repeat(filtered.ar_weights, n_parts, axis=-1)[..., None, :]
     samples = regression_samples(belief, filtered.X, layout, regression.correction)
     if not layout.used.all():
         samples = samples * regression_mask(layout)
-    old = np.sqrt(filtered.ar_decay)[..., None, None, None] * belief.ar_factor
-    stack = [old, np.swapaxes(w * samples, -3, -2)]
+    samples, share = np.swapaxes(samples, -3, -2), None
+    rls = QRDRLS.from_factor(belief.ar_factor, layout.used.shape[-1])
+    if regression.huber is not None:
+        threshold = regression.huber * np.sqrt(belief.q)
+        w, share = with_robust_weights(w, rls.robust_weights(samples, threshold, n_parts))
+    rows = [w[..., None] * samples]
     if regression.correction:
         covariance = regression_covariance(filtered.ar_covariance, layout)
-        stack.append(transposed(cholesky_root(covariance)))
+        rows.append(scaled(transposed(cholesky_root(covariance)), share))
     ridge = regression.ar_ridge * (1 - filtered.ar_decay)[..., None, None] * belief.power[..., None]
     ridge = np.broadcast_to(ridge, present.a.shape)
-    factor = append_rows(*stack, ridge_rows(ridge, present.a[..., None]))
+    rls.append(filtered.ar_decay[..., None], *rows, ridge_rows(ridge, present.a[..., None]))
     weight = filtered.ar_decay * belief.ar_weight + (filtered.ar_weights**2).sum(axis=-1)
     # a = R⁻¹ U, poles inside 0.995   (4.4);  q = ρ² / Σ w²   (4.3)
-    a = stabilised(solve_factor(factor, layout.used.shape[-1])[..., 0])
-    q = factor[..., -1, -1] ** 2 / np.maximum(weight, TINY)[..., None]
-    return factor, weight, a, np.maximum(q, MIN_INNOVATION * belief.power)
+    a = stabilised(rls.solve()[..., 0])
+    q = rls.factor[..., -1, -1] ** 2 / np.maximum(weight, TINY)[..., None]
+    return rls.factor, weight, a, np.maximum(q, MIN_INNOVATION * belief.power)
 
 
 def regression_samples(

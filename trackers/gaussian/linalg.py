@@ -11,6 +11,7 @@ from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from arrivals.typing import Float
 
@@ -160,3 +161,38 @@ def symmetric_2x2(a: Float, b: Float, c: Float) -> Float:
     A = np.empty((*np.shape(a), 2, 2))
     A[..., 0, 0], A[..., 0, 1], A[..., 1, 0], A[..., 1, 1] = a, b, b, c
     return A
+
+
+def append_rows(factor: Float, *rows: Float) -> Float:
+    """Return the triangular factor of a factor with more rows, (..., n, n).
+
+    Examples
+    --------
+    >>> np.abs(append_rows(np.zeros((1, 1)), np.array([[3.0], [4.0]]))).round(12)
+    array([[5.]])
+    """
+    stack = np.concatenate([factor, *rows], axis=-2)
+    return np.asarray(np.linalg.qr(stack, mode="r"))
+
+
+def solve_factor(factor: Float, n_coef: int) -> Float:
+    """Return W = R⁻¹U of a triangular factor [R | U]: (..., n_coef, n_rhs)."""
+    R, U = factor[..., :n_coef, :n_coef], factor[..., :n_coef, n_coef:]
+    return np.asarray(np.linalg.solve(R, U))
+
+
+def ridge_rows(weight: ArrayLike, target: Float) -> Float:
+    """Return the rows √weight [I | target], (..., n_coef, n_coef + n_rhs).
+
+    Parameters
+    ----------
+    weight : array_like, shape (..., n_coef)
+        One number for each coefficient.
+    target : ndarray, shape (..., n_coef, n_rhs)
+        Solution without data.
+    """
+    n = target.shape[-2]
+    root = np.sqrt(np.asarray(weight, dtype=np.float64))[..., None]
+    rows = np.empty((*target.shape[:-1], n + target.shape[-1]))
+    rows[..., :n], rows[..., n:] = root * np.eye(n), root * target
+    return rows

@@ -167,3 +167,30 @@ def test_zeros_are_samples() -> None:
         rls.update(np.zeros((100, 2)), np.zeros((100, 1)))
     rls.update(X[:30, :2], X[:30, :2] @ W[:2, :1])
     np.testing.assert_allclose(rls.solve(), W[:2, :1], atol=0.01)
+
+
+@given(st.floats(0.0, 6.0), st.sampled_from([None, GOAL]))
+def test_l1_shrinks_each_row_of_orthogonal_problems_by_half_the_weight(
+    gamma: float, goal: Float | None
+) -> None:
+    Q, _ = np.linalg.qr(X)
+    rls = QRDRLS(3, 2, forgetting=1.0, ridge=1e-9, target=goal, l1=gamma)
+    rls.update(Q, Q @ W)
+    v = W if goal is None else W - goal
+    size = np.linalg.norm(v, axis=-1, keepdims=True)
+    expected = W - v * np.minimum(gamma / 2 / size, 1.0)
+    np.testing.assert_allclose(rls.solve(), expected, atol=1e-8)
+
+
+def test_weighted_l1_meets_the_conditions_of_its_minimum() -> None:
+    weights = np.array([0.0, 2.0, 90.0])
+    rls = QRDRLS(3, forgetting=0.98, ridge=0.1, l1=weights)
+    rls.update(X[:15], Y[:15, :1])
+    rls.update(X[15:], Y[15:, :1])
+    found, age = rls.solve()[:, 0], 0.98 ** np.arange(39, -1, -1.0)
+    slope = 2 * (X.T @ (age * (X @ found - Y[:, 0])) + 0.1 * found)
+    np.testing.assert_allclose(slope[:2], -weights[:2] * np.sign(found[:2]), atol=1e-8)
+    assert found[1] != 0.0 == found[2]
+    assert abs(slope[2]) < weights[2]
+    with pytest.raises(ValueError, match="l1 must be finite, not negative"):
+        QRDRLS(3, l1=-1.0)
