@@ -16,28 +16,33 @@ from arrivals.validation import instance, positive
 
 @dataclass(frozen=True)
 class ArrayManifold(SingleSourceSnapshot):
-    """Snapshots of a symmetric array with a centre sensor, transformed to a real response.
+    """Snapshots of a symmetric array, transformed to a real response.
 
     Sums and differences of the two sensors of a pair turn a(β) into
     [√2 cos φ_1 ... √2 cos φ_M, 1, √2 sin φ_1 ... √2 sin φ_M], φ_m = 2π d_m/λ sin β, the inner pair
-    first. Both rows of a pair belong to the same distance.
+    first. Both rows of a pair belong to the same distance. M pairs and a centre sensor are 2M + 1
+    sensors; without one the row of ones is missing.
 
     Parameters
     ----------
     array : SensorArray
-        A line, symmetric about a sensor in its centre: `SensorArray.symmetric`.
+        A line, symmetric about a sensor in its centre, `SensorArray.symmetric`, or about a place
+        without a sensor, such as two sensors.
     wavelength : float
-        Metres; at least twice the distance of the inner pair.
+        Metres; at least twice the distance of the inner pair from the centre, and four times
+        without a centre sensor.
     noise : float
         Variance of the complex noise of one sensor; the transformation leaves it white.
 
     Raises
     ------
     ValueError
-        If the array is not symmetric, has no centre sensor, or its inner pair is ambiguous.
+        If the array is not symmetric, or its inner pair is ambiguous.
 
     Notes
     -----
+    Without a centre sensor the sign of a source is arbitrary, and φ_m known up to half a turn.
+
     Shapes: snapshots (..., n_sensors), complex; directions (..., n_sources), rad. The Gaussian
     interface is that of one source with a state [β, Re w, Im w], and its measurements are real,
     `composite(transform(snapshot))`.
@@ -68,10 +73,11 @@ class ArrayManifold(SingleSourceSnapshot):
             object.__setattr__(self, name, positive(name, getattr(self, name)))
         _pairs(self.array)
         inner = self.distances[0]
-        if inner > 0.5 * (1 + 1e-6):
+        limit, name = (0.25, "a quarter") if self.centre is None else (0.5, "half a")
+        if inner > limit * (1 + 1e-6):
             raise ValueError(
-                f"the inner pair must lie at most half a wavelength, {self.wavelength / 2:.6g} m, "
-                f"from the centre; got {inner * self.wavelength:.6g} m: directions are ambiguous"
+                f"the inner pair must lie at most {name} wavelength, {self.wavelength * limit:.6g} "
+                f"m, from the centre; got {inner * self.wavelength:.6g} m: directions are ambiguous"
             )
 
     @cached_property
@@ -85,7 +91,7 @@ class ArrayManifold(SingleSourceSnapshot):
 
     @property
     def n_pairs(self) -> int:
-        """M, of 2M + 1 sensors."""
+        """M, of 2M + 1 sensors, or of 2M without a centre sensor."""
         return self.array.n_sensors // 2
 
     @property
@@ -94,9 +100,21 @@ class ArrayManifold(SingleSourceSnapshot):
         return _transformation(self.array)
 
     @property
-    def centre(self) -> int:
-        """Row of the ones, which settles scale and sign of the sources."""
-        return self.n_pairs
+    def centre(self) -> int | None:
+        """Row of the ones, which settles scale and sign of the sources; None without it."""
+        return self.n_pairs if self.array.n_sensors % 2 else None
+
+    def between(self, cosines: Float, middle: Float | float, sines: Float) -> Float:
+        """Return rows (..., n_sensors) of cosines and sines, `middle` in the row of the centre."""
+        if self.centre is None:
+            return np.concatenate([cosines, sines], axis=-1)
+        row = np.broadcast_to(middle, (*cosines.shape[:-1], 1))
+        return np.concatenate([cosines, row, sines], axis=-1)
+
+    def pairs_of(self, rows: Float) -> Float:
+        """Return rows (..., n_sensors) without that of the centre sensor."""
+        n = self.centre
+        return rows if n is None else np.concatenate([rows[..., :n], rows[..., n + 1 :]], axis=-1)
 
     def transform(self, z: ArrayLike) -> Complex:
         """Return Tᴴ z of snapshots (..., n_sensors); the noise stays white."""
@@ -111,8 +129,7 @@ class ArrayManifold(SingleSourceSnapshot):
         """Return the response to directions (...), rad: shape (..., n_sensors), real."""
         phi = self.phases(doa)
         root = np.sqrt(2.0)
-        ones = np.ones((*phi.shape[:-1], 1))
-        return np.concatenate([root * np.cos(phi), ones, root * np.sin(phi)], axis=-1)
+        return self.between(root * np.cos(phi), 1.0, root * np.sin(phi))
 
     def doa(self, phases: ArrayLike) -> Float:
         """Return the directions, rad, of the pairs' phases, each known up to whole turns.
@@ -164,35 +181,33 @@ class ArrayManifold(SingleSourceSnapshot):
         doa = np.asarray(doa, dtype=np.float64)
         phi = self.phases(doa)
         rate = np.sqrt(2.0) * 2 * np.pi * self.distances * np.cos(doa)[..., None]
-        zeros = np.zeros((*phi.shape[:-1], 1))
-        return np.concatenate([-rate * np.sin(phi), zeros, rate * np.cos(phi)], axis=-1)
+        return self.between(-rate * np.sin(phi), 0.0, rate * np.cos(phi))
 
 
 @lru_cache(maxsize=64)
-def _pairs(array: SensorArray) -> tuple[Int, int, Int]:
+def _pairs(array: SensorArray) -> tuple[Int, int | None, Int]:
     """Return the sensors left of the centre, the centre, and those right of it, inner first.
 
     Raises
     ------
     ValueError
-        If the array is not a line, has no centre sensor, or is not symmetric about it.
+        If the array is not a line, has no pair, or is not symmetric about its centre.
     """
     if array.dim != 1:
         raise ValueError(f"array must be a line; got sensors in {array.dim} dimensions")
     positions = array.positions[:, 0]
     order = np.argsort(positions)
     n = len(order)
-    if n < 3 or n % 2 == 0:
-        raise ValueError(
-            f"array must have a centre sensor and pairs about it, 3, 5, ... sensors; got {n}"
-        )
-    middle = int(order[n // 2])
-    left, right = order[: n // 2][::-1], order[n // 2 + 1 :]
-    off = np.abs(positions[left] + positions[right] - 2 * positions[middle])
+    if n < 2:
+        raise ValueError(f"array must have a pair of sensors; got {n}")
+    middle = int(order[n // 2]) if n % 2 else None
+    left, right = order[: n // 2][::-1], order[(n + 1) // 2 :]
+    centre = positions[order].mean() if middle is None else positions[middle]
+    off = np.abs(positions[left] + positions[right] - 2 * centre)
     worst = int(np.argmax(off))
     if off[worst] > 1e-6 * np.ptp(positions):
         raise ValueError(
-            f"array must be symmetric about its centre sensor at {positions[middle]:g} m; got "
+            f"array must be symmetric about its centre at {centre:g} m; got "
             f"sensors at {positions[left[worst]]:g} and {positions[right[worst]]:g} m"
         )
     return left, middle, right
@@ -201,11 +216,12 @@ def _pairs(array: SensorArray) -> tuple[Int, int, Int]:
 @lru_cache(maxsize=64)
 def _transformation(array: SensorArray) -> Complex:
     left, middle, right = _pairs(array)
-    M = len(left)
-    T = np.zeros((2 * M + 1, 2 * M + 1), dtype=np.complex128)
+    M, n = len(left), array.n_sensors
+    T = np.zeros((n, n), dtype=np.complex128)
     pair = np.arange(M)
     T[right, pair] = T[left, pair] = np.sqrt(0.5)
-    T[middle, M] = 1.0
-    T[right, M + 1 + pair], T[left, M + 1 + pair] = 1j * np.sqrt(0.5), -1j * np.sqrt(0.5)
+    if middle is not None:
+        T[middle, M] = 1.0
+    T[right, n - M + pair], T[left, n - M + pair] = 1j * np.sqrt(0.5), -1j * np.sqrt(0.5)
     T.setflags(write=False)
     return T

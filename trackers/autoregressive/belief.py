@@ -113,7 +113,7 @@ def initialize_belief(
         return np.repeat(np.asarray(value, dtype=np.float64)[None], n_batch, axis=0)
 
     a, power = repeat(motion.coefficient_matrix), repeat(motion.power)
-    target = np.delete(manifold.real_steering(doa), manifold.centre, axis=-1)
+    target = manifold.pairs_of(manifold.real_steering(doa))
     ridge = np.broadcast_to(regression.ar_ridge * power[..., None], a.shape)
     rows = ridge_rows(ridge, a[..., None])
     # var sin(θ + ε) = cos² θ σ² + sin² θ σ⁴ / 2

@@ -205,7 +205,8 @@ def slope_matrix(manifold: ArrayManifold) -> tuple[Float, float]:
     """Return the matrix that turns A_T into dA_T/du, 2π d (-sin row, 0, cos row), and L."""
     M, rate = manifold.n_pairs, 2 * np.pi * manifold.distances
     pair = np.arange(M)
-    matrix = np.zeros((2 * M + 1, 2 * M + 1))
-    matrix[pair, M + 1 + pair], matrix[M + 1 + pair, pair] = -rate, rate
+    n = manifold.array.n_sensors
+    matrix = np.zeros((n, n))
+    matrix[pair, n - M + pair], matrix[n - M + pair, pair] = -rate, rate
     matrix.setflags(write=False)
     return matrix, float(2 * (rate @ rate))

@@ -70,7 +70,7 @@ def log_likelihood(
     F = layout.transition(sources.coefficient_matrix)
     Q = layout.process_noise(np.array(sources.noise, np.float64))
     near = np.r_[manifold.distances <= max(MAX_DISTANCE, manifold.distances[0])]
-    rows = np.r_[near, True, near]
+    rows = manifold.between(near, True, near)
     A: Float = transposed(manifold.real_steering(doa))[..., rows, :]
     y = y[:, rows]
     r = np.full((len(doa), 1, 1), noise * n_parts / 2)

@@ -157,7 +157,7 @@ def filter_with_gaps(
         np.einsum("...j,...jkl->...kl", v * v, Ps),
         np.einsum("...jm,...jkl,...ml->...km", missing, Ps[..., :k], A),
         np.einsum("...j,...jkl->...kl", share, precision),
-        np.asarray(np.delete(valid, A.shape[-2] // 2, axis=-1).any(axis=(-2, -1))),
+        np.asarray(valid[..., : A.shape[-2] // 2].any(axis=(-2, -1))),
         noise * (2 / n_parts),
     )  # fmt: skip
 

@@ -255,7 +255,7 @@ class QRDRLS(Configurable):
         return np.asarray((below**2).sum(axis=-2) / weight[..., None])
 
     def _penalties(self) -> Float:
-        value = np.broadcast_to(real("l1", self.l1), (self.n_coef,))
+        value = np.broadcast_to(real("l1", 0.0 if self.l1 is None else self.l1), (self.n_coef,))
         if not ((value >= 0) & (value < np.inf)).all():
             raise ValueError(f"l1 must be finite, not negative; got {self.l1!r}")
         return value

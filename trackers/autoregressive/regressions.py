@@ -31,18 +31,18 @@ def estimate_directions(
     regression: RegressionSettings,
 ) -> tuple[Float, Float]:
     """Return the factor of the regression for the rows of A_T, and the directions: (6), (7)."""
-    k, n_parts, centre = model.A.shape[-1], belief.x.shape[-2], manifold.centre
-    target = without(transposed(model.A), centre)  # the row of ones is never estimated
+    k, n_parts = model.A.shape[-1], belief.x.shape[-2]
+    target = manifold.pairs_of(transposed(model.A))  # the row of ones is never estimated
     rls = QRDRLS.from_factor(belief.manifold_factor, k)
     # [√λ^N [R | U]; w_j [s_j | y_j]; [Lᵀ | 0]; √(μ (1 - λ^N)) [I | A_Tᵀ]]   (3.2)
     w = np.repeat(filtered.weights, n_parts, axis=-1)
-    samples, share = without(filtered.y, centre, filtered.X[..., :k]), None
+    samples, share = beside(filtered.X[..., :k], manifold.pairs_of(filtered.y)), None
     if regression.huber is not None:
         threshold = regression.huber * np.sqrt(model.r[..., 0, 0])
         w, share = with_robust_weights(w, rls.robust_weights(samples, threshold, n_parts))
     rows = [w[..., None] * samples]
     if regression.correction:
-        rows.append(scaled(covariance_rows(filtered, k, centre), share))
+        rows.append(scaled(covariance_rows(filtered, k, manifold), share))
     ridge = regression.ridge * (1 - filtered.decay)[..., None] * belief.power
     rls.append(filtered.decay, *rows, ridge_rows(ridge, target))
     rls.factor = rls.factor[..., :k, :]
@@ -93,10 +93,8 @@ def directions_of_rows(
 
 def rows_of_factor(factor: Float, manifold: ArrayManifold) -> Float:
     """Return A_T (..., n_sensors, n_sources) with the estimated rows of a regression."""
-    k, centre = factor.shape[-2], manifold.centre
-    W = solve_factor(factor, k)
-    ones = np.ones((*W.shape[:-1], 1))
-    return transposed(np.concatenate([W[..., :centre], ones, W[..., centre:]], axis=-1))
+    W, M = solve_factor(factor, factor.shape[-2]), manifold.n_pairs
+    return transposed(manifold.between(W[..., :M], 1.0, W[..., M:]))
 
 
 def limit_phase_step(before: Float, after: Float, largest_distance: float) -> Float:
@@ -110,7 +108,7 @@ def limit_phase_step(before: Float, after: Float, largest_distance: float) -> Fl
     return np.asarray(np.arcsin(np.clip(np.sin(after), u - limit, u + limit)))
 
 
-def covariance_rows(filtered: FilteredInterval, k: int, centre: int) -> Float:
+def covariance_rows(filtered: FilteredInterval, k: int, manifold: ArrayManifold) -> Float:
     """Return the rows [Lᵀ | 0], L Lᵀ = Σ w² P_ss (3.3).
 
     They make the true directions a fixed point: the estimated samples are regressors with errors.
@@ -120,12 +118,12 @@ def covariance_rows(filtered: FilteredInterval, k: int, centre: int) -> Float:
     missing = filtered.missing_covariance[..., :k, :]
     if missing.any():
         missing = np.asarray(np.linalg.solve(L, missing), dtype=np.float64)
-    return without(missing, centre, transposed(L))
+    return beside(transposed(L), manifold.pairs_of(missing))
 
 
-def without(rows: Float, column: int, *before: Float) -> Float:
-    """Return rows without a column, after others."""
-    return np.concatenate([*before, rows[..., :column], rows[..., column + 1 :]], axis=-1)
+def beside(first: Float, second: Float) -> Float:
+    """Return the columns of both."""
+    return np.concatenate([first, second], axis=-1)
 
 
 def cholesky_root(C: Float) -> Float:

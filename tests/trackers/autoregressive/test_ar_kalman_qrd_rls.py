@@ -191,14 +191,14 @@ WRONG: list[tuple[Callable[[], object], type[Exception], str]] = [
         "motion must be an AutoregressiveSources; got VonMisesWalk",
     ),
     (
-        lambda: made(measurement=ArraySnapshot(SensorArray.ula(4, 0.5), 1.0), doa=DOA),
+        lambda: made(measurement=ArraySnapshot(SensorArray.ula(4, 0.6), 1.0), doa=DOA),
         ValueError,
-        "must have a centre sensor",
+        "at most a quarter wavelength",
     ),
     (
-        lambda: made(measurement=ArraySnapshot(SensorArray.ula(4, 0.5), 1.0)),
+        lambda: made(measurement=ArraySnapshot(SensorArray(np.array([0.0, 0.2, 0.3])), 1.0)),
         ValueError,
-        "must have a centre sensor",
+        "must be symmetric about its centre",
     ),
     (
         lambda: made(measurement=symmetric_array(0.7)),
