@@ -25,7 +25,7 @@ QUICK = 10  # runs of a quick study
 # its runs, and `quick`.
 STUDIES: dict[str, str] = {
     "any-array": f"{PACKAGE}.svalse.any_array:any_array",
-    "ar-kf": f"{PACKAGE}.ar_kalman:ar_kf",
+    "ar-kf": f"{PACKAGE}.ar_kalman.figures_1_to_9:ar_kf",
     "calibration": f"{PACKAGE}.svalse.calibration:calibration",
     "interpolation-table1": f"{PACKAGE}.interpolation.table_1:table1",
     "interpolation-table2": f"{PACKAGE}.interpolation.table_2:table2",

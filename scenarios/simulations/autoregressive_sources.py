@@ -13,7 +13,7 @@ from arrivals.scenarios.base import Scenario, Trial
 from arrivals.scenarios.registry import register
 from arrivals.scenarios.simulations.ar_signals import ar_signals
 from arrivals.typing import Complex, Float
-from arrivals.validation import count, number
+from arrivals.validation import count, instance, number
 
 BROAD = ((0.772, -0.45), (0.96, -0.77), (-1.2, -0.72), (-0.6, -0.5))
 
@@ -43,14 +43,18 @@ class SourceField(Scenario):
         Distances of the sensors on either side from the centre, wavelengths.
     snr_db : float
         Power of each source over that of the noise, one sensor, dB.
+    centre : bool
+        With a sensor in the centre: M distances are 2M + 1 sensors, or 2M without it.
     """
 
     doa_deg: Sequence[float] = (-20.0, 30.0)
     end_deg: Sequence[float] | None = None
     distances: Sequence[float] = (0.25,)
     snr_db: float = 30.0
+    centre: bool = True
 
     def __post_init__(self) -> None:
+        instance("centre", self.centre, bool)
         for name in ("doa_deg", "end_deg", "distances"):
             value = getattr(self, name)
             if value is not None:
@@ -76,6 +80,8 @@ class SourceField(Scenario):
         """The line, and the noise; the wavelength is 1 m."""
         distinct = 1 + 1e-9 * np.arange(len(self.distances))  # the report has two sensors at one
         array = SensorArray.symmetric(np.array(self.distances) * distinct)
+        if not self.centre:
+            array = SensorArray(array.positions[array.positions[:, 0] != 0])
         return ArraySnapshot(array, wavelength=1.0, noise=10 ** (-self.snr_db / 10))
 
     def truth(self, n_steps: int) -> Float:
@@ -103,6 +109,8 @@ class AutoregressiveField(SourceField):
     end_deg : sequence of float, optional
         As in `SourceField`.
     snr_db : float
+        As in `SourceField`.
+    centre : bool
         As in `SourceField`.
     coefficients : sequence of sequences of float
         AR coefficients of each source, whose power is 1.

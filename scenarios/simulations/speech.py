@@ -36,6 +36,8 @@ class SpeechField(SourceField):
         As in `SourceField`.
     snr_db : float
         As in `SourceField`.
+    centre : bool
+        As in `SourceField`.
     order : int
         Order of the autoregressive model, fitted to the whole recordings; 2 in Fig. 9.
     recordings : sequence of path, optional

@@ -7,9 +7,7 @@ import pytest
 from scipy.io import wavfile
 
 from arrivals.scenarios import Scenario, create, nmse
-from arrivals.scenarios.reproduce import ar_kalman as reproduce_ar
-from arrivals.scenarios.reproduce.ar_kalman import Experiment, cases, hold_last, run_tracker
-from arrivals.scenarios.reproduce.studies import reproduce
+from arrivals.scenarios.reproduce.ar_kalman.experiments import Experiment, run_tracker
 from arrivals.scenarios.simulations import (
     AutoregressiveField,
     FastSource,
@@ -87,30 +85,10 @@ def test_section_7_more_sources_than_subspace_methods_resolve(
     scene: AutoregressiveField, offset: float, params: dict[str, float], most: float
 ) -> None:
     trials = [scene.sample(np.random.default_rng(n)) for n in range(6)]
-    runs = run_tracker(trials, Experiment(0, "", scene, params, offset, ""))
+    runs = run_tracker(trials, Experiment(0, "", scene, params, offset), params)
     error = [r.doa[2999::30] - t.truth[2999::30] for t, r in zip(trials, runs, strict=True)]
     assert np.rad2deg(np.median(np.sqrt(np.mean(np.square(error), axis=(1, 2))))) < most
     sent = np.asarray(trials[0].signals)
     assert nmse(sent[3000:], runs[0].signals[3000:], db=True).max() < -3
     with pytest.raises(ValueError, match="n_sources"):
         trials[0].tracker("music", n_sources=scene.n_sources)
-
-
-def test_hold_last_fills_missing_directions() -> None:
-    filled = hold_last(np.array([[np.nan, 0.2], [0.3, np.nan], [np.nan, np.nan]]))
-    np.testing.assert_array_equal(filled, [[0.0, 0.2], [0.3, 0.2], [0.3, 0.2]])
-
-
-def test_ar_study_writes_table_claims_and_figures(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    assert {case.figure for case in cases()} == set(range(1, 10))
-    short = [case._replace(scene=case.scene.replace(n_intervals=110))
-             for case in cases() if case.figure in (1, 3)]  # fmt: skip
-    monkeypatch.setattr(reproduce_ar, "cases", lambda: short)
-    written = reproduce("ar-kf", tmp_path, runs=2)
-    assert [path.name for path in written[2:]] == [f"ar-kf-fig{n}.png" for n in (1, 3)]
-    page = (tmp_path / "ar-kf.md").read_text()
-    assert page.count("\n| ") == 2 + len(short)
-    assert page.count("the AR coefficients converge (Fig. 1) (error 0.") == 1
-    assert "Fig. 7" not in page  # no claims on figures that were not run
