@@ -148,6 +148,22 @@ def _fails(form: str, limit: float, names: Sequence[str], results: Results) -> D
     return Decision(negative(0.5 - float(failed.mean()), error_of(failed.astype(float))), numbers)
 
 
+def doubles(metric: str, name: str, right: str, unit: str = "degrees") -> Both:
+    """Decide by the same runs that a score of a part is more than twice that of another."""
+    return by_both(_doubles, metric, name, right, unit)
+
+
+def _doubles(
+    form: str, metric: str, name: str, right: str, unit: str, results: Results
+) -> Decision | None:
+    found = values(results, metric, form, name, right)
+    if found is None:
+        return None
+    decision = below(2 * found[1], found[0], unit)
+    means = f"{found[0].mean():.3g} against {found[1].mean():.3g} {unit}"
+    return Decision(decision.holds, means)
+
+
 def averaging() -> Both:
     """Decide that all pairs together have a smaller spread than the inner pair alone."""
     return partial(_averaging, REPORT), partial(_averaging, OURS)

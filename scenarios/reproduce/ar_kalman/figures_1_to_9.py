@@ -47,7 +47,8 @@ def ar_kf(runs: int, seed: int) -> Report:
         if case.name == "speech, 10 dB":
             results |= time_of_intervals(case, seed)
     lines = [line for _, line in evaluated]
-    figures = {"array": draw_array(parts[0].scene, parts[-1].scene)} if parts else {}
+    widest = max(parts, key=lambda case: len(case.scene.distances))
+    figures = {"array": draw_array(parts[0].scene, widest.scene)}
     for number in range(1, 10):
         drawn = [(case, line) for case, line in zip(parts, lines, strict=True)
                  if case.figure == (1 if number == 2 else number)]  # fmt: skip
@@ -88,8 +89,8 @@ REMARKS: Sequence[str] = (
     "mean of the pairs up to half a wavelength, phases by atan2, the manifold rebuilt from the "
     "directions. 'Word for word' (CSV) takes the arctangent of the quotient of two rows, (7), and "
     "puts the estimated rows back.",
-    "ESPRIT, PAST and MUSIC estimate unlabelled directions, scored by the best assignment (first 4 "
-    "trials, 1 of speech); they need more sensors than sources and, here, a uniform line. In the "
+    "ESPRIT, PAST and MUSIC estimate unlabelled directions, scored by the best assignment (4 "
+    "trials or 1); they need more sensors than sources and, here, a uniform line. In the "
     "pauses of speech they have no signal.",
     "M pairs of sensors and the centre sensor are 2M + 1 sensors: the report's M = 2, 3, 4 are 5, "
     "7, 9 sensors, and its smallest array, one pair, has 3. Two sensors alone have no row of ones: "

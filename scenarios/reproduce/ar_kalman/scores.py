@@ -29,7 +29,6 @@ from arrivals.typing import Float
 # By (metric, form or method, case), one value a run
 Results: TypeAlias = Mapping[tuple[str, str, str], Float]
 SUBSPACE = ("esprit", "past", "music")
-N_SUBSPACE = 4  # runs of the subspace methods, which process single snapshots; 1 of speech
 RATE = 8000  # of the speech, Hz
 N_LAGS, FEW = 20, 30  # lags of the partial autocorrelation, and samples of a short interval
 
@@ -76,8 +75,8 @@ def evaluate(
         runs[form] = run_tracker(trials, case, params)
         for metric, values in scores(trials, runs[form], case).items():
             results[metric, form, case.name] = values
-    n = 1 if "speech" in case.name else N_SUBSPACE if case.compared else 0
-    for name in SUBSPACE[: len(SUBSPACE) * (n > 0)]:
+    n = case.n_compared(n_runs)
+    for name in SUBSPACE if n else ():
         results["rmse", name, case.name] = np.array(
             [unlabelled_rmse(trial, name, case) for trial in trials[:n]]
         )

@@ -59,6 +59,7 @@ def test_claims_are_decided_by_the_reports_form_and_by_ours() -> None:
     assert both(ar.lower("rmse", "a", "b"), one | two) == (False, True)
     assert both(ar.fails(2.5, "a"), one) == (True, False)
     assert both(ar.same("rmse", "a", "b"), one | two) == (True, False)
+    assert both(ar.doubles("rmse", "b", "a"), one | two) == (False, None)
     past = {("rmse", "past", "a"): 2.0 + JITTER[:4]}
     assert both(ar.better_than("past", "a"), one | past) == (False, True)
 
@@ -119,6 +120,7 @@ def test_parts_are_unique_and_cover_all_figures_and_forms() -> None:
     assert {part.figure for part in parts} == {0, 1, 3, 4, 5, 6, 7, 8, 9}  # Fig. 2 is of part 1
     wide = next(part for part in parts if part.name == "M = 4")
     assert LITERAL not in wide.forms()  # pairs beyond half a wavelength
+    assert [part.n_compared(4) for part in parts[:3]] == [4, 1, 4]
     assert np.isnan(unlabelled_rmse(None, "past", parts[1]))  # type: ignore[arg-type]  # no trial
     np.testing.assert_allclose(start_of([0.2, -0.1], 1.0), [0.2 + np.pi / 180, -0.1 - np.pi / 180])
 
