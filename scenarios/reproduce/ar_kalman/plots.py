@@ -104,15 +104,16 @@ def draw_array(centred: SourceField, wide: SourceField) -> Figure:
                 ax.annotate("", (side * d, -height), (0.0, -height),
                             arrowprops={"arrowstyle": "<->", "color": COLOURS[m % 3]})  # fmt: skip
                 ax.plot([side * d] * 2, [0.0, -height], color=COLOURS[m % 3], linewidth=0.7)
-            ax.text(1.04 * d, -height, f"$d_{m + 1}$ = {d:.3g} λ", va="center", fontsize=9,
-                    color=COLOURS[m % 3])  # fmt: skip
+            ax.text(d + 0.04 * x.max(), -height, f"$d_{m + 1}$ = {d:.3g} λ", va="center",
+                    fontsize=9, color=COLOURS[m % 3], zorder=5,
+                    bbox={"color": "white", "pad": 0.5})  # fmt: skip
         ax.plot([0.0, 0.0], [-0.4 - 0.3 * manifold.n_pairs, 0.0], color="0.6", linewidth=0.7)
         ax.plot(x, np.zeros_like(x), "o", color="black", markersize=9, zorder=4)
         _draw_wave(ax, float(manifold.distances[-1]))
         ax.set_title(f"M = {manifold.n_pairs}: {manifold.n_pairs} pair"
                      f"{'s' * (manifold.n_pairs > 1)} and the centre, "
                      f"{model.array.n_sensors} sensors", fontsize=10)  # fmt: skip
-        ax.set(xlim=(-1.2 * x.max(), 1.5 * x.max()), ylim=(-1.4, 1.1), yticks=[],
+        ax.set(xlim=(-1.2 * x.max(), 1.6 * x.max()), ylim=(-1.4, 1.1), yticks=[],
                xlabel="position, wavelengths")  # fmt: skip
     return figure
 
