@@ -8,7 +8,9 @@ from arrivals.trackers import ARKalmanQRDRLS
 from arrivals.trackers.autoregressive import NoiseSettings, RegressionSettings
 from arrivals.trackers.conformance import MakeTracker, Measurements
 
-SNAPSHOT = ArraySnapshot(SensorArray.symmetric([0.25, 0.5]), wavelength=1.0, noise=0.1)
+# Without a sensor it is not symmetric: the pair of a missing sensor is left out, while a uniform
+# line of one sensor less has other pairs.
+SNAPSHOT = ArraySnapshot(SensorArray.symmetric([0.25, 0.6]), wavelength=1.0, noise=0.1)
 RAGGED = AutoregressiveSources([[0.7, -0.4], [0.9]]).scaled(1.0)
 SPEECH = AutoregressiveSources([[0.9], [0.5]], real_valued=True).scaled(1.0)
 DOA = [-0.3, 0.5]
