@@ -170,6 +170,64 @@ class Scores:
     lost: float
 
 
+@dataclass(frozen=True, eq=False)
+class PositionErrors:
+    """Errors of the estimates that are assigned to the sources of many runs.
+
+    Parameters
+    ----------
+    position : ndarray, shape (n_runs, n_sources, 2)
+        Errors of x and y, m.
+    amplitude : ndarray, shape (n_runs, n_sources)
+        Errors of the amplitudes, dB.
+    """
+
+    position: Float
+    amplitude: Float
+
+    @classmethod
+    def of(
+        cls, theta: ArrayLike, truth: ArrayLike, u: ArrayLike, true_u: ArrayLike,
+        how: Assignment = "nearest",
+    ) -> PositionErrors:  # fmt: skip
+        """Return the errors of estimates; the arguments are those of `scores`."""
+        theta, truth = real("theta", theta), real("truth", truth)
+        if theta.ndim != 3 or truth.ndim != 3 or len(theta) != len(truth) or not truth.size:
+            raise ValueError(
+                "theta and truth must have shape (n_runs, n_sources, 2), not empty; "
+                f"got {theta.shape} and {truth.shape}"
+            )
+        u, true_u = shaped("u", u, *theta.shape[:2]), shaped("true_u", true_u, *truth.shape[:2])
+        index = np.array([assign(t, s, how) for t, s in zip(theta, truth, strict=True)])
+        error = _bounded(np.take_along_axis(theta, index[..., None], axis=1) - truth)
+        du = np.take_along_axis(u, index, axis=1) - true_u
+        return cls(error, _bounded(neper_to_db(du)))
+
+    def runs(self, rows: ArrayLike) -> PositionErrors:
+        """Return the errors of some of the runs."""
+        index = np.asarray(rows)
+        return PositionErrors(self.position[index], self.amplitude[index])
+
+    @property
+    def distance(self) -> Float:
+        """Distances of the estimates from the sources, m, (n_runs, n_sources)."""
+        return np.asarray(np.hypot(self.position[..., 0], self.position[..., 1]))
+
+    def summary(self) -> Scores:
+        """Return the statistics of all runs."""
+        x, y = huber(self.position[..., 0]), huber(self.position[..., 1])
+        level = huber(self.amplitude)
+        return Scores(
+            location_rms=float(np.hypot(x.rms, y.rms)),
+            location_bias=float(np.hypot(x.bias, y.bias)),
+            amplitude_rms=level.rms,
+            amplitude_bias=level.bias,
+            median=float(np.median(self.distance)),
+            p90=float(np.quantile(self.distance, 0.9)),
+            lost=float(np.mean(self.distance > LOST_DISTANCE)),
+        )
+
+
 def scores(
     theta: ArrayLike,
     truth: ArrayLike,
@@ -205,28 +263,7 @@ def scores(
     >>> round(scores(theta, truth, truth[..., 0], truth[..., 0]).location_rms, 1)
     1.3
     """
-    theta, truth = real("theta", theta), real("truth", truth)
-    if theta.ndim != 3 or truth.ndim != 3 or len(theta) != len(truth) or not truth.size:
-        raise ValueError(
-            "theta and truth must have shape (n_runs, n_sources, 2), not empty; "
-            f"got {theta.shape} and {truth.shape}"
-        )
-    u, true_u = shaped("u", u, *theta.shape[:2]), shaped("true_u", true_u, *truth.shape[:2])
-    index = np.array([assign(t, s, how) for t, s in zip(theta, truth, strict=True)])
-    error = _bounded(np.take_along_axis(theta, index[..., None], axis=1) - truth)
-    distance = np.hypot(error[..., 0], error[..., 1])
-    x, y = huber(error[..., 0]), huber(error[..., 1])
-    du = np.take_along_axis(u, index, axis=1) - true_u
-    level = huber(_bounded(neper_to_db(du)))
-    return Scores(
-        location_rms=float(np.hypot(x.rms, y.rms)),
-        location_bias=float(np.hypot(x.bias, y.bias)),
-        amplitude_rms=level.rms,
-        amplitude_bias=level.bias,
-        median=float(np.median(distance)),
-        p90=float(np.quantile(distance, 0.9)),
-        lost=float(np.mean(distance > LOST_DISTANCE)),
-    )
+    return PositionErrors.of(theta, truth, u, true_u, how).summary()
 
 
 def _bounded(error: Float) -> Float:

@@ -47,6 +47,7 @@ RUNS: dict[str, tuple[int, int]] = {
     "any-array": (20, 3),
     "calibration": (30, 2),
     "ar-kf": (100, 4),
+    "rss": (1000, 50),
     "svalse-fig4": (20, 4),
     "svalse-fig5": (20, 4),
     "svalse-fig6": (20, 4),

@@ -47,6 +47,10 @@ class Draws(NamedTuple):
     u: Float
     theta: Float
 
+    def first(self, n: int) -> Draws:
+        """Return the first trials."""
+        return Draws(self.problem.select(slice(n)), self.u[:n], self.theta[:n])
+
 
 class TrialEstimates(NamedTuple):
     """Estimates of a batch of trials, and their processor time.

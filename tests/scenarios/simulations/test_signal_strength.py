@@ -19,9 +19,6 @@ from arrivals.scenarios.bounds.detection import (
 )
 from arrivals.scenarios.bounds.signal_strength import rss_bound
 from arrivals.scenarios.metrics.position_errors import Assignment, assign, huber, scores
-from arrivals.scenarios.reproduce.rss import table_1 as reproduce_rss
-from arrivals.scenarios.reproduce.rss.table_1 import NAMES as METHOD_NAMES
-from arrivals.scenarios.reproduce.rss.table_1 import table1
 from arrivals.scenarios.reproduce.rss.trials import bounds, draws
 from arrivals.scenarios.simulations.signal_strength import RSSTrial, Table1K3, Table1K7, lattice
 
@@ -212,19 +209,3 @@ def test_estimates_that_are_not_finite_count_as_lost() -> None:
     result = np.array([[[0.1, 0.0]], [[0.0, 0.2]], [[np.nan, 0.0]], [[np.inf, 0.0]]])
     u = np.zeros((4, 1))
     assert scores(result, truth, u, u).lost == 0.5
-
-
-def test_table_1_has_rows_claims_and_a_figure(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(reproduce_rss, "_least_ms", lambda work: 4.0)  # not a timing test
-    report = table1(2, 0)
-    assert len({row[:2] for row in report.rows}) == len(report.rows) == 22
-    rms = {row[:2]: row[report.columns.index("location RMS m")] for row in report.rows}
-    three = next(line for line in report.remarks if "3 close targets" in line)
-    ratio = rms["K=3 random", METHOD_NAMES["lm"]] / rms["K=3 random", METHOD_NAMES["vb"]]
-    assert f"{ratio:.2f}" in three
-    assert three.startswith("Holds: " if ratio > 1.2 else "Does not hold: ")
-    assert "Holds: VB is linear in K (a cycle takes 1 times as long" in "".join(report.remarks)
-    assert len([line for line in report.remarks if "olds: " in line or "hold: " in line]) == 8
-    assert list(report.figures) == ["fig4"]
