@@ -155,7 +155,8 @@ class PropagationModel(NamedTuple):
     log_noise : float or ndarray, shape (..., n_sensors)
     r_min : float
     log_gain : float or ndarray
-        As in `levels`. Leading axes are those of a batch that has its own sensors each.
+        As in `levels`, or (n_batch, n_sources, n_sensors). Leading axes are those of a batch that
+        has its own sensors each.
     """
 
     sensors: Float
@@ -174,10 +175,11 @@ class PropagationModel(NamedTuple):
 
     def select(self, rows: Any) -> PropagationModel:
         """Return the model at some rows of a batch."""
-        noise = np.asarray(self.log_noise)
+        noise, gain = np.asarray(self.log_noise), np.asarray(self.log_gain)
         return self._replace(
             sensors=self.sensors[rows] if self.sensors.ndim > 2 else self.sensors,
             log_noise=noise[rows] if noise.ndim > 1 else self.log_noise,
+            log_gain=gain[rows] if gain.ndim > 2 else self.log_gain,
         )
 
     def at_sensors(self, rows: Any) -> PropagationModel:

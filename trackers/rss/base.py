@@ -23,6 +23,7 @@ from arrivals.trackers.rss.arguments import (
 )
 from arrivals.trackers.rss.batch import BatchStart, run_in_chunks
 from arrivals.trackers.rss.belief import SourceBeliefs, keep_finite
+from arrivals.trackers.rss.doppler import Doppler
 from arrivals.trackers.rss.inference.joint_posterior import JointPosterior
 from arrivals.trackers.rss.inference.solution import Diagnostics, Solution, WeightedReadings
 from arrivals.trackers.rss.mirror import Line
@@ -81,6 +82,7 @@ class RSSTracker(Tracker):
         self.n_sources = None if n_sources is None else count("n_sources", n_sources, maximum=1000)
         self.amplitude = instance("amplitude", amplitude, AmplitudePrior)
         self.births = birth_death(births)
+        self.doppler = Doppler.of(motion, amplitude.wave_speed, bool(self.births))
         self.search = instance("search", search, GridSearch)
         if correlation_time is not None:
             positive("correlation_time", correlation_time)
@@ -204,8 +206,10 @@ class RSSTracker(Tracker):
 
     def joint_posterior(self, sources: SourceBeliefs, readings: WeightedReadings) -> JointPosterior:
         """Return the joint posterior (7) of predicted sources and readings."""
-        prior = sources.prior(self.position)
-        return JointPosterior(self.measurement.propagation, readings.xi, readings.W, prior)
+        prior, propagation = sources.prior(self.position), self.measurement.propagation
+        if self.doppler is not None:  # β of (1)
+            propagation = self.doppler.applied(propagation, prior.theta, sources.x)
+        return JointPosterior(propagation, readings.xi, readings.W, prior)
 
     def update_sources(
         self, sources: SourceBeliefs, readings: WeightedReadings, problem: JointPosterior,
@@ -215,8 +219,8 @@ class RSSTracker(Tracker):
         updated = sources.updated(
             solution.u, solution.theta, solution.marginals, self.position, self.motion
         )
-        diagnostics = problem._replace(W=readings.precision).diagnose(solution)
-        return keep_finite(updated, sources), diagnostics
+        W = np.where(problem.W > 0, readings.precision, 0.0)  # of the sensors in use
+        return keep_finite(updated, sources), problem._replace(W=W).diagnose(solution)
 
     def store(
         self, sources: SourceBeliefs, solution: Solution, diagnostics: Diagnostics,

@@ -31,6 +31,10 @@ class AmplitudePrior(FrozenModel):
         Variance of u, Np²; (3 dB)² by default.
     drift : float
         Variance that u gains per unit of time, Np²; (0.3 dB)² by default.
+    wave_speed : float, optional
+        Speed c of the waves, m/s. If given, the amplitude at a sensor has Doppler's factor
+        (1 - v/c cos ψ)⁻² of the predicted velocity, β of (1), which the paper leaves out; the
+        motion must have a velocity, and the number of sources must not change.
 
     Raises
     ------
@@ -46,6 +50,7 @@ class AmplitudePrior(FrozenModel):
     mean: ArrayLike = 80 * NEPER_PER_DB
     variance: ArrayLike = (3 * NEPER_PER_DB) ** 2
     drift: float = (0.3 * NEPER_PER_DB) ** 2
+    wave_speed: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("mean", "variance"):
@@ -53,6 +58,8 @@ class AmplitudePrior(FrozenModel):
         if not np.all(np.asarray(self.variance) > 0):
             raise ValueError(f"variance must be positive; got {self.variance}")
         not_negative("drift", self.drift)
+        if self.wave_speed is not None:
+            positive("wave_speed", self.wave_speed)
 
 
 @dataclass(frozen=True)
