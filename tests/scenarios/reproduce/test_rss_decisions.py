@@ -76,7 +76,7 @@ def test_jackknife_is_the_standard_error_of_a_mean() -> None:
     x = RNG.standard_normal(1000)
     mean, error = rss.jackknife(lambda rows: float(x[rows].mean()), 1000)
     assert mean == pytest.approx(x.mean())
-    assert error == pytest.approx(x.std() / np.sqrt(1000), rel=0.6)  # of ten groups
+    assert error == pytest.approx(x.std() / np.sqrt(1000), rel=0.4)  # of 25 groups
     assert np.isnan(rss.jackknife(lambda rows: 1.0, 1)[1])
 
 
@@ -120,7 +120,7 @@ def test_a_study_without_results_decides_nothing_and_entries_are_once_there() ->
 
 def test_table_1_has_rows_claims_and_a_figure() -> None:
     report = table1(2, 0, quick=True)
-    assert len({row[:2] for row in report.rows}) == len(report.rows) == 24
+    assert len({row[:2] for row in report.rows}) == len(report.rows) == 16
     assert len(report.shown) <= 8
     assert list(report.figures) == ["fig4"]
     verdicts: list[Verdict] = verdicts_of("rss", report.results)

@@ -1,0 +1,150 @@
+"""Functions that decide the claims on the statistic of signal strength."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from arrivals.scenarios.reproduce.claims import Claim, Decide, Decision, below, negative
+from arrivals.scenarios.reproduce.rss.decisions import jackknife
+from arrivals.scenarios.reproduce.signal_strength.drive_by import EnvelopeLaw
+from arrivals.scenarios.reproduce.signal_strength.range_estimates import Errors
+from arrivals.typing import Float, Int
+
+NUMBERS = (10, 50, 100)  # of snapshots
+SIGNIFICANCE = 0.01
+ACCURATE = 0.05  # distance of distribution functions
+
+
+class EnvelopeResults(NamedTuple):
+    """What the claims on the statistic are decided by.
+
+    Parameters
+    ----------
+    ranges, positions : mapping of (form, number of snapshots) to Errors
+        By one sensor, and by a network.
+    bounds : mapping of int to ndarray
+        Cramér-Rao bounds of the positions, m, by number of snapshots.
+    distances : mapping of (form, number of snapshots) to float
+        Between the distribution functions of the form and of the statistic.
+    law : EnvelopeLaw
+        Of the synthetic sound.
+    detected : tuple of three float
+        Probability of detection by the formula, by simulation, and its standard error.
+    """
+
+    ranges: Mapping[tuple[str, int], Errors]
+    positions: Mapping[tuple[str, int], Errors]
+    bounds: Mapping[int, Float]
+    distances: Mapping[tuple[str, int], float]
+    law: EnvelopeLaw
+    detected: tuple[float, float, float]
+
+
+def accurate(form: str, n_snapshots: int) -> Decide:
+    """Decide that a form's distribution function differs by at most 0.05."""
+    return partial(_accurate, form, n_snapshots)
+
+
+def _accurate(form: str, n_snapshots: int, results: EnvelopeResults) -> Decision:
+    distance = results.distances[form, n_snapshots]
+    return Decision(distance <= ACCURATE, f"largest difference {distance:.3f}")
+
+
+def less_biased(form: str, other: str, n_snapshots: int) -> Decide:
+    """Decide that the range by one form has a smaller bias than that by another."""
+    return partial(_less_biased, form, other, n_snapshots)
+
+
+def _less_biased(form: str, other: str, N: int, results: EnvelopeResults) -> Decision:
+    first, second = (100 * results.ranges[name, N].error for name in (form, other))
+    d = np.sign(first.mean()) * first - np.sign(second.mean()) * second
+    error = float(d.std() / np.sqrt(len(d)))
+    numbers = (
+        f"{first.mean():.2f} and {second.mean():.2f} %, difference {d.mean():.2f} ± {error:.2f}"
+    )
+    return Decision(negative(float(d.mean()), error), numbers)
+
+
+def nearer(form: str, other: str, n_snapshots: int) -> Decide:
+    """Decide that positions by one form have smaller errors than those by another."""
+    return partial(_nearer, form, other, n_snapshots)
+
+
+def _nearer(form: str, other: str, N: int, results: EnvelopeResults) -> Decision:
+    first, second = (
+        np.linalg.norm(results.positions[name, N].error, axis=1) for name in (form, other)
+    )
+    return below(first, second, "m")
+
+
+def normalised_square(errors: Errors) -> float:
+    """Return the mean square of the errors in units of their stated deviations; 1 if these fit."""
+    return float(np.mean((errors.error / errors.stated) ** 2))
+
+
+def better_stated(form: str, other: str, n_snapshots: int) -> Decide:
+    """Decide that one form states the errors of positions better than another."""
+    return partial(_better_stated, form, other, n_snapshots)
+
+
+def _better_stated(form: str, other: str, N: int, results: EnvelopeResults) -> Decision:
+    both = [results.positions[name, N] for name in (form, other)]
+
+    def off(rows: Int) -> float:
+        one, two = (
+            abs(np.log(normalised_square(Errors(e.error[rows], e.stated[rows])))) for e in both
+        )
+        return float(one - two)
+
+    d, error = jackknife(off, len(both[0].error))
+    squares = " and ".join(f"{normalised_square(one):.2g}" for one in both)
+    numbers = f"square over the stated one {squares}, 1 if true"
+    return Decision(negative(d, error), numbers)
+
+
+def gaussian(results: EnvelopeResults) -> Decision:
+    """Decide that the envelope is circular Gaussian."""
+    p, q = results.law.p_gaussian, results.law.p_circular
+    return Decision(min(p, q) > SIGNIFICANCE, f"probabilities {p:.2f} and {q:.2f}, limit 0.01")
+
+
+def uncorrelated(results: EnvelopeResults) -> Decision:
+    """Decide that envelope samples 15 ms apart are uncorrelated."""
+    p, one = results.law.p_uncorrelated, results.law.correlation[1]
+    numbers = f"probability {p:.2f}, limit 0.01; adjacent segments of 2.5 ms: {one:.2f}"
+    return Decision(p > SIGNIFICANCE, numbers)
+
+
+def near_bound(form: str, n_snapshots: int) -> Decide:
+    """Decide that the error of positions is within a tenth of the bound."""
+    return partial(_near_bound, form, n_snapshots)
+
+
+def _near_bound(form: str, N: int, results: EnvelopeResults) -> Decision:
+    e, bound = results.positions[form, N].error, results.bounds[N]
+
+    def excess(rows: Int) -> float:
+        rms = np.sqrt(np.square(e[rows]).sum(axis=1).mean())
+        return float(rms / np.sqrt(np.square(bound[rows]).mean()))
+
+    ratio, error = jackknife(excess, len(bound))
+    return Decision(negative(ratio - 1.1, error), f"{ratio:.3f} ± {error:.3f} of it")
+
+
+def formula(results: EnvelopeResults) -> Decision:
+    """Decide that the simulated probability of detection is that of the formula."""
+    exact, found, error = results.detected
+    return Decision(abs(exact - found) < 3 * error, f"{exact:.4f} and {found:.4f} ± {error:.4f}")
+
+
+CHECKS: tuple[Claim, ...] = (
+    Claim("rss-envelope", "", "the exact probability of detection is the simulated one", None,
+          formula, "check"),
+    Claim("rss-envelope", "", "the error of positions of the log-Gaussian form is within a tenth "
+          "of the Cramér-Rao bound, N = 50", None,
+          near_bound("log-Gaussian (the paper)", 50), "ours"),
+)  # fmt: skip
