@@ -15,7 +15,14 @@ from arrivals.scenarios.reproduce.claims import Claim, Verdict
 from arrivals.scenarios.reproduce.interpolation import convergence, rmse, table_1, table_2
 from arrivals.scenarios.reproduce.interpolation import decisions as itp
 from arrivals.scenarios.reproduce.interpolation import own_claims as interpolation
-from arrivals.scenarios.reproduce.svalse import any_array, calibration
+from arrivals.scenarios.reproduce.rss import own_claims as rss
+from arrivals.scenarios.reproduce.signal_strength import doppler, envelope_decisions, network
+from arrivals.scenarios.reproduce.signal_strength.paper_claims import SIGNAL_STRENGTH
+from arrivals.scenarios.reproduce.svalse import any_array, calibration, own_claims
+from arrivals.scenarios.reproduce.svalse import decisions as sv
+from arrivals.scenarios.reproduce.svalse.forms import FROM_20_DB
+from arrivals.scenarios.reproduce.svalse.published_values import PAPER
+from arrivals.scenarios.reproduce.swellex96 import decisions as sea
 
 SVALSE: tuple[Claim, ...] = ()
 AT_SEA: tuple[Claim, ...] = ()
@@ -86,8 +93,6 @@ AUTOREGRESSIVE: tuple[Claim, ...] = tuple(
     )
 )
 # fmt: on
-INTERPOLATION: tuple[Claim, ...] = ()
-SIGNAL_STRENGTH: tuple[Claim, ...] = ()
 
 CLAIMS = (
     *SVALSE,
@@ -98,6 +103,10 @@ CLAIMS = (
     *own_ar.CLAIMS,
     *any_array.CLAIMS,
     *calibration.CLAIMS,
+    *rss.CLAIMS,
+    *envelope_decisions.CLAIMS,
+    *doppler.CLAIMS,
+    *network.CLAIMS,
 )
 
 

@@ -16,6 +16,7 @@ from arrivals.validation import count, not_negative, number, one_of, positive, r
 Sweep = Literal["gauss-seidel", "jacobi"]
 Refresh = Literal["point", "literal"]
 Covariance = Literal["joint", "factor", "modes"]
+SensorChoice = Literal["information", "nearest"]
 Method = Literal["lm", "bfgs"]
 
 
@@ -157,11 +158,17 @@ class VariationalSolver(FrozenModel):
         Gaussians at the maxima found from the sigma points of the prior, weighted by their
         evidence, at about three times the computing time. The next step starts from them. Without
         effect on steps that search for sources.
+    sensors_used : int, optional
+        Number of sensors whose readings are used in a step, chosen by the predicted sources; all
+        if None. Steps that search for sources use all.
+    sensor_choice : {"information", "nearest"}
+        The sensors with the largest expected decrease of entropy, or those nearest to a source.
 
     Raises
     ------
     TypeError, ValueError
-        If a number is out of range or a choice is unknown.
+        If a number is out of range, a choice is unknown, or the published form is combined with
+        a part that it does not have: `covariance="modes"`, `sensors_used`.
 
     References
     ----------
@@ -185,6 +192,23 @@ class VariationalSolver(FrozenModel):
     tol_theta: float = 0.5
     newton_steps: int = 5
     covariance: Covariance = "joint"
+    sensors_used: int | None = None
+    sensor_choice: SensorChoice = "information"
+
+    @classmethod
+    def as_printed(cls) -> VariationalSolver:
+        """Return Algorithm 1 of the paper as printed: 30 parallel updates, each the next prior.
+
+        Examples
+        --------
+        >>> solver = VariationalSolver.as_printed()
+        >>> solver.refresh, solver.sweep, solver.damping, solver.covariance
+        ('literal', 'jacobi', 1.0, 'factor')
+        """
+        return cls(
+            sweep="jacobi", damping=1.0, refresh="literal", tol_u=0.0, tol_theta=1e-6,
+            covariance="factor",
+        )  # fmt: skip
 
     def __post_init__(self) -> None:
         one_of("sweep", self.sweep, ("gauss-seidel", "jacobi"))
@@ -197,6 +221,24 @@ class VariationalSolver(FrozenModel):
         not_negative("tol_theta", self.tol_theta)
         count("newton_steps", self.newton_steps)
         one_of("covariance", self.covariance, ("joint", "factor", "modes"))
+        one_of("sensor_choice", self.sensor_choice, ("information", "nearest"))
+        if self.sensors_used is not None:
+            count("sensors_used", self.sensors_used)
+        if self.refresh == "literal":
+            self._check_literal()
+
+    def _check_literal(self) -> None:
+        """Raise a ValueError if Algorithm 1 is combined with a part that it does not have."""
+        cure = "use refresh='point', the general form"
+        if self.covariance == "modes":
+            raise ValueError(
+                f"covariance must be 'joint' or 'factor' for refresh='literal'; got 'modes': {cure}"
+            )
+        if self.sensors_used is not None:
+            raise ValueError(
+                "sensors_used must be None for refresh='literal', which has all sensors; got "
+                f"{self.sensors_used}: {cure}"
+            )
 
 
 @dataclass(frozen=True)

@@ -100,9 +100,7 @@ def draws(scenario: FixedSources, runs: int, seed: int) -> Draws:
 
 
 SOLVERS: dict[str, VariationalSolver] = {
-    "vb_literal": VariationalSolver(
-        sweep="jacobi", damping=1.0, refresh="literal", tol_u=0.0, tol_theta=1e-6
-    ),
+    "vb_literal": VariationalSolver.as_printed(),
     "vb_jacobi": VariationalSolver(
         sweep="jacobi", damping=0.5, line_search=False, tol_u=0.0, tol_theta=1e-6
     ),

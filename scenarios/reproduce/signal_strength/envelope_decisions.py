@@ -141,7 +141,7 @@ def formula(results: EnvelopeResults) -> Decision:
     return Decision(abs(exact - found) < 3 * error, f"{exact:.4f} and {found:.4f} ± {error:.4f}")
 
 
-CHECKS: tuple[Claim, ...] = (
+CLAIMS: tuple[Claim, ...] = (
     Claim("rss-envelope", "", "the exact probability of detection is the simulated one", None,
           formula, "check"),
     Claim("rss-envelope", "", "the error of positions of the log-Gaussian form is within a tenth "

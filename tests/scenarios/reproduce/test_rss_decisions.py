@@ -7,12 +7,13 @@ import pytest
 
 from arrivals.scenarios.metrics.position_errors import PositionErrors
 from arrivals.scenarios.reproduce.claims import Verdict
-from arrivals.scenarios.reproduce.paper_claims import SIGNAL_STRENGTH, verdicts_of
+from arrivals.scenarios.reproduce.paper_claims import verdicts_of
 from arrivals.scenarios.reproduce.rss import decisions as rss
 from arrivals.scenarios.reproduce.rss.convergence import LocalMaxima
 from arrivals.scenarios.reproduce.rss.published_values import SEVEN, THREE
 from arrivals.scenarios.reproduce.rss.table_1 import table1
 from arrivals.scenarios.reproduce.rss.timing import CYCLE, DIFFERENCES, SEARCH
+from arrivals.scenarios.reproduce.signal_strength.paper_claims import SIGNAL_STRENGTH
 
 N = 200
 RNG = np.random.default_rng(0)

@@ -1,12 +1,17 @@
 """Studies of the statistic of signal strength, of moving sources, and of networks."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
+from arrivals.scenarios import create
 from arrivals.scenarios.reproduce.claims import Verdict
 from arrivals.scenarios.reproduce.paper_claims import verdicts_of
+from arrivals.scenarios.reproduce.rss.trials import draws
 from arrivals.scenarios.reproduce.signal_strength import doppler as moving
 from arrivals.scenarios.reproduce.signal_strength import envelope_decisions as env
+from arrivals.scenarios.reproduce.signal_strength import network as net
 from arrivals.scenarios.reproduce.signal_strength.drive_by import (
     EnvelopeLaw,
     drive_by,
@@ -14,6 +19,7 @@ from arrivals.scenarios.reproduce.signal_strength.drive_by import (
     envelope_law,
 )
 from arrivals.scenarios.reproduce.signal_strength.envelope import envelope_study
+from arrivals.scenarios.reproduce.signal_strength.graphs import draw_graph, model_graph, separable
 from arrivals.scenarios.reproduce.signal_strength.range_estimates import (
     AMPLITUDE,
     ENERGY,
@@ -23,6 +29,8 @@ from arrivals.scenarios.reproduce.signal_strength.range_estimates import (
     range_bound,
     range_errors,
 )
+from arrivals.scenarios.simulations.signal_strength import Table1K3
+from arrivals.trackers.rss.inference.joint_posterior import Prior
 
 RNG = np.random.default_rng(0)
 
@@ -102,3 +110,25 @@ def test_doppler_study_has_a_lead_where_the_factor_is_ignored() -> None:
     verdicts = verdicts_of("rss-doppler", same)
     assert holds(verdicts, "can be ignored") == [True] * 3
     assert holds(verdicts, "own velocity lowers") == [None] * 3
+
+
+def test_network_claims_follow_the_errors_and_count_messages() -> None:
+    same = np.array([1.0, 1.01, 0.99])
+    results = {form: net.NetworkErrors(same, same, same, same) for form in net.forms()}
+    verdicts = verdicts_of("rss-network", results)
+    assert [one.holds for one in verdicts] == [True, None, None, True]
+    worse = net.NetworkErrors(2 * same, same, same, same)
+    verdicts = verdicts_of("rss-network", {**results, (net.CELLS, 4): worse})
+    assert [one.holds for one in verdicts] == [True, None, None, False]
+    assert [net.numbers_sent(net.CELLS, n, 1) for n in (1, 2, 4)] == [0, 7, 21]
+
+
+def test_graph_has_the_names_of_the_models_and_its_latent_nodes_are_entangled() -> None:
+    nodes = model_graph()
+    assert set(Prior._fields) < set(nodes)
+    assert {parent for node in nodes.values() for parent in node.parents} <= set(nodes)
+    problem = draws(Table1K3(), 1, 0).problem
+    assert not separable(problem, 0.1, 1.0)  # given the readings
+    assert separable(problem._replace(W=0 * problem.W), 0.1, 1.0)  # without them
+    trial: Any = create("rss_table1_k3").sample(np.random.default_rng(0))
+    assert len(draw_graph(trial).axes) == 3

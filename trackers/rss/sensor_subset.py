@@ -1,0 +1,129 @@
+"""Updates by a subset of the sensors, or by one cell of sensors after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from arrivals.measurement_models.signal_strength.path_loss import slopes
+from arrivals.measurements import real_numbers
+from arrivals.messages import shown
+from arrivals.trackers.rss.inference.joint_posterior import JointPosterior
+from arrivals.typing import Bool, Float
+from arrivals.validation import items
+
+if TYPE_CHECKING:
+    from arrivals.trackers.rss.base import RSSTracker
+
+
+def of_best_sensors(problem: JointPosterior, n: int, choice: str) -> JointPosterior:
+    """Return a batch of problems with the readings of the n best sensors at the prior means.
+
+    Parameters
+    ----------
+    problem : JointPosterior
+        With one batch axis.
+    n : int
+    choice : {"information", "nearest"}
+        One after the other by the expected decrease of the entropy; or nearest to a source.
+
+    References
+    ----------
+    Cevher, Sankaranarayanan, Chellappa, ICASSP 2008, section 5: future work.
+    """
+    if n >= problem.W.shape[-1]:
+        return problem
+    used = (most_informative if choice == "information" else nearest)(problem, n)
+    return problem._replace(W=np.where(used, problem.W, 0.0))
+
+
+def nearest(problem: JointPosterior, n: int) -> Bool:
+    """Return which n sensors with readings are nearest to a source, (n_batch, n_sensors).
+
+    The sources take turns.
+    """
+    square = problem.propagation.offsets(problem.prior.theta).square
+    square = np.where(problem.W[..., None, :] > 0, square, np.inf)
+    rank = square.argsort(axis=-1).argsort(axis=-1).min(axis=-2)
+    order = rank.argsort(axis=-1, kind="stable")
+    used = np.zeros(problem.W.shape, dtype=np.bool_)
+    np.put_along_axis(used, order[..., :n], True, axis=-1)
+    return used
+
+
+def most_informative(problem: JointPosterior, n: int) -> Bool:
+    """Return which n sensors are expected to decrease the entropy most, (n_batch, n_sensors).
+
+    Each is chosen after the others: the gain of a sensor is ½ log(1 + W gᵀ C g), with the
+    gradient g of its reading and the covariance C that the sensors before it leave.
+    """
+    prior, rows = problem.prior, np.arange(len(problem.W))
+    G = slopes(problem.propagation.levels(prior.mu, prior.theta), problem.propagation.alpha)
+    C = np.linalg.inv(problem.prior_precision())
+    used = np.zeros(problem.W.shape, dtype=np.bool_)
+    for _ in range(n):
+        gain = problem.W * np.einsum("bmi,bij,bmj->bm", G, C, G, optimize=True)
+        best = np.where(used, -1.0, gain).argmax(axis=-1)
+        used[rows, best] = True
+        w, g = problem.W[rows, best], G[rows, best]
+        Cg = (C @ g[..., None])[..., 0]
+        scale = w / (1 + w * (g * Cg).sum(axis=-1))
+        # C = C - C g g' C W / (1 + W g' C g)
+        C = C - scale[:, None, None] * Cg[:, :, None] * Cg[:, None, :]
+    return used
+
+
+def update_by_cells(tracker: RSSTracker, z: ArrayLike, cells: Sequence[ArrayLike]) -> None:
+    """Update a tracker by one cell of sensors after the other.
+
+    Each cell needs its own readings and the posterior of the cell before it: means and
+    covariances of the sources, seven numbers each. The cells linearise at different points, and
+    covariances between sources are not passed on, so the result differs from that of all sensors
+    together.
+
+    Parameters
+    ----------
+    tracker : RSSTracker
+        With sources; it has the posterior of the last cell afterwards, and the sum of the log
+        likelihoods.
+    z : array_like, shape (n_sensors,)
+        Readings, Np; NaN where missing.
+    cells : sequence of array_like
+        Indices of the sensors of each cell.
+
+    Raises
+    ------
+    ValueError
+        If a sensor is in two cells.
+
+    References
+    ----------
+    Cevher, Sankaranarayanan, Chellappa, ICASSP 2008, section 5: future work.
+
+    Examples
+    --------
+    >>> from arrivals.measurement_models import LogNormalRSS
+    >>> from arrivals.motion_models import RandomWalk
+    >>> from arrivals.trackers import RSSVB
+    >>> rss = LogNormalRSS(np.random.default_rng(0).uniform(-60, 60, (40, 2)), position=(0, 1))
+    >>> tracker = RSSVB(RandomWalk(q=1.0), rss, [[-20.0, 15.0]], 100.0 * np.eye(2))
+    >>> z = rss.draw([9.2], [[-25.0, 10.0]], np.random.default_rng(1))
+    >>> update_by_cells(tracker, z, [range(20), range(20, 40)])
+    >>> tracker.estimate.position.round(0)
+    array([[-25.,  10.]])
+    """
+    parts = [np.asarray(cell, dtype=np.int64) for cell in items("cells", cells)]
+    every = np.concatenate(parts)
+    if len(np.unique(every)) < len(every):
+        raise ValueError(f"cells must not share sensors; got {shown(every)}")
+    readings, total, elapsed = real_numbers("z", z), 0.0, tracker.elapsed
+    for part in parts:
+        own: Float = np.full(tracker.measurement.dim_z, np.nan)
+        own[part] = readings[part]
+        tracker.elapsed = elapsed
+        tracker.update(own)
+        total += tracker.log_likelihood
+    tracker.log_likelihood = total
