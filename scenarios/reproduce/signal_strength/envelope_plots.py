@@ -65,7 +65,7 @@ def draw_drive_by(sound: Float, law: EnvelopeLaw) -> Figure:
         ax.legend(fontsize=8)
     top.set(ylabel="amplitude", title="synthetic drive-by sound, 48 kHz, N = 4 segments",
             ylim=(1.1 * sound.min(), 1.7 * sound.max()))  # fmt: skip
-    bottom.set(xlabel="time, ms", ylabel="complex envelope")
+    bottom.set(xlabel="time, ms", ylabel="complex envelope", xlim=top.get_xlim())
     x = np.sort(law.samples)
     normal.plot(ndtri((np.arange(len(x)) + 0.5) / len(x)), x, ".", markersize=2, color="#1f77b4",
                 label="real and imaginary parts")  # fmt: skip
