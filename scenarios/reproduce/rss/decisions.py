@@ -74,7 +74,7 @@ def jackknife(statistic: Callable[[Int], float], n_runs: int) -> tuple[float, fl
     --------
     >>> mean, error = jackknife(lambda runs: float(runs.mean()), 100)
     >>> mean, round(error, 2)
-    (49.5, 6.01)
+    (49.5, 5.89)
     """
     rows = np.arange(n_runs)
     groups = min(GROUPS, n_runs)
