@@ -74,7 +74,7 @@ def interpolation_ekf() -> tuple[Tracker, Any]:
 STEPS: list[tuple[Callable[[], tuple[Tracker, Any]], int]] = [
     (kalman, 7),
     (svalse, 24),
-    (rss_vb, 14),
+    (rss_vb, 15),
     (interpolation_ekf, 18),
 ]
 

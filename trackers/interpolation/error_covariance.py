@@ -122,14 +122,16 @@ class ScoreTable(FrozenModel):
         g = 1 - P / np.maximum(prior, TINY)
         pull = self.slope[row] * g
         noise, square = self.noise_at(x, row) * P * g, pull * pull
-        bend = None if self.bend is None else np.broadcast_to(2 * self.bend[row], pull.shape)
+        omega2 = self.square_frequency
+        omega2 = None if omega2 is None else np.broadcast_to(omega2[row], pull.shape)
         found = np.empty(pull.shape)
         for k in range(pull.shape[-1]):
             variance = reach = before(k, M)
             linear = pull[..., k]
-            if bend is not None:
-                u = bend[..., k] * variance  # twice that of `updated`
-                linear, reach = linear * np.exp(-0.25 * u), -np.expm1(-u) / bend[..., k]
+            if omega2 is not None:  # the same linearization
+                u = omega2[..., k] * variance
+                linear = linear * np.exp(-0.5 * u)
+                reach = np.expm1(-2 * u) / (-2 * omega2[..., k])
             M = variance * (1 - 2 * linear) + noise[..., k] + square[..., k] * reach
             found[..., k] = M
         return found

@@ -95,7 +95,8 @@ class InterpolationEKF(GaussianFilter):
     Where the model has a `band`, samples are filtered to it, and missing until the filter settles:
     at the start, after a gap or a click. The filter delays the estimate too.
 
-    `P` takes residuals to be independent; `std`, of the delay `latency` snapshots ago, does not.
+    `std` is that of the error of the delay `latency` snapshots ago, true if the prior is; `P` takes
+    residuals that share samples to be independent. docs/trackers.md says how many errors it covers.
 
     References
     ----------

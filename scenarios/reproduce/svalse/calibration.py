@@ -174,7 +174,7 @@ def changes(scene: CalibrationScene, limit: float, pooled: Pooled) -> Decision |
     """Decide that GOSPA changes by at most a limit."""
     if scene not in pooled:
         return None
-    mean, error = change(pooled[scene])
+    mean, error, *_ = change(pooled[scene])
     return Decision(mean <= limit, f"{mean:+.2f} ± {error:.2f}")
 
 
