@@ -101,7 +101,7 @@ def test_certain_births_as_printed_are_one_run_of_the_full_study(tmp_path: Path)
 def test_sources_off_the_grid_are_cases_at_high_snr(tmp_path: Path) -> None:
     study = reproduce_svalse_snr.off_grid("svalse_scenario1", 1, 0, tmp_path)
     assert tuple(study.cases) == OFF_GRID
-    assert set(study.methods) == set(reproduce_svalse_snr.SHOWN)
+    assert set(study.methods) == set(reproduce_svalse_snr.COMPARED_OFF_GRID)
     truth = scenarios.create("svalse_scenario1", n_steps=1, offset_deg=0.25).sample(
         np.random.default_rng(0)
     )
