@@ -1,4 +1,4 @@
-"""The claims of the paper on signal strength, for the table of all papers."""
+"""The claims of the paper on signal strength."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from arrivals.scenarios.reproduce.signal_strength.range_estimates import (
 )
 
 # fmt: off
-SIGNAL_STRENGTH: tuple[Claim, ...] = (
+CLAIMS: tuple[Claim, ...] = (
     *(Claim("rss", "Table 1", f"{case}: the {name} of {'VB' if vb else 'ML'} is smaller than that "
             f"of {'ML' if vb else 'VB'}", *rss.smaller(metric, case, vb))
       for case, of_vb in ((THREE, (True, True, True, True)), (SEVEN, (False, True, False, True)))

@@ -18,6 +18,7 @@ from arrivals.scenarios.reproduce.ar_kalman.experiments import (
     cases,
     start_of,
 )
+from arrivals.scenarios.reproduce.ar_kalman.paper_claims import CLAIMS as AUTOREGRESSIVE
 from arrivals.scenarios.reproduce.ar_kalman.plots import draw_array, draw_pacf
 from arrivals.scenarios.reproduce.ar_kalman.scores import (
     Results,
@@ -27,7 +28,7 @@ from arrivals.scenarios.reproduce.ar_kalman.scores import (
     unlabelled_rmse,
 )
 from arrivals.scenarios.reproduce.claims import Decide
-from arrivals.scenarios.reproduce.paper_claims import AUTOREGRESSIVE, CLAIMS
+from arrivals.scenarios.reproduce.paper_claims import CLAIMS
 from arrivals.scenarios.reproduce.studies import reproduce
 from arrivals.typing import Float
 

@@ -9,8 +9,8 @@ from arrivals.scenarios.reproduce.claims import Claim
 from arrivals.scenarios.reproduce.interpolation import decisions as itp
 from arrivals.scenarios.reproduce.interpolation import own_claims, table_1, table_2
 from arrivals.scenarios.reproduce.interpolation.convergence import LENGTHS, settling_lengths
+from arrivals.scenarios.reproduce.interpolation.paper_claims import CLAIMS as INTERPOLATION
 from arrivals.scenarios.reproduce.interpolation.trials import SOURCES, draws, scan_records
-from arrivals.scenarios.reproduce.paper_claims import INTERPOLATION
 from arrivals.typing import Float
 
 RNG = np.random.default_rng(0)

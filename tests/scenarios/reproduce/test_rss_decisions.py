@@ -13,7 +13,7 @@ from arrivals.scenarios.reproduce.rss.convergence import LocalMaxima
 from arrivals.scenarios.reproduce.rss.published_values import SEVEN, THREE
 from arrivals.scenarios.reproduce.rss.table_1 import table1
 from arrivals.scenarios.reproduce.rss.timing import CYCLE, DIFFERENCES, SEARCH
-from arrivals.scenarios.reproduce.signal_strength.paper_claims import SIGNAL_STRENGTH
+from arrivals.scenarios.reproduce.signal_strength.paper_claims import CLAIMS as SIGNAL_STRENGTH
 
 N = 200
 RNG = np.random.default_rng(0)

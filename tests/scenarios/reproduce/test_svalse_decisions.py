@@ -11,7 +11,7 @@ from arrivals.motion_models import BernoulliVonMises
 from arrivals.scenarios import create
 from arrivals.scenarios.base import Trial
 from arrivals.scenarios.reproduce.claims import counts
-from arrivals.scenarios.reproduce.paper_claims import AT_SEA, SVALSE, verdicts_of
+from arrivals.scenarios.reproduce.paper_claims import verdicts_of
 from arrivals.scenarios.reproduce.svalse import decisions as sv
 from arrivals.scenarios.reproduce.svalse.factor_graph import (
     BELIEF_PROPAGATION,
@@ -21,9 +21,11 @@ from arrivals.scenarios.reproduce.svalse.factor_graph import (
     factors,
 )
 from arrivals.scenarios.reproduce.svalse.forms import PRINTED_7D, UNMERGED_7D
+from arrivals.scenarios.reproduce.svalse.paper_claims import CLAIMS as SVALSE
 from arrivals.scenarios.reproduce.svalse.step_metrics import STEP_METRICS, gospa_steps
 from arrivals.scenarios.reproduce.swellex96.decisions import SCORES, SeaResults
 from arrivals.scenarios.reproduce.swellex96.field import FieldFacts
+from arrivals.scenarios.reproduce.swellex96.paper_claims import CLAIMS as AT_SEA
 from arrivals.trackers import CoordinateSolver, Run
 from arrivals.typing import Float
 
