@@ -84,8 +84,13 @@ def _name_lines(figure: Figure, n_sources: int, has_report: bool) -> None:
     if has_report:
         marks.append(Line2D([], [], color=grey, **REPORTED, label="report's form"))
     marks.append(Patch(color=grey, **BAND, label="ours, 10 to 90 % of the runs"))
-    figure.legend(handles=marks, loc="outside upper center", ncols=3 if len(figure.axes) < 2 else 6,
-                  fontsize=8, frameon=False)  # fmt: skip
+    figure.legend(
+        handles=marks,
+        loc="outside upper center",
+        ncols=3 if figure.get_figwidth() < 7 else 6,
+        fontsize=8,
+        frameon=False,
+    )
 
 
 def draw_array(centred: SourceField, wide: SourceField) -> Figure:

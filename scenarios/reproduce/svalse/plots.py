@@ -147,7 +147,8 @@ def _draw_number(ax: Axes, drawn: Sequence[DrawnRun]) -> None:
                 color=METHOD_COLOURS[tracker_name(one.method)], linestyle="--" if printed else "-",
                 label=one.method)  # fmt: skip
     ax.set_title("number of sources, and of estimates", fontsize=10)
-    ax.set(xlabel="step", ylabel="number", ylim=(0, None))
+    top = max(there.max(), *(one.run.n_found.max() for one in drawn))
+    ax.set(xlabel="step", ylabel="number", ylim=(0, top + 0.5))
     ax.legend(fontsize=8, ncols=3, loc="lower center")
 
 
