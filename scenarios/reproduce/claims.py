@@ -89,8 +89,11 @@ class Verdict:
 
     @property
     def holds(self) -> bool | None:
-        """The decision by the paper's form, by ours if there is none; None if not decided."""
-        decision = self.by_paper or self.by_ours
+        """The decision by the paper's form, by ours for a claim without one; None if not decided.
+
+        Where a run leaves out the paper's form, ours does not decide in its place.
+        """
+        decision = self.by_ours if self.claim.by_paper is None else self.by_paper
         return None if decision is None else decision.holds
 
     def line(self) -> str:

@@ -38,6 +38,9 @@ class Report:
         Columns of the page's table, at most `MAX_COLUMNS`; the first ones if empty.
     results : object
         What the study's claims are decided by.
+    captions : mapping of str to str
+        What a figure shows, by its name, where that is not all runs of the study: "run 0", a
+        sketch, fewer runs.
     """
 
     title: str
@@ -47,6 +50,7 @@ class Report:
     figures: Mapping[str, Figure] = field(default_factory=dict)
     shown: Sequence[str] = ()
     results: Any = None
+    captions: Mapping[str, str] = field(default_factory=dict)
 
     def to_csv(self, path: Path) -> None:
         """Write the table as CSV, with all columns."""

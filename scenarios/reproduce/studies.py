@@ -186,9 +186,10 @@ def _write(
     report.to_csv(folder / f"{name}.csv")
     files = [f"{name}-{key}.png" for key in report.figures]
     runs = f"{stamp['runs']} run{'s' * (stamp['runs'] != 1)}"
-    origin = f"{name}, seed {stamp['seed']}, {runs} · arrivals {stamp['version']}"
-    for path, figure in zip(files, report.figures.values(), strict=True):
-        save_picture(figure, folder / path, f"{report.title} · {origin}")
+    for path, (key, figure) in zip(files, report.figures.items(), strict=True):
+        shown = report.captions.get(key, f"{report.title} · {runs}")
+        origin = f"{name}, seed {stamp['seed']} · arrivals {stamp['version']}"
+        save_picture(figure, folder / path, f"{shown} · {origin}")
     page = report.markdown(files, verdicts)
     with atomic_write(folder / f"{name}.md") as file:
         file.write(add_stamp(page, {**stamp, "verdicts": counts(verdicts)}))

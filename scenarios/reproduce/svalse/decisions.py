@@ -167,7 +167,9 @@ def _mostly(
     given = [one for one in rest if one is not None]
     if part is None or len(given) < len(rest):
         return None
-    return below(np.sum(given, axis=0), part, "degrees")
+    others_sum = np.sum(given, axis=0)
+    both = ~np.isnan(others_sum - part)
+    return below(others_sum[both], part[both], "degrees") if both.any() else None
 
 
 def always_converges(method: str) -> Both:
@@ -176,7 +178,7 @@ def always_converges(method: str) -> Both:
 
 
 def _always_converges(method: str, results: Results) -> Decision | None:
-    shares = {case: float(runs.mean()) for (metric, name, case), runs in results.items()
+    shares = {case: float(np.nanmean(runs)) for (metric, name, case), runs in results.items()
               if metric == "converged" and name == method}  # fmt: skip
     if not shares:
         return None

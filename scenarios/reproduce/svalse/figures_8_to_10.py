@@ -9,17 +9,21 @@ from typing import TYPE_CHECKING, Any
 
 from arrivals.plots.study import METHOD_COLOURS, plot_metric
 from arrivals.scenarios.bounds.snapshot import LineBound, line_bound
+from arrivals.scenarios.experiments.methods import methods
 from arrivals.scenarios.experiments.monte_carlo import StudySettings, compute_study
+from arrivals.scenarios.experiments.results_file import Results
 from arrivals.scenarios.experiments.study import Study
 from arrivals.scenarios.metrics.registry import METRICS
 from arrivals.scenarios.registry import create
 from arrivals.scenarios.reproduce.report import Report
 from arrivals.scenarios.reproduce.svalse.decisions import results_of
 from arrivals.scenarios.reproduce.svalse.forms import (
+    FAST,
     FORMS,
     NAN,
     PAPER_FORM,
     batch_of,
+    paper_forms,
     table_methods,
 )
 from arrivals.scenarios.reproduce.svalse.plots import panels
@@ -32,6 +36,7 @@ if TYPE_CHECKING:
 
 SCENES = {"svalse_scenario1": "three static sources", "svalse_scenario2": "six static sources"}
 SNR_DB = tuple(float(snr) for snr in range(0, 45, 5))
+PAPER_FORM_RUNS = 10  # at most: the two forms take 700 s a run
 OFF_GRID_DB = (30.0, 40.0)
 OFF_GRID = 0.25  # degrees, halfway between the directions of (S)SBL
 PARTS = ("gospa", "distance", "missed", "false", "rmse", "cardinality", "converged")
@@ -44,8 +49,11 @@ COMPARED_OFF_GRID = ("ssbl", PAPER_FORM["svalse"], "svalse")
 def sweep(name: str, runs: int, seed: int, out: Path | None, quick: bool) -> Study:
     """Run all methods on a scene at every SNR; the cases are the SNRs."""
     cases = {f"{snr:g}": create(name, snr_db=snr) for snr in SNR_DB}
-    settings = StudySettings(MEASURED, out, batch=batch_of(runs))
-    return compute_study(cases, table_methods(quick), runs, seed, settings)
+    ours = compute_study(cases, methods(FAST), runs, seed, _settings(runs, out))
+    if quick:
+        return ours
+    fewer = min(runs, PAPER_FORM_RUNS)
+    return joined(ours, compute_study(cases, paper_forms(), fewer, seed, _settings(fewer, out)))
 
 
 def off_grid(name: str, runs: int, seed: int, out: Path | None) -> Study:
@@ -54,8 +62,20 @@ def off_grid(name: str, runs: int, seed: int, out: Path | None) -> Study:
         f"{snr:g} off grid": create(name, snr_db=snr, offset_deg=OFF_GRID) for snr in OFF_GRID_DB
     }
     compared = [one for one in table_methods(quick=False) if one.label in COMPARED_OFF_GRID]
-    settings = StudySettings(MEASURED, out, batch=batch_of(runs))
-    return compute_study(cases, compared, runs, seed, settings)
+    fewer = min(runs, PAPER_FORM_RUNS)
+    return compute_study(cases, compared, fewer, seed, _settings(fewer, out))
+
+
+def _settings(runs: int, out: Path | None) -> StudySettings:
+    return StudySettings(MEASURED, out, batch=batch_of(runs))
+
+
+def joined(first: Study, second: Study) -> Study:
+    """Return the results of two studies of the same cases and seed as one, in memory."""
+    config = {**first.config, "methods": first.config["methods"] + second.config["methods"]}
+    results = Results(config, None)
+    results.add([*first.rows(), *second.rows()])
+    return Study(results)
 
 
 def fig8(runs: int, seed: int, out: Path | None = None, quick: bool = False) -> Report:

@@ -104,8 +104,18 @@ def table_methods(quick: bool) -> list[Method]:
     >>> [method.label for method in table_methods(quick=False)][-2:]
     ["valse paper's form", "svalse paper's form"]
     """
-    slow = (valse_paper_form(), svalse_paper_form(PAPER_FORM["svalse"]))
-    return methods(FAST if quick else (*FAST, *slow))
+    return methods(FAST if quick else (*FAST, *paper_forms()))
+
+
+def paper_forms() -> list[Method]:
+    """Return VALSE and SVALSE in the paper's form.
+
+    Examples
+    --------
+    >>> [method.label for method in paper_forms()]
+    ["valse paper's form", "svalse paper's form"]
+    """
+    return [valse_paper_form(), svalse_paper_form(PAPER_FORM["svalse"])]
 
 
 def batch_of(runs: int) -> int:
