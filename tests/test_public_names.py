@@ -27,7 +27,7 @@ NAMES = {
         InterpolationEKF Kalman MAPSolver MUSIC MVDR NewtonSolver PAST Particle PeaksGNN
         PositionEstimate QRDRLS RSSML RSSVB RootMUSIC Run SBL SSBL SVALSE SourceEstimate
         StateEstimate Tracker UKF VALSE VariationalSolver as_filterpy available create find
-        find_peaks is_missing refine_peaks register
+        find_peaks is_missing refine_peaks register update_by_cells
     """,
     "trackers.filterpy": "ExtendedKalmanFilter IMMEstimator KalmanFilter UnscentedKalmanFilter",
     "scenarios": """

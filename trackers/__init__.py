@@ -27,6 +27,7 @@ from arrivals.trackers.multi_target.peaks_gnn import PeaksGNN
 from arrivals.trackers.registry import available, create, find, register
 from arrivals.trackers.rss.rss_ml import RSSML
 from arrivals.trackers.rss.rss_vb import RSSVB
+from arrivals.trackers.rss.sensor_subset import update_by_cells
 from arrivals.trackers.rss.settings import (
     AmplitudePrior,
     BirthDeath,
@@ -95,4 +96,5 @@ __all__ = [
     "is_missing",
     "refine_peaks",
     "register",
+    "update_by_cells",
 ]

@@ -15,6 +15,7 @@ from arrivals.files import atomic_write
 
 MARK = "<!-- arrivals "
 SOURCES = ("paper", "ours", "check")
+PICTURE = re.compile(r"!\[(.*?)\]\((.*?)\)")
 
 
 class Paper(NamedTuple):
@@ -84,8 +85,10 @@ ABBREVIATIONS = (
     "GOSPA is the mean over the steps of the sum of the distances of estimates to sources and half "
     "the cut-off (10 degrees) for each missed source and each false estimate; RMSE ignores false "
     "estimates, and counts the cut-off for missed sources. ± is a standard error.\n\n"
-    "Each claim of a paper is decided by the form that it prints and, where they differ, by the "
-    "defaults of this library; differences within two standard errors are not decided."
+    "Each claim of a paper is decided by the form that it prints and, where they differ, by ours; "
+    "differences within two standard errors are not decided. The counts of a paper's claims are by "
+    "its own form where there is one. What this library adds, and checks of these programs against "
+    "limits that we set, are counted apart."
 )
 
 
@@ -140,13 +143,15 @@ def write_page(path: Path, names: Sequence[str], folder: Path, command: str) -> 
         beside, written = f"{path.stem}/", _copy(names, folder, path.with_suffix(""))
     stamps = {name: read_stamp(folder / f"{name}.md") or {} for name in names}
     lines: list[str] = []
-    paper = OTHERS
-    for name in sorted(names, key=lambda name: _order(_paper(name))):
-        if paper != _paper(name) or not lines:
-            paper = _paper(name)
+    for paper in (*PAPERS, OTHERS):
+        mine = [name for name in names if _paper(name) == paper]
+        if mine:
+            texts = [(folder / f"{name}.md").read_text(encoding="utf-8") for name in mine]
             lines += [f"## {paper.heading}", "", f"{paper.citation}.", "", paper.paragraph, ""]
-        text = (folder / f"{name}.md").read_text(encoding="utf-8")
-        lines.append(_section(name, text, stamps[name], beside))
+            lines += [f"* [{text.splitlines()[0].lstrip('# ')}](#{name})"
+                      for name, text in zip(mine, texts, strict=True)]  # fmt: skip
+            lines += ["", *(_section(name, text, stamps[name], beside)
+                            for name, text in zip(mine, texts, strict=True))]  # fmt: skip
     head = (
         "# Results\n\nOur results beside those of the papers, with a verdict on each claim. "
         f"Written by\n\n    {command}\n\nwith arrivals {arrivals.__version__}; finished studies "
@@ -161,7 +166,9 @@ def _copy(names: Sequence[str], folder: Path, target: Path) -> list[Path]:
     target.mkdir(exist_ok=True)
     copies = []
     for name in names:
-        for source in (folder / f"{name}.csv", *sorted(folder.glob(f"{name}-*.png"))):
+        page = (folder / f"{name}.md").read_text(encoding="utf-8")
+        pictures = [picture for _, picture in PICTURE.findall(page)]
+        for source in (folder / one for one in (f"{name}.csv", *pictures)):
             with atomic_write(target / source.name, binary=True) as file:
                 file.write(source.read_bytes())
             copies.append(target / source.name)
@@ -170,17 +177,18 @@ def _copy(names: Sequence[str], folder: Path, target: Path) -> list[Path]:
 
 def _summary(stamps: Mapping[str, Mapping[str, Any]]) -> str:
     """Return the table of claims: how many of each paper hold, do not, and are not decided."""
-    lines = ["| | claims of the paper | hold | do not | not decided | ours hold | checks pass |",
+    lines = ["| | claims of the paper | hold | do not | not decided | ours: hold / do not / not "
+             "decided | checks: pass / fail / not decided |",
              "| --- | --- | --- | --- | --- | --- | --- |"]  # fmt: skip
     for paper in (*PAPERS, OTHERS):
         mine = [s.get("verdicts", {}) for name, s in stamps.items() if _paper(name) == paper]
         if mine:
-            paper_s, ours, checks = (
+            paper_s, *own = (
                 np.sum([verdicts.get(source, (0, 0, 0)) for verdicts in mine], axis=0)
                 for source in SOURCES
             )
             cells = [paper_s.sum(), *paper_s] if paper_s.any() else ["-"] * 4
-            others = [f"{own[0]} of {own.sum()}" if own.any() else "-" for own in (ours, checks)]
+            others = [" / ".join(map(str, counted)) if counted.any() else "-" for counted in own]
             heading = f"[{paper.heading}](#{_anchor(paper.heading)})"
             lines.append(f"| {' | '.join(map(str, [heading, *cells, *others]))} |")
     return "\n".join(lines) + "\n"
@@ -197,10 +205,6 @@ def _anchor(heading: str) -> str:
     return re.sub(r"[^a-z0-9 -]", "", heading.lower()).replace(" ", "-")
 
 
-def _order(paper: Paper) -> int:
-    return (*PAPERS, OTHERS).index(paper)
-
-
 def _paper(name: str) -> Paper:
     prefix = name.partition("-")[0]
     return next((paper for paper in PAPERS if paper.prefix == prefix), OTHERS)
@@ -210,7 +214,7 @@ def _section(name: str, text: str, stamp: Mapping[str, Any], beside: str) -> str
     """Return a study's page one level deeper, with links to its table and pictures."""
     title, *lines = text.splitlines()
     body = "\n".join(line for line in lines if not line.startswith(MARK)).strip()
-    body = re.sub(r"\n{3,}", "\n\n", re.sub(r"!\[(.*?)\]\((.*?)\)", rf"![\1]({beside}\2)", body))
+    body = re.sub(r"\n{3,}", "\n\n", PICTURE.sub(rf"![\1]({beside}\2)", body))
     origin = ""
     if stamp:
         runs = f"{stamp['runs']} run{'s' * (stamp['runs'] != 1)}"

@@ -12,7 +12,7 @@ from arrivals.measurement_models.signal_strength.path_loss import slopes
 from arrivals.measurements import real_numbers
 from arrivals.messages import shown
 from arrivals.trackers.rss.inference.joint_posterior import JointPosterior
-from arrivals.typing import Bool, Float
+from arrivals.typing import Bool, Float, Int
 from arrivals.validation import items
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ def most_informative(problem: JointPosterior, n: int) -> Bool:
     return used
 
 
-def update_by_cells(tracker: RSSTracker, z: ArrayLike, cells: Sequence[ArrayLike]) -> None:
+def update_by_cells(tracker: RSSTracker, z: ArrayLike | None, cells: Sequence[ArrayLike]) -> None:
     """Update a tracker by one cell of sensors after the other.
 
     Each cell needs its own readings and the posterior of the cell before it: means and
@@ -89,15 +89,15 @@ def update_by_cells(tracker: RSSTracker, z: ArrayLike, cells: Sequence[ArrayLike
     tracker : RSSTracker
         With sources; it has the posterior of the last cell afterwards, and the sum of the log
         likelihoods.
-    z : array_like, shape (n_sensors,)
-        Readings, Np; NaN where missing.
+    z : array_like, shape (n_sensors,), or None
+        Readings, Np; NaN where missing, None if all are.
     cells : sequence of array_like
         Indices of the sensors of each cell.
 
     Raises
     ------
     ValueError
-        If a sensor is in two cells.
+        If a sensor is in two cells, there is no such sensor, or the readings have another shape.
 
     References
     ----------
@@ -115,15 +115,35 @@ def update_by_cells(tracker: RSSTracker, z: ArrayLike, cells: Sequence[ArrayLike
     >>> tracker.estimate.position.round(0)
     array([[-25.,  10.]])
     """
-    parts = [np.asarray(cell, dtype=np.int64) for cell in items("cells", cells)]
-    every = np.concatenate(parts)
-    if len(np.unique(every)) < len(every):
-        raise ValueError(f"cells must not share sensors; got {shown(every)}")
-    readings, total, elapsed = real_numbers("z", z), 0.0, tracker.elapsed
+    n = tracker.measurement.dim_z
+    parts = _disjoint(cells, n)
+    if z is None:
+        tracker.update(None)
+        return
+    readings = real_numbers("z", z)
+    if readings.shape != (n,):
+        raise ValueError(f"z must have shape ({n},); got {readings.shape}")
+    total, elapsed = 0.0, tracker.elapsed
     for part in parts:
-        own: Float = np.full(tracker.measurement.dim_z, np.nan)
+        own: Float = np.full(n, np.nan)
         own[part] = readings[part]
         tracker.elapsed = elapsed
         tracker.update(own)
         total += tracker.log_likelihood
     tracker.log_likelihood = total
+
+
+def _disjoint(cells: Sequence[ArrayLike], n_sensors: int) -> list[Int]:
+    """Return the sensors of each cell; raise a ValueError if they are not sets of sensors."""
+    parts = [np.asarray(cell) for cell in items("cells", cells)]
+    wanted = f"cells must be lists of sensors, 0 to {n_sensors - 1}"
+    if not parts:
+        raise ValueError(f"{wanted}; got none")
+    for part in parts:
+        whole = part.ndim == 1 and part.dtype.kind in "iu"
+        if not whole or part.size == 0 or part.min() < 0 or part.max() >= n_sensors:
+            raise ValueError(f"{wanted}; got {shown(part)}")
+    every = np.concatenate(parts)
+    if len(np.unique(every)) < len(every):
+        raise ValueError(f"cells must not share sensors; got {shown(every)}")
+    return [part.astype(np.int64) for part in parts]

@@ -98,9 +98,36 @@ def test_one_cell_is_an_update_and_several_are_near_it() -> None:
     assert four.log_likelihood == pytest.approx(whole.log_likelihood, abs=10)
 
 
-def test_cells_do_not_share_sensors() -> None:
-    with pytest.raises(ValueError, match="cells must not share sensors"):
-        update_by_cells(tracker(), TRIAL.measurements[0], [[0, 1], [1, 2]])
+@pytest.mark.parametrize(
+    ("cells", "message"),
+    [
+        ([[0, 1], [1, 2]], "cells must not share sensors"),
+        ([], "cells must be lists of sensors, 0 to 99; got none"),
+        ([[0], []], "cells must be lists of sensors, 0 to 99; got"),
+        ([[0, 100]], "cells must be lists of sensors, 0 to 99; got"),
+        ([[-1]], "cells must be lists of sensors, 0 to 99; got"),
+        ([[0.5]], "cells must be lists of sensors, 0 to 99; got"),
+        ([0, 1], "cells must be lists of sensors, 0 to 99; got"),
+    ],
+)
+def test_cells_are_disjoint_sets_of_sensors(cells: Any, message: str) -> None:
+    own = tracker()
+    before = own.x
+    with pytest.raises(ValueError, match=message):
+        update_by_cells(own, TRIAL.measurements[0], cells)
+    assert own.x is before
+
+
+def test_readings_of_cells_have_one_number_a_sensor() -> None:
+    with pytest.raises(ValueError, match=r"z must have shape \(100,\); got \(99,\)"):
+        update_by_cells(tracker(), TRIAL.measurements[0][:99], [range(10)])
+
+
+def test_missing_readings_of_cells_are_a_missing_measurement() -> None:
+    cells, whole = tracker(), tracker()
+    update_by_cells(cells, None, [range(50), range(50, 100)])
+    whole.update(None)
+    np.testing.assert_array_equal(cells.x, whole.x)
 
 
 @pytest.mark.parametrize(
