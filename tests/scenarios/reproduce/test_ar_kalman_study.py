@@ -18,6 +18,7 @@ from arrivals.scenarios.reproduce.ar_kalman.experiments import (
     cases,
     start_of,
 )
+from arrivals.scenarios.reproduce.ar_kalman.own_claims import ACCEPTED, within_limits
 from arrivals.scenarios.reproduce.ar_kalman.paper_claims import CLAIMS as AUTOREGRESSIVE
 from arrivals.scenarios.reproduce.ar_kalman.plots import draw_array, draw_pacf
 from arrivals.scenarios.reproduce.ar_kalman.scores import (
@@ -63,6 +64,38 @@ def test_claims_are_decided_by_the_reports_form_and_by_ours() -> None:
     assert both(ar.doubles("rmse", "b", "a"), one | two) == (False, None)
     past = {("rmse", "past", "a"): 2.0 + JITTER[:4]}
     assert both(ar.better_than("past", "a"), one | past) == (False, True)
+    near = fabricated("rmse", "c", 1.25, 1.0)
+    assert both(ar.same("rmse", "c", "a"), one | near) == (False, None)
+
+
+def test_numbers_name_their_parts() -> None:
+    results = fabricated("rmse", "a", 1.0, 3.0) | fabricated("rmse", "b", 2.0, 2.5)
+    results |= fabricated("ar error", "a", 1.0, 1.0) | fabricated("ar error", "b", 4.0, 4.0)
+    numbers = {
+        decide(results).numbers  # type: ignore[union-attr]  # all parts are there
+        for decide in (
+            ar.under("rmse", 2.5, "a", "b")[1],
+            ar.lower("rmse", "a", "b")[1],
+            ar.grows_more("b", "a")[1],
+        )
+    }
+    assert numbers == {
+        "a: 1 ± 0.03; b: 2 ± 0.03 degrees",
+        "a: 1; b: 2 degrees, paired difference -1.00 ± 0.00",
+        "the error grows by 1.00 octaves of the directions, 2.00 of the AR models, "
+        "difference -1.00 ± 0.01",
+    }
+
+
+def test_few_runs_do_not_decide_shares_and_limits() -> None:
+    failed = {("rmse", OURS, "a"): np.array([9.0, 9.0, 9.0, 1.0])}
+    assert holds(ar.fails(2.5, "a")[1], failed) is None
+    medians = {("rmse", OURS, name): 0.5 * limit * np.ones(4) for name, limit in ACCEPTED.items()}
+    assert holds(within_limits, medians)
+    medians["rmse", OURS, "M = 2"] *= np.array([1.0, 1.0, 9.0, 9.0])
+    assert holds(within_limits, medians) is None
+    medians["rmse", OURS, "M = 2"] = np.full(4, 9.0)
+    assert holds(within_limits, medians) is False
 
 
 def test_bias_spread_and_growth() -> None:
@@ -81,9 +114,12 @@ def test_literal_form_time_and_order() -> None:
     results = {("rmse", LITERAL, "a"): 6.0 + JITTER, ("rmse", LITERAL, "b"): 4.0 + JITTER}
     assert holds(ar.literal_fails(5.0, "a"), results)
     assert holds(ar.literal_fails(5.0, "a", "b"), results) is False
-    timed = {("cpu ms", OURS, "a"): np.array([1.0]), ("cpu ms", REPORT, "a"): np.array([9.0]),
+    timed = {("cpu ms", OURS, "a"): np.array([1.0, 1.1]),
+             ("cpu ms", REPORT, "a"): np.array([9.0, 9.1]),
              ("duration ms", "", "a"): np.array([3.75])}  # fmt: skip
     assert both(ar.in_real_time("a"), timed) == (False, True)
+    timed["cpu ms", OURS, "a"] = np.array([3.0, 3.0])
+    assert holds(ar.in_real_time("a")[1], timed) is None
     decision = ar.order_of_voices(pacf_of_voices())
     assert decision is not None
     assert decision.holds is False
