@@ -6,7 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
+from arrivals.scenarios.reproduce import studies
 from arrivals.scenarios.reproduce.ar_kalman import decisions as ar
 from arrivals.scenarios.reproduce.ar_kalman import figures_1_to_9
 from arrivals.scenarios.reproduce.ar_kalman.decisions import Both
@@ -30,6 +32,7 @@ from arrivals.scenarios.reproduce.ar_kalman.scores import (
 )
 from arrivals.scenarios.reproduce.claims import Decide
 from arrivals.scenarios.reproduce.paper_claims import CLAIMS
+from arrivals.scenarios.reproduce.pictures import save_picture
 from arrivals.scenarios.reproduce.studies import reproduce
 from arrivals.typing import Float
 
@@ -184,11 +187,20 @@ def test_study_writes_table_claims_and_figures(
     short = [case._replace(scene=case.scene.replace(n_intervals=110))
              for case in cases() if case.name in ("30 dB", "N = 3, d = .5, .5")]  # fmt: skip
     monkeypatch.setattr(figures_1_to_9, "cases", lambda: short)
+    origins: dict[str, str] = {}
+
+    def save(figure: Figure, path: Path, origin: str) -> None:
+        origins[path.stem] = origin
+        save_picture(figure, path, origin)
+
+    monkeypatch.setattr(studies, "save_picture", save)
     written = reproduce("ar-kf", tmp_path, runs=2)
     names = ["array", "fig1", "fig2", "fig3", "pacf"]
     assert [path.name for path in written[2:]] == [f"ar-kf-{name}.png" for name in names]
     page = (tmp_path / "ar-kf.md").read_text()
     assert page.count("\n| ") == 2 + len(short)
     assert page.count("* Fig. 1: the AR coefficients converge") == 1
+    assert origins["ar-kf-array"].startswith("sketch of the sensors, no data")
+    assert "lines: run 0; bands: 10 to 90 % of 2 runs" in origins["ar-kf-fig3"]
     left_out = next(line for line in page.splitlines() if "Fig. 7" in line)
     assert "**Not decided**" in left_out  # of figures that were not run
