@@ -29,6 +29,7 @@ SPEECH = {"regression__forgetting": 0.98, "regression__ar_forgetting": 0.99,
           "regression__ridge": 5.0, "gate": 0.3, "noise__adapt_process_noise": False}  # fmt: skip
 STATIC, NOISY = {"regression__forgetting": 0.95}, {"regression__forgetting": 0.99}
 FAST = {"regression__forgetting": 0.9, "interval": 3}
+WIDE = (30.0, 60.0, 75.0)  # degrees, of a pair of sources on both sides
 STILL, MOVING = 100 * 30, 40 * 30  # snapshots before the first one that is scored
 
 
@@ -134,6 +135,13 @@ def _of_statements() -> list[Experiment]:
         ),
         Experiment(0, "3 sources, 3 sensors", three, NOISY, 3),
         *(Experiment(0, f"{d} degrees apart", apart[d], NOISY, d / 4) for d in apart),
+        Experiment(
+            0, "close, 30 dB", AutoregressiveField(doa_deg=apart[10].doa_deg), STATIC, 2.5
+        ),
+        *(
+            Experiment(0, f"±{d:g}, {one.snr_db:g} dB", one.replace(doa_deg=(-d, d)), params, 10)
+            for one, params in ((AutoregressiveField(), STATIC), (noisy, NOISY)) for d in WIDE
+        ),
         Experiment(0, "still, N = 3", noisy, NOISY | {"interval": 3}, 10),
         Experiment(0, "fast, N = 30", FastSource(), FAST | {"interval": 30}, 5, 120),
         *(

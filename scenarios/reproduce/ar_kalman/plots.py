@@ -79,10 +79,10 @@ def _name_lines(figure: Figure, n_sources: int, has_report: bool) -> None:
 
     grey = "0.4"
     marks: list[Any] = [Line2D([], [], **TRUTH, label="truth")]
-    marks += [Line2D([], [], color=colour, linewidth=1.2, label=f"source {k + 1}, ours")
+    marks += [Line2D([], [], color=colour, linewidth=1.2, label=f"source {k + 1}, ours, run 0")
               for k, colour in enumerate(COLOURS[:n_sources])]  # fmt: skip
     if has_report:
-        marks.append(Line2D([], [], color=grey, **REPORTED, label="report's form"))
+        marks.append(Line2D([], [], color=grey, **REPORTED, label="report's form, run 0 only"))
     marks.append(Patch(color=grey, **BAND, label="ours, 10 to 90 % of the runs"))
     figure.legend(
         handles=marks,
@@ -109,9 +109,8 @@ def draw_array(centred: SourceField, wide: SourceField) -> Figure:
                 ax.annotate("", (side * d, -height), (0.0, -height),
                             arrowprops={"arrowstyle": "<->", "color": COLOURS[m % 3]})  # fmt: skip
                 ax.plot([side * d] * 2, [0.0, -height], color=COLOURS[m % 3], linewidth=0.7)
-            ax.text(d + 0.04 * x.max(), -height, f"$d_{m + 1}$ = {d:.3g} λ", va="center",
-                    fontsize=9, color=COLOURS[m % 3], zorder=5,
-                    bbox={"color": "white", "pad": 0.5})  # fmt: skip
+            ax.text(1.06 * x.max(), -height, f"$d_{m + 1}$ = {d:.3g} λ", va="center",
+                    fontsize=9, color=COLOURS[m % 3])  # fmt: skip
         ax.plot([0.0, 0.0], [-0.4 - 0.3 * manifold.n_pairs, 0.0], color="0.6", linewidth=0.7)
         ax.plot(x, np.zeros_like(x), "o", color="black", markersize=9, zorder=4)
         _draw_wave(ax, float(manifold.distances[-1]))

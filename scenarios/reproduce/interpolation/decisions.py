@@ -1,41 +1,26 @@
 """Functions that decide the claims on the interpolation-delay filter, from values of every trial.
 
-The paper's form is the one with two taps, "B", beside which the numbers of the loop as printed,
-"literal", are given. Directions and errors are in degrees.
+Directions and errors are in degrees.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import partial
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
 
-from arrivals.scenarios.reproduce.claims import Decide, Decision, below, negative
+from arrivals.scenarios.reproduce.claims import Decision, below, negative
 from arrivals.typing import Float
 
 # Values of the trials by the study's case, such as (source, method, direction)
 Results: TypeAlias = Mapping[tuple[Any, ...], Float]
-Both: TypeAlias = tuple[Decide, Decide]  # by the paper's form, and by ours
 LARGEST = 1.93  # largest error of a mean in the paper's table, degrees
 CLOSE = 1.25  # ratio of variances that are "very close"
 CUT_OFF = 10.0  # degrees, of errors that are compared by their mean square
 NEAR = 2.0  # errors of estimates that have converged, degrees
-
-
-def by_both(decide: Callable[..., Decision | None], ours: str = "E2", **options: Any) -> Both:
-    """Return a function that decides by the paper's form, and one by a form of ours."""
-    return partial(_by_paper, decide, options), partial(decide, ours, **options)
-
-
-def _by_paper(
-    decide: Callable[..., Decision | None], options: Mapping[str, Any], results: Results
-) -> Decision | None:
-    decision, printed = (decide(form, results, **options) for form in ("B", "literal"))
-    if decision is None or printed is None:
-        return decision
-    return Decision(decision.holds, f"{decision.numbers}; as printed {printed.numbers}")
+SAME = 0.5  # difference of means that agree, degrees
+ENOUGH = 30  # equal estimates of every case that count as zero variance
 
 
 def all_of(decisions: Iterable[bool | None]) -> bool | None:
@@ -67,7 +52,7 @@ def accurate(method: str, results: Results, *, source: str) -> Decision | None:
     error = {doa: standard_error(each) for doa, each in ends.items()}
     worst = max(bias, key=lambda doa: abs(bias[doa]))
     holds = all_of(negative(abs(bias[doa]) - LARGEST, error[doa]) for doa in ends)
-    numbers = f"{method} {bias[worst]:+.2f} ± {error[worst]:.2f} degrees at {worst:g}"
+    numbers = f"{method}: error {bias[worst]:+.2f} ± {error[worst]:.2f} degrees at {worst:g}"
     return Decision(holds, numbers)
 
 
@@ -93,7 +78,10 @@ def lower_variance(
 
 
 def zero_variance(method: str, results: Results, *, cases: Iterable[Any] = ()) -> Decision | None:
-    """Decide that all estimates of a method are equal, in all its cases or in some of a tone."""
+    """Decide that all estimates of a method are equal, in all its cases or in some of a tone.
+
+    Fewer than `ENOUGH` equal estimates of a case do not decide.
+    """
     wanted = set(cases)
     mine = [
         values for (source, name, doa), values in results.items()
@@ -112,9 +100,10 @@ def _all_equal(method: str, cases: Sequence[Float]) -> Decision | None:
     if not cases:
         return None
     zero = [bool(np.ptp(values) < 1e-9) for values in cases]
-    highest = max(float(values.var(ddof=1)) for values in cases)
-    numbers = f"{method} in {sum(zero)} of {len(zero)} cases, at most {highest:.3g} degrees²"
-    return Decision(all(zero), numbers)
+    highest = 0.0 if all(zero) else max(float(values.var(ddof=1)) for values in cases)
+    numbers = f"{method}: zero in {sum(zero)} of {len(zero)} cases, at most {highest:.2g} degrees²"
+    enough = min(map(len, cases)) >= ENOUGH
+    return Decision((True if enough else None) if all(zero) else False, numbers)
 
 
 def percentage_within(
@@ -134,12 +123,16 @@ def variances_within(
     method: str, results: Results, *, source: str, low: float, high: float
 ) -> Decision | None:
     """Decide that the variances of all directions are within a range."""
-    variances = [float(each.var(ddof=1)) for each in ends_of(results, source, method).values()]
-    if not variances:
+    ends = ends_of(results, source, method)
+    if not ends:
         return None
-    runs = len(next(iter(ends_of(results, source, method).values())))
-    relative = np.sqrt(2 / (runs - 1))  # of normal errors
-    holds = all_of(_within(v, v * relative, low, high) for v in variances)
+    variances = [float(each.var(ddof=1)) for each in ends.values()]
+    # the larger one of the error for normal estimates and that of their squared deviations
+    errors = [
+        max(v * np.sqrt(2 / (len(each) - 1)), standard_error((each - each.mean()) ** 2))
+        for v, each in zip(variances, ends.values(), strict=True)
+    ]
+    holds = all_of(_within(v, e, low, high) for v, e in zip(variances, errors, strict=True))
     return Decision(holds, f"{method} {min(variances):.3g} to {max(variances):.3g} degrees²")
 
 
@@ -148,33 +141,36 @@ def _within(value: float, error: float, low: float, high: float) -> bool | None:
 
 
 def published_means(
-    method: str, results: Results, *, published: Sequence[tuple[float, float]]
+    method: str, results: Results, *, published: Sequence[tuple[float, float]], source: str
 ) -> Decision | None:
-    """Decide that the paper's means are within two standard errors of those of a tone."""
-    ends = ends_of(results, "tone", method)
+    """Decide that the paper's means and those of a source differ by less than `SAME`."""
+    ends = ends_of(results, source, method)
     if not ends:
         return None
-    off, far = [], []
+    off, errors = [], []
     for (mean, variance), each in zip(published, ends.values(), strict=False):
-        error = np.sqrt(variance / 100 + each.var(ddof=1) / len(each))  # 100 simulations
+        errors.append(float(np.sqrt(variance / 100 + each.var(ddof=1) / len(each))))  # 100 runs
         off.append(mean - float(each.mean()))
-        far.append(abs(off[-1]) > 2 * error + 5e-3)
-    largest = max(off, key=abs)
-    return Decision(
-        not any(far),
-        f"{method}: the paper's are within two standard errors at {len(far) - sum(far)} of "
-        f"{len(far)} directions, {largest:+.2f} degrees away at most",
-    )
+    holds = all_of(negative(abs(d) - SAME, e) for d, e in zip(off, errors, strict=True))
+    means = ", ".join(f"{d:+.2f}" for d in off)
+    return Decision(holds, f"{method}: printed minus found {means} degrees")
 
 
-def smaller_at_75(method: str, results: Results) -> Decision | None:
-    """Decide that the variance at 75 degrees is below that at 15, for a tone."""
-    ends = ends_of(results, "tone", method)
+def smaller_at_75(method: str, results: Results, *, source: str) -> Decision | None:
+    """Decide that the variance at 75 degrees is below that at 15."""
+    ends = ends_of(results, source, method)
     if not {15.0, 75.0} <= set(ends):
         return None
     first, second = ((ends[doa] - ends[doa].mean()) ** 2 for doa in (75.0, 15.0))
-    decision = below(first, second, "degrees²")
-    return Decision(decision.holds, f"{method} {decision.numbers}")
+    holds, spread = _paired(first, second)
+    numbers = f"{method} {first.mean():.3g} at 75 and {second.mean():.3g} degrees² at 15"
+    return Decision(holds, f"{numbers}, {spread}")
+
+
+def _paired(first: Float, second: Float) -> tuple[bool | None, str]:
+    """Return whether one figure is below another one in the same trials, and the difference."""
+    decision = below(first, second)
+    return decision.holds, decision.numbers.partition(", ")[2]
 
 
 # -- Figs 2 to 8: errors by (figure's case, method, ...) ---------------------------------------
@@ -195,8 +191,8 @@ def mostly_near(
     near = np.abs(errors) < limit
     share = float(near.mean())
     spread = float(np.sqrt((share * (1 - share) + 0.25 / len(near)) / len(near)))
-    median = f"median {np.median(np.abs(errors)):.2g} {unit}".rstrip()
-    return Decision(negative(0.5 - share, spread), f"{method} {share:.0%}, {median}")
+    median = f"median error {np.median(np.abs(errors)):.2g} {unit}".rstrip()
+    return Decision(negative(0.5 - share, spread), f"{method} {share:.0%} of the trials, {median}")
 
 
 def smaller(
@@ -207,8 +203,10 @@ def smaller(
     first, second = ([each for each in one if each is not None] for one in found)
     if not len(first) == len(second) == len(cases):
         return None
-    decision = below(np.mean(first, axis=0), np.mean(second, axis=0), unit)
-    return Decision(decision.holds, f"{method} and {than} {decision.numbers}")
+    mine, others = np.mean(first, axis=0), np.mean(second, axis=0)
+    holds, spread = _paired(mine, others)
+    numbers = f"{method} {mine.mean():.3g}, {than} {others.mean():.3g} {unit}"
+    return Decision(holds, f"{numbers}, {spread}")
 
 
 def rms_below(
@@ -218,17 +216,44 @@ def rms_below(
 
     Errors are cut off at `CUT_OFF`: else the few trials of scans that take a side lobe decide.
     """
-    found = [[results.get((*case, name)) for case in cases] for name in (method, than)]
-    first, second = (
-        [np.minimum(np.abs(each), CUT_OFF) ** 2 for each in one if each is not None]
-        for one in found
-    )
-    if not len(first) == len(second) == len(cases):
+    first, second = (_squares_of(results, name, cases, False) for name in (method, than))
+    if first is None or second is None:
         return None
-    d = np.mean(first, axis=0) - np.mean(second, axis=0)
+    d = first - second
     rms = [float(np.sqrt(np.mean(each))) for each in (first, second)]
     numbers = f"{method} {rms[0]:.3g}, {than} {rms[1]:.3g} degrees"
     return Decision(negative(float(d.mean()), standard_error(d)), numbers)
+
+
+def variance_below(
+    method: str,
+    results: Results,
+    *,
+    than: str,
+    cases: Sequence[tuple[Any, ...]],
+    factor: float = 1.0,
+) -> Decision | None:
+    """Decide that a variance, mean of several cases, is below `factor` times another one.
+
+    Deviations from the mean are cut off at `CUT_OFF`.
+    """
+    first, second = (_squares_of(results, name, cases, True) for name in (method, than))
+    if first is None or second is None:
+        return None
+    d = first - factor * second
+    numbers = f"{method} {first.mean():.3g}, {than} {second.mean():.3g} degrees²"
+    return Decision(negative(float(d.mean()), standard_error(d)), numbers)
+
+
+def _squares_of(
+    results: Results, method: str, cases: Sequence[tuple[Any, ...]], centred: bool
+) -> Float | None:
+    """Return the squared errors of each trial, or deviations from the mean, averaged over cases."""
+    found = [results.get((*case, method)) for case in cases]
+    off = [each - centred * each.mean() for each in found if each is not None]
+    if not off or len(off) < len(cases):
+        return None
+    return np.asarray(np.mean([np.minimum(np.abs(each), CUT_OFF) ** 2 for each in off], axis=0))
 
 
 def near_bound(

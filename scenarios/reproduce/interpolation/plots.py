@@ -16,15 +16,16 @@ if TYPE_CHECKING:
 
 NAMES = {
     "literal": "loop as printed (literal)",
-    "frozen": "loop, index of (4) (frozen)",
+    "frozen": "the paper's loop (frozen)",
     "B": "two taps (B)",
-    "C": "eight taps (C)",
+    "C": "eight taps, default (C)",
     "D": "four baselines (D)",
     "E": "joint filter (E)",
     "E2": "joint filter (E2)",
     "conventional": "conventional",
     "mvdr": "MVDR",
 }
+LEAVES = "a bar that leaves the logarithmic axis reaches 0"  # for captions
 COLOURS = {"literal": "#8c564b", "frozen": "#e377c2", "B": "#d62728", "C": "#ff7f0e",
            "D": "#9467bd", "E": "#2ca02c", "E2": "#2ca02c", "conventional": "#1f77b4",
            "mvdr": "#17becf"}  # fmt: skip
@@ -54,11 +55,14 @@ def draw_band(ax: Axes, x: Any, paths: Float, method: str, **other: Any) -> None
 
 
 def draw_rmse(ax: Axes, x: Any, errors: Float, method: str) -> None:
-    """Draw the RMSE of the trials, (runs, n), with two standard errors of the mean square."""
+    """Draw the RMSE of the trials, (runs, n), with two standard errors of the mean square.
+
+    A bar that reaches zero leaves a logarithmic axis.
+    """
     squares = np.square(errors)
     mean = squares.mean(axis=0)
     error = 2 * squares.std(axis=0, ddof=1) / np.sqrt(len(squares))
-    low, high = np.sqrt(np.maximum(mean - error, mean / 16)), np.sqrt(mean + error)
+    low, high = np.sqrt(np.maximum(mean - error, 0.0)), np.sqrt(mean + error)
     rmse = np.sqrt(mean)
     ax.errorbar(x, rmse, (rmse - low, high - rmse), capsize=2, **style(method))
 

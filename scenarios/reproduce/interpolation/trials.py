@@ -46,7 +46,7 @@ def draws(scenario: InterpolationScenario, runs: int, seed: int) -> Float:
 def tracker(
     measurement: ArraySamples, method: str, start_deg: float, n_steps: int, **params: Any
 ) -> InterpolationEKF:
-    """Make a filter of the studies: the paper's form for "B", a fourth of the record to acquire.
+    """Make a filter of the studies, with a fourth of the record to acquire.
 
     The paper's correlation is that of a flat band, also for tones. The joint filter "E" starts
     within the main lobe, with a standard deviation of 0.08 in the sine.

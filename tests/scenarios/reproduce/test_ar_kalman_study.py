@@ -6,7 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
+from arrivals.scenarios.reproduce import studies
 from arrivals.scenarios.reproduce.ar_kalman import decisions as ar
 from arrivals.scenarios.reproduce.ar_kalman import figures_1_to_9
 from arrivals.scenarios.reproduce.ar_kalman.decisions import Both
@@ -18,6 +20,7 @@ from arrivals.scenarios.reproduce.ar_kalman.experiments import (
     cases,
     start_of,
 )
+from arrivals.scenarios.reproduce.ar_kalman.own_claims import ACCEPTED, within_limits
 from arrivals.scenarios.reproduce.ar_kalman.paper_claims import CLAIMS as AUTOREGRESSIVE
 from arrivals.scenarios.reproduce.ar_kalman.plots import draw_array, draw_pacf
 from arrivals.scenarios.reproduce.ar_kalman.scores import (
@@ -29,6 +32,7 @@ from arrivals.scenarios.reproduce.ar_kalman.scores import (
 )
 from arrivals.scenarios.reproduce.claims import Decide
 from arrivals.scenarios.reproduce.paper_claims import CLAIMS
+from arrivals.scenarios.reproduce.pictures import save_picture
 from arrivals.scenarios.reproduce.studies import reproduce
 from arrivals.typing import Float
 
@@ -63,6 +67,38 @@ def test_claims_are_decided_by_the_reports_form_and_by_ours() -> None:
     assert both(ar.doubles("rmse", "b", "a"), one | two) == (False, None)
     past = {("rmse", "past", "a"): 2.0 + JITTER[:4]}
     assert both(ar.better_than("past", "a"), one | past) == (False, True)
+    near = fabricated("rmse", "c", 1.25, 1.0)
+    assert both(ar.same("rmse", "c", "a"), one | near) == (False, None)
+
+
+def test_numbers_name_their_parts() -> None:
+    results = fabricated("rmse", "a", 1.0, 3.0) | fabricated("rmse", "b", 2.0, 2.5)
+    results |= fabricated("ar error", "a", 1.0, 1.0) | fabricated("ar error", "b", 4.0, 4.0)
+    numbers = {
+        decide(results).numbers  # type: ignore[union-attr]  # all parts are there
+        for decide in (
+            ar.under("rmse", 2.5, "a", "b")[1],
+            ar.lower("rmse", "a", "b")[1],
+            ar.grows_more("b", "a")[1],
+        )
+    }
+    assert numbers == {
+        "a: 1 ± 0.03; b: 2 ± 0.03 degrees",
+        "a: 1; b: 2 degrees, paired difference -1.00 ± 0.00",
+        "the error grows by 1.00 octaves of the directions, 2.00 of the AR models, "
+        "difference -1.00 ± 0.01",
+    }
+
+
+def test_few_runs_do_not_decide_shares_and_limits() -> None:
+    failed = {("rmse", OURS, "a"): np.array([9.0, 9.0, 9.0, 1.0])}
+    assert holds(ar.fails(2.5, "a")[1], failed) is None
+    medians = {("rmse", OURS, name): 0.5 * limit * np.ones(4) for name, limit in ACCEPTED.items()}
+    assert holds(within_limits, medians)
+    medians["rmse", OURS, "M = 2"] *= np.array([1.0, 1.0, 9.0, 9.0])
+    assert holds(within_limits, medians) is None
+    medians["rmse", OURS, "M = 2"] = np.full(4, 9.0)
+    assert holds(within_limits, medians) is False
 
 
 def test_bias_spread_and_growth() -> None:
@@ -81,9 +117,12 @@ def test_literal_form_time_and_order() -> None:
     results = {("rmse", LITERAL, "a"): 6.0 + JITTER, ("rmse", LITERAL, "b"): 4.0 + JITTER}
     assert holds(ar.literal_fails(5.0, "a"), results)
     assert holds(ar.literal_fails(5.0, "a", "b"), results) is False
-    timed = {("cpu ms", OURS, "a"): np.array([1.0]), ("cpu ms", REPORT, "a"): np.array([9.0]),
+    timed = {("cpu ms", OURS, "a"): np.array([1.0, 1.1]),
+             ("cpu ms", REPORT, "a"): np.array([9.0, 9.1]),
              ("duration ms", "", "a"): np.array([3.75])}  # fmt: skip
     assert both(ar.in_real_time("a"), timed) == (False, True)
+    timed["cpu ms", OURS, "a"] = np.array([3.0, 3.0])
+    assert holds(ar.in_real_time("a")[1], timed) is None
     decision = ar.order_of_voices(pacf_of_voices())
     assert decision is not None
     assert decision.holds is False
@@ -148,11 +187,20 @@ def test_study_writes_table_claims_and_figures(
     short = [case._replace(scene=case.scene.replace(n_intervals=110))
              for case in cases() if case.name in ("30 dB", "N = 3, d = .5, .5")]  # fmt: skip
     monkeypatch.setattr(figures_1_to_9, "cases", lambda: short)
+    origins: dict[str, str] = {}
+
+    def save(figure: Figure, path: Path, origin: str) -> None:
+        origins[path.stem] = origin
+        save_picture(figure, path, origin)
+
+    monkeypatch.setattr(studies, "save_picture", save)
     written = reproduce("ar-kf", tmp_path, runs=2)
     names = ["array", "fig1", "fig2", "fig3", "pacf"]
     assert [path.name for path in written[2:]] == [f"ar-kf-{name}.png" for name in names]
     page = (tmp_path / "ar-kf.md").read_text()
     assert page.count("\n| ") == 2 + len(short)
     assert page.count("* Fig. 1: the AR coefficients converge") == 1
+    assert origins["ar-kf-array"].startswith("sketch of the sensors, no data")
+    assert "lines: run 0; bands: 10 to 90 % of 2 runs" in origins["ar-kf-fig3"]
     left_out = next(line for line in page.splitlines() if "Fig. 7" in line)
     assert "**Not decided**" in left_out  # of figures that were not run

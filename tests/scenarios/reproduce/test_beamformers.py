@@ -6,12 +6,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.collections import LineCollection
 
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.recordings.sample_stream import band_samples, live_samples, track_samples
 from arrivals.scenarios import create, read
 from arrivals.scenarios.reproduce.interpolation import convergence, rmse, table_1
 from arrivals.scenarios.reproduce.interpolation.beamformers import scan
+from arrivals.scenarios.reproduce.interpolation.plots import draw_rmse, make_figure
 from arrivals.scenarios.reproduce.interpolation.trials import (
     SOURCES,
     bound_deg,
@@ -105,6 +107,27 @@ def test_study_writes_table_page_and_figures(name: str, tmp_path: Path) -> None:
     page = written[1].read_text()
     assert "**Claims of the paper**" in page
     assert "by the paper's form" in page
+
+
+def test_pictures_say_what_they_show(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        table_1, "final_directions", lambda scene, runs, *_: scene.doa_deg + np.arange(runs)
+    )
+    report = table_1.table1(2, 0)
+    assert report.captions["fig1"] == "sketch of the array, no data"
+    titles = [ax.get_title() for ax in report.figures["table1"].axes]
+    assert titles[0] == "coupled tones: with the loop as printed"
+    assert titles[5] == "a tone: variance"
+    assert any("coupled tones, frozen: " in remark for remark in report.remarks)
+
+
+def test_error_bar_that_reaches_zero_leaves_a_logarithmic_axis() -> None:
+    _, (ax,) = make_figure(1, 1, (4.0, 3.0))
+    draw_rmse(ax, [1.0, 2.0], np.array([[1.0, 0.01], [1.1, 0.01], [0.9, 3.0]]), "B")
+    (bars,) = [part for part in ax.collections if isinstance(part, LineCollection)]
+    lowest = [segment[0, 1] for segment in bars.get_segments()]
+    assert lowest[0] == pytest.approx(np.sqrt(1.00667 - 2 * 0.2003 / np.sqrt(3)), abs=1e-3)
+    assert lowest[1] == pytest.approx(0.0, abs=1e-12)
 
 
 def test_interpolation_scenario_invalid_parameter_is_rejected() -> None:
