@@ -154,6 +154,18 @@ def negative(mean: float, error: float) -> bool | None:
     return mean < 0 if abs(mean) > 2 * error else None
 
 
+def all_of(decisions: Iterable[bool | None]) -> bool | None:
+    """Return True if all hold, False if one does not, else None.
+
+    Examples
+    --------
+    >>> all_of([True, None]), all_of([None, False])
+    (None, False)
+    """
+    found = set(decisions)
+    return False if False in found else None if None in found else True
+
+
 def below(lower: ArrayLike, higher: ArrayLike, unit: str = "") -> Decision:
     """Decide by paired runs that one figure is below another.
 

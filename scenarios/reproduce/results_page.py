@@ -61,8 +61,10 @@ PAPERS = (
         "K. Radhakrishnan, A. Unnikrishnan and K. G. Balakrishnan, *Performance evaluation of an "
         "algorithm for estimation of DOA using model estimation technique*",
         "An extended Kalman filter of the delay between sensors, which interpolates between "
-        "samples. B to E2 are forms of the filter, from the paper's two taps (B) to a phasor on "
-        "all sensors (E), and E on the record twice (E2). literal is the paper's loop as printed.",
+        "samples. literal is the paper's loop as printed; frozen is that loop with the index of "
+        "(4), and is judged as the paper's form. B renews the coefficients at each sensor, C, the "
+        "default, has eight taps and both directions along the array, D more baselines, E a phasor "
+        "on all sensors, and E2 is E on the record twice.",
     ),
     Paper(
         "rss",

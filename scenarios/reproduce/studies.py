@@ -50,6 +50,7 @@ RUNS: dict[str, tuple[int, int]] = {
     "any-array": (20, 3),
     "calibration": (30, 2),
     "ar-kf": (100, 4),
+    "interpolation-table2": (10, 4),
     "rss": (1000, 100),
     "rss-doppler": (100, 12),
     "rss-envelope": (300, 40),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, TypeAlias
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from arrivals.scenarios.reproduce.ar_kalman.experiments import INNER, LITERAL, OURS, REPORT
 from arrivals.scenarios.reproduce.ar_kalman.scores import Results
-from arrivals.scenarios.reproduce.claims import Decide, Decision, below, negative
+from arrivals.scenarios.reproduce.claims import Decide, Decision, all_of, below, negative
 from arrivals.typing import Float
 
 Both: TypeAlias = tuple[Decide, Decide]  # by the report's form, and by ours
@@ -18,18 +18,6 @@ CONVERGED, HALF = 0.5, 2.5  # degrees; half of the initial error of moving sourc
 DIFFERENCE = 0.25  # of a score: smaller ones are not significant
 SYSTEMATIC = 0.2  # of a processor time: differences between machines and loads
 VOICES = ("voice 1", "voice 2")
-
-
-def all_of(decisions: Iterable[bool | None]) -> bool | None:
-    """Return True if all hold, False if one does not, else None.
-
-    Examples
-    --------
-    >>> all_of([True, None]), all_of([None, False])
-    (None, False)
-    """
-    found = set(decisions)
-    return False if False in found else None if None in found else True
 
 
 def by_both(decide: Callable[..., Decision | None], *args: Any) -> Both:

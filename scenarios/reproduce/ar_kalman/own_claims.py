@@ -7,7 +7,6 @@ from functools import partial
 import numpy as np
 
 from arrivals.scenarios.reproduce.ar_kalman.decisions import (
-    all_of,
     literal_fails,
     paired,
     share_above,
@@ -15,7 +14,7 @@ from arrivals.scenarios.reproduce.ar_kalman.decisions import (
 )
 from arrivals.scenarios.reproduce.ar_kalman.experiments import OURS, REPORT
 from arrivals.scenarios.reproduce.ar_kalman.scores import Results
-from arrivals.scenarios.reproduce.claims import Claim, Decision, negative
+from arrivals.scenarios.reproduce.claims import Claim, Decision, all_of, negative
 
 STUDY = "ar-kf"
 # Largest medians of the RMSE that are accepted, degrees

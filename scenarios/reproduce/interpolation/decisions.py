@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from arrivals.scenarios.reproduce.claims import Decision, below, negative
+from arrivals.scenarios.reproduce.claims import Decision, all_of, below, negative
 from arrivals.typing import Float
 
 # Values of the trials by the study's case, such as (source, method, direction)
@@ -21,18 +21,6 @@ CUT_OFF = 10.0  # degrees, of errors that are compared by their mean square
 NEAR = 2.0  # errors of estimates that have converged, degrees
 SAME = 0.5  # difference of means that agree, degrees
 ENOUGH = 30  # equal estimates of every case that count as zero variance
-
-
-def all_of(decisions: Iterable[bool | None]) -> bool | None:
-    """Return True if all hold, False if one does not, else None.
-
-    Examples
-    --------
-    >>> all_of([True, None]), all_of([None, False])
-    (None, False)
-    """
-    found = set(decisions)
-    return False if False in found else None if None in found else True
 
 
 # -- Table 1: results by (source, method, direction) -------------------------------------------

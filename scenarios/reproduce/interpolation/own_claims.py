@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from arrivals.scenarios.reproduce.claims import Claim, Decision, negative
+from arrivals.scenarios.reproduce.claims import Claim, Decision, all_of, negative
 from arrivals.scenarios.reproduce.interpolation import decisions as itp
 from arrivals.scenarios.reproduce.interpolation.decisions import Results, standard_error
 from arrivals.scenarios.reproduce.interpolation.forms import OURS, PAPER, SOURCE_NAMES
@@ -26,7 +26,7 @@ def index_bias(results: Results) -> Decision | None:
         doa: each - np.rad2deg(np.arcsin(np.sin(np.deg2rad(doa)) - 1 / kappa))
         for doa, each in ends.items()
     }
-    holds = itp.all_of(
+    holds = all_of(
         negative(abs(float(each.mean())) - SMALL, standard_error(each)) for each in off.values()
     )
     means = ", ".join(f"{each.mean():.1f}" for each in ends.values())

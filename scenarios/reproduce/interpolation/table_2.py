@@ -41,7 +41,7 @@ GRID = np.deg2rad(np.arange(-90.0, 91.0))
 def table2(runs: int, seed: int) -> Report:
     """CPU times of 100 simulations, by two readings of the scans, and numbers of operations."""
     scenario = SOURCES["tone"]
-    samples, repeats = draws(scenario, N_SIMULATIONS, seed), max(4, min(runs // 10, 10))
+    samples = draws(scenario, N_SIMULATIONS, seed)
     timed: dict[tuple[str, str], Callable[[Float], Any]] = {
         **{(method, update): partial(_filter, method) for method, update in UPDATES.items()},
         **{(method, reading): partial(final_scans, method=method, reading=reading)
@@ -49,8 +49,8 @@ def table2(runs: int, seed: int) -> Report:
     }  # fmt: skip
     results: dict[tuple[Any, ...], Float] = {}
     for case, function in timed.items():
-        results[(*case, "together")] = _seconds(function, samples, repeats)
-        results[(*case, "one by one")] = _seconds(function, samples[:2, None], repeats)
+        results[(*case, "together")] = _seconds(function, samples, runs)
+        results[(*case, "one by one")] = _seconds(function, samples[:2, None], runs)
     rows = [
         (*case, *(float(results[(*case, way)].mean()) for way in ("together", "one by one")),
          operations(*case), PAPER_S.get(case[0], np.nan))
@@ -58,7 +58,7 @@ def table2(runs: int, seed: int) -> Report:
     ]  # fmt: skip
     remarks = (
         "CPU seconds for 100 simulations of 10 sensors and 100 snapshots, as one array program "
-        f"or one by one (two of them): means of {repeats} timings. These programs are interpreted: "
+        f"or one by one (two of them): means of {runs} timings. These programs are interpreted: "
         "times of one by one are mostly those of calls. The scans search whole degrees, 181 "
         f"directions, without interpolation. Differences below {2 * SYSTEMATIC:.0%} of a time "
         "decide nothing: they depend on the machine.",
@@ -69,10 +69,10 @@ def table2(runs: int, seed: int) -> Report:
         "table to the conventional method; we follow the table.",
     )
     columns = ("method", "update", "s, together", "s, one by one", "operations", "paper, s")
-    title = f"Table 2: execution times of 100 simulations, {repeats} timings"
+    title = f"Table 2: execution times of 100 simulations, {runs} timings"
     return Report(
         title, columns, rows, remarks, {"times": _draw(results)}, results=results,
-        captions={"times": f"means of {repeats} timings, two standard errors"},
+        captions={"times": f"means of {runs} timings, two standard errors"},
     )  # fmt: skip
 
 
@@ -138,13 +138,13 @@ def operations(method: str, update: str) -> float:
     return float(covariance + inverse + beams)
 
 
-def _seconds(function: Callable[[Float], Any], samples: Float, repeats: int) -> Float:
+def _seconds(function: Callable[[Float], Any], samples: Float, runs: int) -> Float:
     """Return CPU seconds for 100 simulations: of all at once, or of each of (n, 1, ...) alone."""
     alone = samples.ndim == 4
     groups = list(samples) if alone else [samples]
     function(groups[0])
     taken = []
-    for _ in range(repeats):
+    for _ in range(runs):
         started = time.process_time()
         for group in groups:
             function(group)
