@@ -18,8 +18,9 @@ from arrivals.scenarios.base import Trial
 from arrivals.scenarios.experiments.workers import parallel_map
 from arrivals.scenarios.metrics.gospa import Gospa, mean_gospa
 from arrivals.scenarios.registry import create
-from arrivals.scenarios.reproduce.claims import Claim, Decision, below
+from arrivals.scenarios.reproduce.claims import Claim, Decision
 from arrivals.scenarios.reproduce.report import Report
+from arrivals.scenarios.reproduce.svalse.decisions import compared
 from arrivals.scenarios.simulations.planar_arrays import Circle
 from arrivals.trackers import NewtonSolver
 from arrivals.trackers.run import Run
@@ -114,7 +115,8 @@ def any_array(runs: int, seed: int) -> Report:
     title = f"Any array: GOSPA over {runs} runs"
     keys = [(case.label, case.method) for case in CASES]
     results = dict(zip(keys, scores[:, :, 0], strict=True))
-    return Report(title, columns, rows, remarks, {"circle": _draw(seed)}, results=results)
+    return Report(title, columns, rows, remarks, {"circle": _draw(seed)}, results=results,
+                  captions={"circle": "SVALSE on the circle, one trial"})  # fmt: skip
 
 
 # Claims on the same draws: (label, method) of the lower and the higher GOSPA, and the claim
@@ -138,8 +140,9 @@ ORDER = [
 ]  # fmt: skip
 
 
-def _decided(low: tuple[str, str], high: tuple[str, str], results: Any) -> Decision:
-    return below(results[low], results[high], "degrees")
+def _decided(low: tuple[str, str], high: tuple[str, str], results: Any) -> Decision | None:
+    n = int(low[1] != high[1])  # what differs: the scene, or the method
+    return compared((low[n], high[n]), results[low], results[high], "degrees")
 
 
 CLAIMS = tuple(

@@ -13,8 +13,10 @@ from arrivals.scenarios.reproduce.claims import Decide, Decision, below, negativ
 from arrivals.scenarios.reproduce.svalse.forms import (
     PAPER_FORM,
     PRINTED_7D,
+    STARTS,
     UNMERGED_7D,
     activation_label,
+    start_label,
 )
 from arrivals.scenarios.reproduce.svalse.published_values import ACTIVATION
 from arrivals.typing import Float
@@ -29,7 +31,10 @@ OFF_GRID = tuple(f"{snr} off grid" for snr in (HIGH[0], HIGH[-1]))
 ALL = tuple(f"{n}: {snr}" for n in (1, 2) for snr in range(0, 45, 5))  # cases of Fig. 10
 PANELS = tuple(activation_label(*pair) for pair in ACTIVATION)[:4]
 PANEL_GOSPA = {activation_label(*pair): known.paper for pair, known in ACTIVATION.items()}
+PANEL_RMSE = {activation_label(*pair): known.paper_rmse for pair, known in ACTIVATION.items()}
 DEFAULT = activation_label(0.25, 0.10)
+TITLES = {"cbf": "CBF", "sbl": "SBL", "ssbl": "SSBL", "valse": "VALSE", "svalse": "SVALSE",
+          "peaks_gnn": "tracked beam peaks"}  # fmt: skip
 
 
 def of_scenario(number: int, cases: Sequence[str]) -> tuple[str, ...]:
@@ -98,10 +103,40 @@ def _lower(
     first: str, second: str, results: Results, *, metric: str, cases: Sequence[str], unit: str
 ) -> Decision | None:
     low, high = (values(results, metric, method, cases) for method in (first, second))
-    if low is None or high is None:
-        return None
+    return None if low is None or high is None else compared((first, second), low, high, unit)
+
+
+def compared(names: tuple[str, str], low: Float, high: Float, unit: str) -> Decision | None:
+    """Decide by paired runs that one figure is below another; name both in the numbers.
+
+    Figures in a unit that starts with a per cent sign are shares. None without a common run.
+
+    Examples
+    --------
+    >>> compared(("svalse", "ssbl"), np.array([0.1, 0.2]), np.array([0.5, 0.6]), "%").numbers
+    'SVALSE: 15; SSBL: 55 %, paired difference -40.00 ± 0.00'
+    """
     both = ~np.isnan(low - high)
-    return below(low[both], high[both], unit) if both.any() else None
+    if not both.any():
+        return None
+    scale = 100.0 if unit.startswith("%") else 1.0
+    decision = below(scale * low[both], scale * high[both], unit)
+    first, second = (title(name) for name in names)
+    means = decision.numbers.replace(" and ", f"; {second}: ", 1)
+    return decision._replace(numbers=f"{first}: {means}")
+
+
+def title(method: str) -> str:
+    """Return the name of a method for a reader, without the form, which the page adds.
+
+    Examples
+    --------
+    >>> title("svalse paper's form"), title("valse from 20 dB"), title("p_d 0, p_a 1")
+    ('SVALSE', 'VALSE from 20 dB', 'p_d 0, p_a 1')
+    """
+    name, _, variant = method.partition(" ")
+    variant = variant.removesuffix("paper's form").removeprefix("by ours ")
+    return f"{TITLES.get(name, name)} {variant}".strip()
 
 
 def below_limit(metric: str, method: str, limit: float, *cases: str, unit: str = "degrees") -> Both:
@@ -125,8 +160,11 @@ def _limited(
     if here is None or not here.size:
         return None
     mean, error = float(here.mean()), standard_error(here)
-    sign = -1 if above else 1
-    return Decision(negative(sign * (mean - limit), error), f"{mean:.3g} ± {error:.2g} {unit}")
+    holds = negative(-(mean - limit) if above else mean - limit, error)
+    scale = 100.0 if unit.startswith("%") else 1.0
+    if unit == "too few or many":
+        mean, unit = abs(mean), "sources too few" if mean < 0 else "sources too many"
+    return Decision(holds, f"{scale * mean:.3g} ± {scale * error:.2g} {unit}")
 
 
 def standard_error(runs: Float) -> float:
@@ -150,7 +188,10 @@ def _published(metric: str, method: str, value: float, results: Results) -> Deci
     if here is None or len(here) < MIN_RUNS:
         return None
     mean, std = float(here.mean()), float(here.std(ddof=1))
-    numbers = f"the paper's run {value:g}, here {mean:.2f}, std of runs {std:.2f} degrees"
+    away = abs(value - mean) / std if std else float(np.inf)
+    numbers = (
+        f"here {mean:.2f} degrees, std of runs {std:.2f}: {away:.1f} deviations away, 2 allowed"
+    )
     return Decision(abs(value - mean) <= 2 * std, numbers)
 
 
@@ -168,8 +209,17 @@ def _mostly(
     if part is None or len(given) < len(rest):
         return None
     others_sum = np.sum(given, axis=0)
-    both = ~np.isnan(others_sum - part)
-    return below(others_sum[both], part[both], "degrees") if both.any() else None
+    return compared(("other parts", metric), others_sum, part, "degrees")
+
+
+def starts(metric: str, other: float, unit: str) -> Both:
+    """Decide that noise that starts at 20 dB has less of a metric than from another level."""
+    by_paper, by_ours = (
+        partial(_lower, start_label(STARTS[1], ours), start_label(other, ours),
+                metric=f"started, {metric}", cases=("",), unit=unit)
+        for ours in (False, True)
+    )  # fmt: skip
+    return by_paper, by_ours
 
 
 def always_converges(method: str) -> Both:
@@ -185,7 +235,7 @@ def _always_converges(method: str, results: Results) -> Decision | None:
     worst = min(shares, key=lambda case: shares[case])
     numbers = f"in {np.mean(list(shares.values())):.1%} of the steps"
     if shares[worst] < 1:
-        numbers += f", at {worst} dB {shares[worst]:.1%}"
+        numbers += f", at worst {shares[worst]:.1%} at {worst} dB"
     return Decision(shares[worst] >= 1, numbers)
 
 
@@ -196,6 +246,21 @@ def as_printed_7d(results: Results) -> Decision | None:
     if here is None or quadrature is None or unmerged is None:
         return None
     value = PANEL_GOSPA[PANELS[3]]
-    numbers = f"the paper's run {value:g}, as printed {here[0]:.2f}, by quadrature "
-    numbers += f"{quadrature[0]:.2f}, without merging {unmerged[0]:.2f} degrees"
+    numbers = f"one run: as printed {here[0]:.2f} degrees, 10 % off allowed; by quadrature "
+    numbers += f"{quadrature[0]:.2f}, without merging {unmerged[0]:.2f}"
     return Decision(bool(abs(here[0] - value) <= value / 10), numbers)
+
+
+def mixture_is_accurate(results: Results) -> Decision | None:
+    """Decide on the mixtures' means, within a quarter of a deviation, and widths, within 10 %."""
+    shift, width = (results.get((metric, "mixture", "")) for metric in ("shift", "width"))
+    if shift is None or width is None:
+        return None
+    median, most = np.percentile(shift, [50, 90])
+    ratio = float(np.median(width))
+    numbers = (
+        f"{len(shift)} densities: means {median:.2f} deviations off the exact ones (0.25 allowed), "
+        f"90 % within {most:.2f}; "
+        f"widths {ratio:.2f} of the exact ones (0.9 to 1.1 allowed); medians"
+    )
+    return Decision(bool(median < 0.25 and abs(ratio - 1) < 0.1), numbers)

@@ -6,7 +6,6 @@ tracker and of its solver, in the order in which they are called.
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -53,6 +52,8 @@ class Operation(NamedTuple):
     ----------
     method : callable
         Method that carries it out.
+    text : str
+        What it does, for the drawing.
     equations : str
     messages : tuple of tuple
         Ends of the arrows: variables, or places of factors.
@@ -61,6 +62,7 @@ class Operation(NamedTuple):
     """
 
     method: Callable[..., Any]
+    text: str
     equations: str
     messages: tuple[tuple[str, str], ...]
     kind: str
@@ -81,22 +83,27 @@ def factors(motion: BernoulliVonMises) -> dict[str, Factor]:
         "walk": Factor(f"walk (61)\n{step}", (0.9, 3.3), ("θ",), "θ"),
         "chain": Factor(chain, (0.9, -1.0), ("s",), "s"),
         "amplitude": Factor("amplitude (6)\nCN(0, τ)", (2.6, 0.1), ("w", "s")),
-        "likelihood": Factor("likelihood (13)\nν", (4.7, 2.25), ("θ", "w")),
+        "likelihood": Factor("likelihood (13)\nν", (5.0, 2.3), ("θ", "w")),
     }
 
 
 SCHEDULE = (
-    Operation(SVALSE.predict_batch, "(62)-(65)", (("walk", "θ"), ("chain", "s")),
-              BELIEF_PROPAGATION),
-    Operation(MultiSnapshotAscent.initialize, "(66)-(68)", (("likelihood", "θ"),), MEAN_FIELD),
-    Operation(MultiSnapshotAscent.choose_support, "(30), (31), (49)-(57)",
+    Operation(SVALSE.predict_batch, "predict the angles and the probabilities of activity",
+              "(62)-(65)", (("walk", "θ"), ("chain", "s")), BELIEF_PROPAGATION),
+    Operation(MultiSnapshotAscent.initialize, "start the angles of new components by the residual",
+              "(66)-(68)", (("likelihood", "θ"),), MEAN_FIELD),
+    Operation(MultiSnapshotAscent.choose_support, "choose the active components; amplitudes follow",
+              "(30), (31), (49)-(57)",
               (("likelihood", "w"), ("amplitude", "w"), ("amplitude", "s")), MEAN_FIELD),
-    Operation(MultiSnapshotAscent.update_variances, "(58), (59)", (), MEAN_FIELD),
-    Operation(MultiSnapshotAscent.update_angles, "(27), (28), (32)-(48)",
-              (("likelihood", "θ"),), MEAN_FIELD),
-    Operation(MultiSnapshotAscent.has_converged, "repeat 3 to 6", (), MEAN_FIELD),
-    Operation(SVALSE.store, "q(θ), q(s) to the next step",
-              (("θ", "next walk"), ("s", "next chain")), BELIEF_PROPAGATION),
+    Operation(MultiSnapshotAscent.update_variances, "fit the variances of noise and amplitudes",
+              "(58), (59)", (), MEAN_FIELD),
+    Operation(MultiSnapshotAscent.update_angles, "update the angles of active components in turn",
+              "(27), (28), (32)-(48)", (("likelihood", "θ"),), MEAN_FIELD),
+    Operation(MultiSnapshotAscent.has_converged, "stop if the reconstruction no longer changes",
+              "else repeat 3 to 6", (), MEAN_FIELD),
+    Operation(SVALSE.store, "report the estimates; keep active and recent components",
+              "q(θ), q(s) to the next step", (("θ", "next walk"), ("s", "next chain")),
+              BELIEF_PROPAGATION),
 )  # fmt: skip
 
 
@@ -111,13 +118,13 @@ def draw_factor_graph(motion: BernoulliVonMises | None = None) -> Figure:
     Examples
     --------
     >>> [ax.get_title() for ax in draw_factor_graph().axes]
-    ['factor graph of component l, two time steps', 'schedule of a time step']
+    ['factor graph (16), two time steps', 'schedule of a time step: the numbers on the left']
     """
     figure, (graph, schedule) = panels(1, 2, (13.0, 5.4))
     _draw_steps(graph, factors(motion or BernoulliVonMises()))
     _draw_schedule(schedule, SCHEDULE)
-    graph.set_title("factor graph of component l, two time steps", fontsize=11)
-    schedule.set_title("schedule of a time step", fontsize=11)
+    graph.set_title("factor graph (16), two time steps", fontsize=11)
+    schedule.set_title("schedule of a time step: the numbers on the left", fontsize=11)
     return figure
 
 
@@ -142,10 +149,10 @@ def _draw_steps(ax: Axes, parts: dict[str, Factor]) -> None:
                     zorder=3)  # fmt: skip
             ax.text(*_at(place, step), f"${_latin(name)}_l$", ha="center", va="center", zorder=4)
         plate: dict[str, Any] = {"facecolor": "none", "edgecolor": "0.75", "linestyle": "--"}
-        corner = _at((0.0, -1.7), step)
-        ax.add_patch(FancyBboxPatch(corner, 5.6, 5.6, boxstyle="round,pad=0.1", **plate))
-        ax.text(*_at((5.5, -1.6), step), f"step {('t', 't + 1')[step]}, l = 1 ... L", ha="right",
-                fontsize=8, color="0.4")  # fmt: skip
+        corner = _at((0.05, -2.0), step)
+        ax.add_patch(FancyBboxPatch(corner, 3.35, 5.9, boxstyle="round,pad=0.1", **plate))
+        ax.text(*_at((3.4, -2.0), step), "l = 1 ... L", ha="right", fontsize=8, color="0.4")
+        ax.text(*_at((5.0, 1.45), step), f"step {('t', 't + 1')[step]}", ha="center", fontsize=9)
     places |= {f"next {name}": _at(parts[name].place, 1) for name in ("walk", "chain")}
     numbers: dict[tuple[str, str, str], list[str]] = {}
     for number, operation in enumerate(SCHEDULE, 1):
@@ -153,8 +160,26 @@ def _draw_steps(ax: Axes, parts: dict[str, Factor]) -> None:
             numbers.setdefault((first, last, operation.kind), []).append(f"{number}")
     for (first, last, colour), of_edge in numbers.items():
         _draw_message(ax, places[first], places[last], ", ".join(of_edge), colour)
-    ax.set(xlim=(-0.4, 2 * WIDTH), ylim=(-2.1, 4.2))
+    _name_boxes(ax)
+    ax.set(xlim=(-0.4, 2 * WIDTH), ylim=(-3.4, 4.2))
     ax.set_axis_off()
+
+
+def _name_boxes(ax: Axes) -> None:
+    """Put the legend of boxes, circles and arrows below the graph."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    marks = [
+        Patch(facecolor=PRIOR, edgecolor="0.3", label="prior densities, one a component"),
+        Patch(facecolor=LIKELIHOOD, edgecolor="0.3", label="likelihood, one for all components"),
+        Line2D([], [], marker="o", markersize=10, color="white", markeredgecolor="0.2",
+               label="random variables"),
+        Patch(facecolor="none", edgecolor="0.75", linestyle="--", label="for l = 1 ... L"),
+        Line2D([], [], color=BELIEF_PROPAGATION, marker=">", label="belief propagation"),
+        Line2D([], [], color=MEAN_FIELD, marker=">", label="mean field"),
+    ]  # fmt: skip
+    ax.legend(handles=marks, loc="lower center", ncols=3, fontsize=8, frameon=False)
 
 
 def _draw_message(ax: Axes, start: Point, end: Point, number: str, colour: str) -> None:
@@ -174,16 +199,12 @@ def _draw_message(ax: Axes, start: Point, end: Point, number: str, colour: str) 
 
 
 def _draw_schedule(ax: Axes, schedule: Sequence[Operation]) -> None:
-    """List the operations: name, equations, and the first line of the method's description."""
+    """List the operations: number, what each does, and the name of the method and equations."""
     for number, operation in enumerate(schedule, 1):
-        y = 1.02 - number / (len(schedule) + 1.6)
-        title = f"{number}  {operation.method.__name__}   {operation.equations}"
-        ax.text(0.02, y, title, fontsize=9.5, fontweight="bold", color=operation.kind)
-        first = (inspect.getdoc(operation.method) or "").splitlines()[0]
-        ax.text(0.06, y - 0.045, first, fontsize=8.5, color="0.25")
-    for y, colour, name in ((0.07, BELIEF_PROPAGATION, "belief propagation between the steps"),
-                            (0.01, MEAN_FIELD, "mean field within a step")):  # fmt: skip
-        ax.text(0.02, y, f"→ {name}", color=colour, fontsize=9)
+        y = 1.04 - number / (len(schedule) + 0.8)
+        ax.text(0.02, y, f"{number}  {operation.text}", fontsize=9.5, color=operation.kind)
+        note = f"{operation.equations}   {operation.method.__qualname__}"
+        ax.text(0.06, y - 0.045, note, fontsize=8.5, color="0.35")
     ax.set(xlim=(0, 1), ylim=(0, 1))
     ax.set_axis_off()
 

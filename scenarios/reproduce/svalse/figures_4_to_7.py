@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from arrivals.scenarios.base import Scenario
+from arrivals.scenarios.base import Scenario, Trial
 from arrivals.scenarios.bounds.snapshot import line_bound
 from arrivals.scenarios.experiments.methods import Method, tracker_name
 from arrivals.scenarios.experiments.monte_carlo import StudySettings, compute_study
@@ -20,17 +20,19 @@ from arrivals.scenarios.reproduce.svalse.decisions import results_of
 from arrivals.scenarios.reproduce.svalse.factor_graph import draw_factor_graph
 from arrivals.scenarios.reproduce.svalse.forms import (
     FORMS,
+    FORMS_SEEN,
     NAN,
     PAPER_FORM,
     PRINTED_7D,
+    STARTS,
     activation_label,
     batch_of,
+    started_at,
     svalse_as_printed,
     svalse_paper_form,
     table_methods,
     unmerged_7d,
     valse_as_printed,
-    valse_from_20_db,
     valse_paper_form,
 )
 from arrivals.scenarios.reproduce.svalse.plots import (
@@ -41,8 +43,12 @@ from arrivals.scenarios.reproduce.svalse.plots import (
 )
 from arrivals.scenarios.reproduce.svalse.published_values import ACTIVATION, PAPER, REBUILT
 from arrivals.scenarios.reproduce.svalse.step_metrics import STEP_METRICS
+from arrivals.trackers.run import Run
+from arrivals.trackers.svalse.coordinate.angle_posterior import fold, mixture, quadrature
+from arrivals.typing import Float
 
 MEASURED = METRICS | STEP_METRICS
+START_RUNS = 5  # of noise that starts at several levels: 25 s each in the paper's form
 COLUMNS = ("method", "GOSPA", "std of runs", "from", "to", "distance", "missed", "false", "RMSE",
            "std of steps", "found near endfire", "wrong number", "converged", "label switches",
            "track length", "NEES", "in 68 %", "in 95 %", "CPU ms a step", "paper's run", "rebuilt",
@@ -76,17 +82,65 @@ def scene(
     settings = StudySettings(MEASURED, out, batch=batch_of(runs))
     compared = table_methods(quick)
     if name == "svalse_fig4" and not quick:
-        compared.append(valse_from_20_db())
+        compared.append(started_at(20.0, ours=False))
     study = compute_study({name: scenario}, compared, runs, seed, settings)
     rows = [_row(study, name, method) for method in study.methods]
     drawn = first_runs(scenario, seed, quick)
     rows += [_run_row(one, name) for one in drawn if one.method not in study.methods]
-    lines = [*remarks, SPREADS, FORMS, _scale(scenario, runs, seed)]
+    results = results_of(study)
+    lines = [*remarks, SPREADS, FORMS_SEEN, _scale(scenario, runs, seed)]
     figures = {"tracks": draw_scene(drawn, PAPER[name]), "gospa": draw_parts(study, name)}
-    if name == "svalse_fig4":
-        figures["graph"] = draw_factor_graph()
     heading = f"{title}, {runs} runs at 20 dB, degrees"
-    return Report(heading, COLUMNS, rows, lines, figures, SHOWN, results_of(study))
+    captions = {"tracks": f"{title}, run 0 at 20 dB", "gospa": heading}
+    if name == "svalse_fig4":
+        lines[lines.index(FORMS_SEEN)] = FORMS
+        figures["graph"] = draw_factor_graph()
+        captions["graph"] = "Figs 1 to 3: sketch of the factor graph and of the schedule"
+        results |= start_results(scenario, min(runs, START_RUNS), seed, out, quick)
+        results |= mixture_results(drawn[0].trial)
+    return Report(heading, COLUMNS, rows, lines, figures, SHOWN, results, captions)
+
+
+def iterations(trial: Trial, run: Run) -> float:
+    """Return the mean number of iterations of a step."""
+    return float(np.mean(run.iterations))
+
+
+def start_results(
+    scenario: Scenario, runs: int, seed: int, out: Path | None, quick: bool
+) -> dict[tuple[str, str, str], Float]:
+    """Return missed sources and iterations of VALSE by the SNR from which its noise starts."""
+    settings = StudySettings({"missed": METRICS["missed"], "iterations": iterations}, out, batch=1)
+    forms = (True,) if quick else (True, False)
+    started = [started_at(snr_db, ours) for ours in forms for snr_db in STARTS]
+    study = compute_study({"svalse_fig4": scenario}, started, runs, seed, settings)
+    return {(f"started, {metric}", method, case): values
+            for (metric, method, case), values in results_of(study).items()}  # fmt: skip
+
+
+def mixture_results(trial: Trial) -> dict[tuple[str, str, str], Float]:
+    """Return mean and width of mixtures (38)-(48) beside the exact ones, for every true source.
+
+    The densities are those of (32) with the amplitudes of least squares at the true directions:
+    the difference of the means in exact deviations, and the ratio of the deviations.
+    """
+    shift, width = [], []
+    model: Any = trial.measurement
+    for y, doa in zip(np.asarray(trial.measurements), trial.truth, strict=True):
+        A = model.array.steering_vector(doa, model.wavelength).T
+        A = A / A[:1]  # phases from the first sensor
+        w = np.linalg.lstsq(A, y, rcond=None)[0]
+        rest = y - A @ w
+        noise = (np.abs(rest) ** 2).sum() / (len(y) - len(w))
+        for a, amplitude in zip(A.T, w, strict=True):
+            # (32), (33)
+            eta = 2 / noise * (rest + a * amplitude) * amplitude.conj()
+            c = fold(eta, np.arange(len(eta)), len(eta) - 1)
+            (exact, _), (_, mean) = quadrature(c), mixture(c)
+            deviation = np.sqrt(-2 * np.log(np.abs(exact[1])))
+            shift.append(abs(np.angle(mean / exact[1])) / deviation)
+            width.append(np.sqrt(-2 * np.log(abs(mean))) / deviation)
+    return {("shift", "mixture", ""): np.array(shift), ("width", "mixture", ""): np.array(width)}
 
 
 def first_runs(scenario: Scenario, seed: int, quick: bool) -> list[DrawnRun]:
@@ -186,7 +240,9 @@ def fig7(runs: int, seed: int, out: Path | None = None, quick: bool = False) -> 
     figures = {"tracks": draw_activation(drawn, paper)}
     title = f"Fig. 7: probabilities of activation, paper's form, {runs} runs at 20 dB, degrees"
     page = tuple(name for name in columns[:9] if name != "converged")
-    return Report(title, columns, rows, [FORCED, FEWER, FORMS], figures, page, results)
+    remarks = [FORCED, *([FEWER] if quick else []), FORMS_SEEN]
+    captions = {"tracks": "Fig. 7: probabilities of activation, paper's form, run 0 at 20 dB"}
+    return Report(title, columns, rows, remarks, figures, page, results, captions)
 
 
 FORCED = (
@@ -196,7 +252,7 @@ FORCED = (
 )
 
 
-FEWER = "A quick study has at most 100 iterations a step in this table."
+FEWER = "This quick study has at most 100 iterations a step."
 
 
 def _activation_means(study: Study, label: str) -> tuple[float, ...]:

@@ -13,12 +13,11 @@ from typing import Any
 
 from arrivals.motion_models import BernoulliVonMises
 from arrivals.scenarios.experiments.methods import Method, methods
-from arrivals.trackers import CoordinateSolver
+from arrivals.trackers import CoordinateSolver, NewtonSolver
 
 FAST = ("cbf", "peaks_gnn", "sbl", "ssbl", "valse", "svalse")
 PAPER_FORM = {"valse": "valse paper's form", "svalse": "svalse paper's form"}
 AS_PRINTED = {"valse": "valse as printed", "svalse": "svalse as printed"}
-FROM_20_DB = "valse from 20 dB"
 PRINTED_7D = "p_d 0.25, p_a 1 as printed, run 0"
 UNMERGED_7D = "p_d 0.25, p_a 1 without merging, run 0"
 NAN = float("nan")
@@ -29,6 +28,10 @@ FORMS = (
     "probability of 0.5 in the first step. Ours: joint Newton steps, a phase reference in the "
     "middle, and a walk of 1.5 degrees in direction that may stand still."
 )
+FORMS_SEEN = (
+    "Paper's form and as printed: the forms of VALSE and SVALSE are described under Fig. 4."
+)
+STARTS = (3.0, 20.0, 40.0)  # SNR from which the noise of VALSE starts, dB: high, the paper's, low
 
 
 def quadrature(max_iterations: int) -> dict[str, Any]:
@@ -54,10 +57,22 @@ def valse_paper_form() -> Method:
     return Method("valse", quadrature(2000), PAPER_FORM["valse"])
 
 
-def valse_from_20_db() -> Method:
-    """Return VALSE in the paper's form, its noise started as SVALSE's (section VI.B)."""
-    params = quadrature(2000)
-    return Method("valse", params | {"solver": params["solver"].replace(snr_db=20.0)}, FROM_20_DB)
+def start_label(snr_db: float, ours: bool) -> str:
+    """Return the label of VALSE whose noise starts at this SNR, in the paper's form or ours.
+
+    Examples
+    --------
+    >>> start_label(20, ours=False)
+    'valse from 20 dB'
+    """
+    return f"valse {'by ours ' if ours else ''}from {snr_db:g} dB"
+
+
+def started_at(snr_db: float, ours: bool) -> Method:
+    """Return VALSE whose noise starts at this SNR, in the paper's form or ours."""
+    params = {"solver": NewtonSolver()} if ours else quadrature(2000)
+    solver = params["solver"].replace(snr_db=snr_db)
+    return Method("valse", params | {"solver": solver}, start_label(snr_db, ours))
 
 
 def svalse_as_printed(label: str = AS_PRINTED["svalse"], **probabilities: float) -> Method:
@@ -80,8 +95,14 @@ def unmerged_7d() -> Method:
 
 
 def valse_as_printed() -> Method:
-    """Return VALSE as printed."""
-    solver = CoordinateSolver.paper().replace(max_iterations=2000)
+    """Return VALSE as printed: every step is a first one (section VI.B).
+
+    Examples
+    --------
+    >>> valse_as_printed().params["solver"].first_existence
+    0.5
+    """
+    solver = CoordinateSolver.paper(first_existence=0.5).replace(max_iterations=2000)
     return Method("valse", {"solver": solver, "reference": "first"}, AS_PRINTED["valse"])
 
 

@@ -35,7 +35,8 @@ def states_deviations(method: str, results: Results) -> Decision | None:
     if len(given) < len(stated):
         return None
     nees, c68, c95 = given
-    numbers = f"{c68:.0%} and {c95:.0%}; errors {np.sqrt(nees):.1f} times as large, in rms"
+    numbers = f"they cover {c68:.0%} and {c95:.0%}; errors "
+    numbers += f"{np.sqrt(nees):.1f} times as large as stated, in rms"
     return Decision(CONSERVATIVE.holds(c68, c95), numbers)
 
 
@@ -47,8 +48,7 @@ def lowest_gospa(cases: Sequence[str], results: Results) -> Decision | None:
         if (mean := values(results, "gospa", method, cases)) is not None
     }
     best = min(others, key=lambda method: others[method])
-    decision = lower("gospa", "svalse", best, *cases)[1](results)
-    return decision and Decision(decision.holds, f"SVALSE and {best} {decision.numbers}")
+    return lower("gospa", "svalse", best, *cases)[1](results)
 
 
 def _claims() -> Iterator[Claim]:
@@ -60,9 +60,10 @@ def _claims() -> Iterator[Claim]:
         for method, name in (("svalse", "SVALSE"), ("valse", "VALSE")):
             text = f"the 68 and 95 % intervals that {name} states cover {CONSERVATIVE}"
             decide = partial(states_deviations, method)
-            yield Claim(study, "", text, by_ours=decide, source="ours")
+            added = method == "svalse"  # the other states deviations without memory, as before
+            yield Claim(study, "", text, by_ours=decide, source="ours" if added else "check")
         improved = lower("gospa", "svalse", paper_form("svalse"))[1]
-        text = "our SVALSE has a lower GOSPA than the paper's form"
+        text = "SVALSE by our defaults has a lower GOSPA than in the paper's form"
         yield Claim(study, "", text, by_ours=improved, source="ours")
         for method, rebuilt in REBUILT[f"svalse_fig{number}"].items():
             label = paper_form(method)

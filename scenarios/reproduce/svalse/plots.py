@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from string import ascii_lowercase
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
 PARTS = {"distance": "#9aa5b1", "missed": "#1f77b4", "false": "#d62728"}
 TRUTH = "#00b050"
+LABELLED = len(PALETTE) - 1  # colour of all labels: not that of the truth, VALSE or SVALSE
 TRUTH_MARKS: dict[str, Any] = {
     "color": TRUTH, "marker": "o", "markersize": 4.5, "markerfacecolor": "none",
     "markeredgewidth": 0.8, "linestyle": "",
@@ -54,26 +56,28 @@ def draw_scene(drawn: Sequence[DrawnRun], paper: Mapping[str, float]) -> Figure:
     Parameters
     ----------
     drawn : sequence of DrawnRun
-        The same trial by VALSE and SVALSE, twice if also as printed: that is panels (b) and (c).
+        The same trial by VALSE and SVALSE, as printed in panels (b) and (c) and then by ours; by
+        ours only in a quick study.
     paper : mapping of str to float
         The paper's GOSPA by tracker.
     """
-    figure, axes = panels(3, 2, (12.0, 9.2))
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(12.0, 10.0), layout="constrained")
+    rows = [["a", "b"], ["c", "d"], ["e", "number"] if len(drawn) > 2 else ["number", "number"]]
+    axes = list(figure.subplot_mosaic(rows).values())  # type: ignore[arg-type]  # names
     trial = drawn[0].trial
     _draw_beam_and_truth(axes[0], trial)
     axes[0].set_title("(a) truth, over the beam power", fontsize=10)
     ours = drawn[-1]
     for ax, letter, one in zip(axes[1:3], "bc", drawn, strict=False):
         _draw_run(ax, one)
-        ax.set_title(f"({letter}) {one.method}", fontsize=10)
+        ax.set_title(f"({letter}) {_named(one.method)}", fontsize=10)
     _draw_gospa(axes[3], drawn, paper)
-    last = [axes[4], axes[5]]
     if len(drawn) > 2:
-        _draw_run(last[0], ours)
-        last.pop(0).set_title(f"(e) {ours.method}, ours", fontsize=10)
-    _draw_number(last.pop(0), drawn)
-    for ax in last:
-        ax.set_axis_off()
+        _draw_run(axes[4], ours)
+        axes[4].set_title(f"(e) {_named(ours.method)}", fontsize=10)
+    _draw_number(axes[-1], drawn)
     _one_bar(figure, axes[:2], [ax for ax in axes if ax.collections])
     _name_marks(figure)
     return figure
@@ -105,10 +109,22 @@ def draw_activation(drawn: Sequence[DrawnRun], paper: Sequence[float]) -> Figure
 def _draw_run(ax: Axes, one: DrawnRun) -> None:
     trial = one.trial
     plot_bearing_time(
-        one.run, snapshots=trial.measurements, measurement=trial.measurement, ax=ax  # type: ignore[arg-type]  # complex
+        _recoloured(one.run), snapshots=trial.measurements, measurement=trial.measurement, ax=ax  # type: ignore[arg-type]  # complex
     )  # fmt: skip
     _draw_truth(ax, trial)
-    ax.label_outer()
+
+
+def _named(method: str) -> str:
+    return method if method in AS_PRINTED.values() else f"{method}, ours"
+
+
+def _recoloured(run: Run) -> Run:
+    """Return the run with other labels, all of the colour `LABELLED`."""
+    if "label" not in run.fields:
+        return run
+    label = run.fields["label"]
+    other = np.where(label < 0, -1, len(PALETTE) * label + LABELLED)
+    return replace(run, fields={**run.fields, "label": other})
 
 
 def _draw_beam_and_truth(ax: Axes, trial: Trial) -> None:
@@ -127,7 +143,7 @@ def _draw_gospa(ax: Axes, drawn: Sequence[DrawnRun], paper: Mapping[str, float])
         gospa, name = gospa_steps(one.trial, one.run), tracker_name(one.method)
         printed = one.method in AS_PRINTED.values()
         published = f" (paper {paper[name]:g}°)" if printed and name in paper else ""
-        label = f"{one.method}: mean {gospa.mean():.2f}°{published}"
+        label = f"{_named(one.method)}: mean {gospa.mean():.2f}°{published}"
         ax.plot(gospa, marker="o" if printed else "", markersize=3, color=METHOD_COLOURS[name],
                 linestyle="--" if printed else "-", linewidth=1.0, label=label)  # fmt: skip
     ax.set_title("(d) GOSPA of every step", fontsize=10)
@@ -145,8 +161,8 @@ def _draw_number(ax: Axes, drawn: Sequence[DrawnRun]) -> None:
         printed = one.method in AS_PRINTED.values()
         ax.step(np.arange(len(there)), one.run.n_found, where="mid", linewidth=1.0,
                 color=METHOD_COLOURS[tracker_name(one.method)], linestyle="--" if printed else "-",
-                label=one.method)  # fmt: skip
-    ax.set_title("number of sources, and of estimates", fontsize=10)
+                label=_named(one.method))  # fmt: skip
+    ax.set_title("number of sources, and of estimates (not in the paper)", fontsize=10)
     top = max(there.max(), *(one.run.n_found.max() for one in drawn))
     ax.set(xlabel="step", ylabel="number", ylim=(0, top + 0.5))
     ax.legend(fontsize=8, ncols=3, loc="lower center")
@@ -168,8 +184,16 @@ def _name_marks(figure: Figure) -> None:
 
     marks = [
         Line2D([], [], **TRUTH_MARKS, label="truth"),
-        Line2D([], [], marker="o", markersize=4, linestyle="", color=NEUTRAL, label="estimates"),
-        Line2D([], [], linewidth=2, color=PALETTE[0], label="estimates, one colour a label"),
+        Line2D(
+            [],
+            [],
+            marker="o",
+            markersize=4,
+            linestyle="",
+            color=NEUTRAL,
+            label="estimates without a label",
+        ),
+        Line2D([], [], linewidth=2, color=PALETTE[LABELLED], label="estimates, one line a label"),
     ]
     figure.legend(handles=marks, loc="outside upper center", ncols=3, fontsize=9, frameon=False)
 
@@ -193,12 +217,14 @@ def draw_parts(study: Study, name: str) -> Figure:
         base += heights
     ends = np.array([study.interval("gospa", method) for method in labels]).T
     ax.errorbar(at, base, yerr=np.abs(ends - base), color="black", fmt="none", capsize=3,
-                label="95 % of the mean")  # fmt: skip
+                label="95 % interval of the mean")  # fmt: skip
     rebuilt = {method: values.gospa for method, values in REBUILT[name].items()}
     for values, marker, origin in ((rebuilt, "D", "rebuilt"), (PAPER[name], "*", "paper, one run")):
         beside = {paper_form(method): value for method, value in values.items()}
-        if not set(beside) <= set(labels):  # a quick study
-            beside = values
+        if not set(beside) <= set(labels):  # a quick study, without the paper's form
+            beside = {method: value for method, value in beside.items() if method in labels}
+        if not beside:
+            continue
         index = [labels.index(label) for label in beside]
         ax.plot(np.array(index) + 0.2, list(beside.values()), marker, color="black",
                 markerfacecolor="white", label=origin)  # fmt: skip

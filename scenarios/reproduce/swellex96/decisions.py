@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-from arrivals.scenarios.reproduce.claims import Claim, Decide, Decision, below
-from arrivals.scenarios.reproduce.svalse.decisions import Both, by_both
+from arrivals.scenarios.reproduce.claims import Claim, Decision
+from arrivals.scenarios.reproduce.svalse.decisions import Both, by_both, compared
 from arrivals.scenarios.reproduce.swellex96.field import FieldFacts
 from arrivals.typing import Float
 
@@ -37,53 +37,59 @@ def _lower(first: str, second: str, results: SeaResults, *, metric: str) -> Deci
     if not {first, second} <= set(results.scores):
         return None
     column = SCORES.index(metric)
-    low, high = (results.scores[name][:, column] for name in (first, second))
-    return below(low, high, "degrees")
+    return compared((first, second), results.scores[first][:, column],
+                    results.scores[second][:, column], "degrees")  # fmt: skip
 
 
 def none_beyond_critical(results: SeaResults) -> Decision:
     """Decide that less than 1 % of the power comes from beyond the critical angle."""
-    share = results.field.beyond_critical
-    return Decision(share < 0.01, f"{share:.1%} of the power, median of the steps")
+    share, far = results.field.beyond_critical, results.field.beyond_far
+    numbers = f"{share:.1%} of the power is from beyond it, median of steps 1 to 350, 1 % allowed"
+    return Decision(share < 0.01, f"{numbers}; {far:.1%} in steps 1 to 200")
 
 
 def angles_grow(results: SeaResults) -> Decision:
     """Decide that the angles grow in most steps."""
     share = results.field.growing
-    return Decision(share > MANY, f"in {share:.0%} of the steps up to the closest one")
+    return Decision(share > MANY, f"they do in {share:.0%} of the steps up to the closest one")
 
 
 def bottom_dominates(results: SeaResults) -> Decision:
     """Decide that the path B is the strongest in most steps, at about -15 degrees."""
     share, (near, far) = results.field.bottom, results.field.bottom_span
     holds = share > MANY and far < -15 < near
-    return Decision(holds, f"in {share:.0%} of the steps, {near:.0f}° to {far:.0f}°")
+    return Decision(
+        holds, f"the strongest in {share:.0%} of the steps, at {near:.0f}° to {far:.0f}°"
+    )
 
 
 def direct_is_weaker(results: SeaResults) -> Decision:
     """Decide that the direct path is weaker, by rays and by modes."""
     rays, modes = results.field.weaker_rays, results.field.weaker_modes
-    numbers = f"by {rays:.0f} dB (rays), {modes:.0f} dB (modes, beam power), medians"
+    numbers = (
+        f"weaker by {rays:.0f} dB (rays) and {modes:.0f} dB (beam power of the modes), medians"
+    )
     return Decision(min(rays, modes) > 0, numbers)
 
 
 def two_dominate(results: SeaResults) -> Decision:
     """Decide that BS and BSB are the strongest in most steps."""
     share = results.field.late_bounces
-    return Decision(share > MANY, f"in {share:.0%} of the steps")
+    return Decision(share > MANY, f"one of them is the strongest in {share:.0%} of the steps")
 
 
 def at_their_angles(results: SeaResults) -> Decision:
     """Decide that BS and BSB pass 15 and -17 degrees in those steps."""
     spans, step = results.field.late_spans, results.field.nearest_step
-    numbers = "{:.0f}° to {:.0f}° and {:.0f}° to {:.0f}°".format(*spans)
-    return Decision(220 <= step < 250, f"{numbers}; nearest at step {step}")
+    numbers = "BSR {:.0f}° to {:.0f}°, BSBR {:.0f}° to {:.0f}°".format(*spans)
+    return Decision(220 <= step <= 250, f"{numbers}; nearest to 15° and -17° at step {step}")
 
 
 def many_bounces_dominate(results: SeaResults) -> Decision:
     """Decide that paths of four bounces and more are the strongest in most steps."""
     share, names = results.field.many_bounces, results.field.succession
-    return Decision(share > MANY, f"in {share:.0%} of the steps; in turn {', '.join(names)}")
+    numbers = f"in {share:.0%} of the steps; most often in each quarter of them: {', '.join(names)}"
+    return Decision(share > MANY, numbers)
 
 
 def pairs_are_close(results: SeaResults) -> Decision:
@@ -97,8 +103,8 @@ def models_agree(results: SeaResults) -> Decision:
     """Decide that the beam powers of rays and modes are correlated."""
     field = results.field
     numbers = (
-        f"correlation {field.correlation:.2f}, median of the steps; level of the rays "
-        f"{field.level:+.1f} dB, std {field.level_std:.1f} dB"
+        f"correlation of the beam powers {field.correlation:.2f}, median of the steps; level of "
+        f"the rays over the modes {field.level:+.1f} dB, std {field.level_std:.1f} dB"
     )
     return Decision(field.correlation > 0.8 and abs(field.level) < 3, numbers)
 
@@ -106,22 +112,29 @@ def models_agree(results: SeaResults) -> Decision:
 def peaks_are_paths(results: SeaResults) -> Decision:
     """Decide that the highest beam peaks are at strong paths."""
     above, low, most = results.field.peak_to_path
-    numbers = f"{above:.1f}° from above, {low:.1f}° from below, medians; 90 % within {most:.1f}°"
-    return Decision(max(above, low) < 1, numbers)
+    numbers = f"median distance of the highest peak to a path: {above:.1f}° from above, {low:.1f}° "
+    return Decision(max(above, low) < 1, f"{numbers}from below; 90 % within {most:.1f}°")
 
 
-FIELD: tuple[tuple[str, Decide], ...] = (
-    ("multipath ends at the critical angle of 21.6 degrees: steps 1 to 200", none_beyond_critical),
+def of_field(decide: Callable[[SeaResults], Decision], results: SeaResults) -> Decision:
+    """Decide by the simulated field, and say so: no form of a method takes part."""
+    decision = decide(results)
+    return decision._replace(numbers=f"simulated field: {decision.numbers}")
+
+
+FIELD: tuple[tuple[str, Callable[[SeaResults], Decision]], ...] = (
+    ("multipath ends at the critical angle of 21.6 degrees", none_beyond_critical),
     ("the absolute angles increase as the source comes closer", angles_grow),
     ("modes and rays match visually well", models_agree),
     ("the beam has significant peaks at the paths", peaks_are_paths),
-    ("about -15 degrees, one bottom bounce (B), is dominant: steps 250 to 339", bottom_dominates),
-    ("the direct path, 12 degrees, is weaker than that: steps 250 to 339", direct_is_weaker),
+    ("BR (our B), at about -15 degrees, is dominant: steps 250 to 350", bottom_dominates),
+    ("DP (our D), at 12 degrees, is weaker than BR: steps 250 to 350", direct_is_weaker),
     ("a path and that with a bounce above the source are about 1 degree or less apart",
      pairs_are_close),
-    ("BS and BSB dominate: steps 220 to 249", two_dominate),
-    ("they arrive from 15 and -17 degrees", at_their_angles),
-    ("paths of four bounces and more dominate successively: steps 1 to 200", many_bounces_dominate),
+    ("BSR and BSBR (our BS and BSB) dominate: steps 220 to 250", two_dominate),
+    ("BSR and BSBR arrive from 15 and -17 degrees: steps 220 to 250", at_their_angles),
+    ("paths of four bounces and more, as BSBSR and BSBSBR, dominate in turn: steps 1 to 200",
+     many_bounces_dominate),
 )  # fmt: skip
 CLAIMS = tuple(
     Claim("swellex96", "", text, by_ours=lower("gospa", first, second)[1], source="ours")

@@ -35,18 +35,19 @@ class FieldFacts(NamedTuple):
 
     Attributes
     ----------
-    beyond_critical : float
-        Median share of the power of steps 1 to 200 that comes from beyond the critical angle.
+    beyond_critical, beyond_far : float
+        Median share of the power that comes from beyond the critical angle: in all steps, and in
+        steps 1 to 200.
     growing : float
         Share of the steps up to the closest one in which the angle of a path grows.
     bottom : float
-        Share of steps 250 to 339 in which the path B is the strongest.
+        Share of steps 250 to 350 in which the path B is the strongest.
     bottom_span : tuple of two float
-        Its angles of smallest and largest magnitude there.
+        Its angles of smallest and largest magnitude in those steps.
     weaker_rays, weaker_modes : float
         Median level of B over the direct path there, and the same of beam peaks of the modes.
     late_bounces : float
-        Share of steps 220 to 249 in which BS or BSB is the strongest.
+        Share of steps 220 to 250 in which BS or BSB is the strongest.
     late_spans : tuple of four float
         Angles of BS and of BSB there.
     nearest_step : int
@@ -64,6 +65,7 @@ class FieldFacts(NamedTuple):
     """
 
     beyond_critical: float
+    beyond_far: float
     growing: float
     bottom: float
     bottom_span: tuple[float, float]
@@ -103,24 +105,24 @@ def field_facts(scenario: TowPastLine, step: Int) -> FieldFacts:
     >>> facts.many_bounces > 0.5
     True
     """
-    beyond, growing = _angles(scenario, step)
+    beyond, beyond_far, growing = _angles(scenario, step)
     bottom, span, rays, modes, late, spans, nearest = _strongest(scenario, step)
     many, succession = _many_bounces(scenario, step)
     correlation, level, level_std, peaks = _models_agree(scenario)
     return FieldFacts(
-        beyond, growing, bottom, span, rays, modes, late, spans, nearest, many, succession,
-        _pair_gap(scenario), correlation, level, level_std, peaks,
+        beyond, beyond_far, growing, bottom, span, rays, modes, late, spans, nearest, many,
+        succession, _pair_gap(scenario), correlation, level, level_std, peaks,
     )  # fmt: skip
 
 
-def _angles(scenario: TowPastLine, step: Int) -> tuple[float, float]:
-    """Return the power from beyond the critical angle, and the growth of the angles."""
+def _angles(scenario: TowPastLine, step: Int) -> tuple[float, float, float]:
+    """Return the power from beyond the critical angle, in all and far steps, and the growth."""
     _, doa, level_db = scenario.paths()
     power = np.nan_to_num(10 ** (level_db / 10))
-    far = step <= 200
-    beyond = np.where(np.abs(doa) > CRITICAL, power, 0)[far].sum(axis=1) / power[far].sum(axis=1)
+    beyond = np.where(np.abs(doa) > CRITICAL, power, 0).sum(axis=1) / power.sum(axis=1)
+    medians = float(np.median(beyond)), float(np.median(beyond[step <= 200]))
     nearing = np.diff(np.abs(np.where(level_db > -np.inf, doa, np.nan)[step <= 294]), axis=0)
-    return float(np.median(beyond)), float((nearing[~np.isnan(nearing)] > 0).mean())
+    return *medians, float((nearing[~np.isnan(nearing)] > 0).mean())
 
 
 def _strongest(
@@ -128,7 +130,7 @@ def _strongest(
 ) -> tuple[float, Span, float, float, float, tuple[float, float, float, float], int]:
     """Return the facts of the paths that dominate from step 220 on."""
     names, doa, level_db = scenario.paths()
-    late, middle = (step >= 250) & (step < 340), (step >= 220) & (step < 250)
+    late, middle = (step >= 250) & (step <= 350), (step >= 220) & (step <= 250)
     B, D, BS, BSB = (names.index(name) for name in ("B", "D", "BS", "BSB"))
     top = np.nanargmax(level_db, axis=1)
     weaker = float(np.nanmedian((level_db[:, B] - level_db[:, D])[late]))

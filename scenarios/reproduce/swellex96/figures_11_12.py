@@ -12,7 +12,7 @@ from arrivals.motion_models import BernoulliVonMises
 from arrivals.scenarios.experiments.workers import parallel_map
 from arrivals.scenarios.metrics.gospa import mean_gospa, mean_rmse
 from arrivals.scenarios.reproduce.report import Report
-from arrivals.scenarios.reproduce.svalse.forms import FORMS, PAPER_FORM, quadrature
+from arrivals.scenarios.reproduce.svalse.forms import FORMS_SEEN, PAPER_FORM, quadrature
 from arrivals.scenarios.reproduce.swellex96.decisions import SeaResults
 from arrivals.scenarios.reproduce.swellex96.field import field_facts
 from arrivals.scenarios.reproduce.swellex96.plots import environment_figure, field_figure
@@ -57,10 +57,9 @@ def swellex96(runs: int, seed: int, quick: bool = False) -> Report:
         rows += [(n, name, *_row(scenario, doa[n, name], step, block), ms)
                  for block in blocks_of(n, name)]  # fmt: skip
     first = dict(zip(pairs, tracked[::runs], strict=True))
-    figures = {
-        "fig11": environment_figure(),
-        "fig12": field_figure(arrays[63], first[63, "valse"], first[63, "svalse"], step, seed),
-        "fig12-64": field_figure(arrays[64], first[64, "valse"], first[64, "svalse"], step, seed),
+    figures = {"fig11": environment_figure()} | {
+        name: field_figure(arrays[n], first[n, "valse"], first[n, "svalse"], step, seed)
+        for name, n in FIELD_FIGURES.items()
     }
     columns = ("elements", "method", "steps", "GOSPA", "std", "distance", "missed", "false", "RMSE",
                "found", "paths", "near a path, %", "CPU ms a step")  # fmt: skip
@@ -70,7 +69,8 @@ def swellex96(runs: int, seed: int, quick: bool = False) -> Report:
     title = f"Figs 11 and 12: the SWellEx-96 tow, simulated, 10 dB, {draws}{decimation}"
     scores = {name: _scores(scenario, doa[n, name], step, CLOSE) for n, name in pairs if n == 63}
     results = SeaResults(scores, field_facts(scenario, step))
-    return Report(title, columns, rows, (*REMARKS, CURVED, FORMS), figures, shown, results)
+    return Report(title, columns, rows, (*REMARKS, CURVED, FORMS_SEEN), figures, shown, results,
+                  CAPTIONS)  # fmt: skip
 
 
 def blocks_of(n_elements: int, method: str) -> tuple[tuple[int, int], ...]:
@@ -97,6 +97,11 @@ def step_numbers(runs: int) -> Int:
     return np.arange(1, 351, 2 if runs == 1 else 1)
 
 
+FIELD_FIGURES = {"fig12": 63, "fig12-64": 64}
+CAPTIONS = {"fig11": "Fig. 11: sketch of the experiment by its tables and rays, without noise"} | {
+    name: f"Fig. 12: the tow, simulated, {n} elements, first draw of the noise"
+    for name, n in FIELD_FIGURES.items()
+}
 REMARKS = (
     "The recordings are too large to ship: the field is a sum of normal modes in the experiment's "
     "water, over its sea floor, at the ship's ranges, with white noise. Element 43 was defective "
@@ -105,6 +110,10 @@ REMARKS = (
     "excluded on both sides. GOSPA (cut-off 10 degrees), its parts and RMSE are degrees, `std` is "
     f"that of GOSPA over draws; 'near a path' counts the estimates within {NEAR} degrees of a "
     f"path that is at most {AUDIBLE_DB:g} dB below the strongest.",
+    "Paths are named by their bounces in order of travel, B at the bottom and S at the surface: "
+    "D, B, BS and BSB are the paper's DP, BR, BSR and BSBR. As there, a path stands also for that "
+    "with one more bounce at the surface just above the source. The statements of Sec. VIII on the "
+    "field are decided by the simulated field, without noise, on the paper's own steps.",
     "sbl and ssbl have a grid of 1 degree; the beam width of 64 elements is 1.8 degrees.",
 )
 CURVED = (

@@ -104,7 +104,10 @@ def field_figure(scenario: TowPastLine, valse: Run, svalse: Run, step: Int, seed
     """
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(12.0, 10.0), layout="constrained")
+    figure = Figure(figsize=(9.0, 8.2), layout="constrained")
+    n_elements = len(scenario.measurement.array.positions)
+    which = "all 64 elements" if n_elements == 64 else f"{n_elements} elements, as in the paper"
+    figure.suptitle(f"Fig. 12, simulated: {which}", fontsize=12)
     axes = figure.subplots(3, 2, sharex=True, sharey=True).ravel()
     noisy = scenario.sample(np.random.default_rng([seed, 0])).measurements
     beams = (
@@ -114,14 +117,14 @@ def field_figure(scenario: TowPastLine, valse: Run, svalse: Run, step: Int, seed
     )
     for n, title, snapshots in beams:
         image = _draw_beam(axes[n], scenario, np.asarray(snapshots, np.complex128), step)
-        axes[n].set_title(title)
-    figure.colorbar(image, ax=list(axes), shrink=0.5, label="dB re the step's maximum")
+        axes[n].set_title(title, fontsize=10)
+    figure.colorbar(image, ax=list(axes), shrink=0.5, label="dB re the step's maximum", aspect=30)
     for n, title, run in ((2, "(c) VALSE", valse), (4, "(e) SVALSE", svalse)):
         _draw_levels(axes[n], step, run.doa, 20 * np.log10(np.abs(run.amplitude)))
-        axes[n].set_title(title)
+        axes[n].set_title(title, fontsize=10)
     _names, doa, level_db = scenario.paths()
     _draw_levels(axes[5], step, doa, level_db)
-    axes[5].set_title("paths of the ray model")
+    axes[5].set_title("paths of the ray model (not in the paper)", fontsize=10)
     for ax in axes:
         ax.set(ylim=(-60, 60), yticks=np.arange(-60, 61, 20))
     for ax in axes[::2]:

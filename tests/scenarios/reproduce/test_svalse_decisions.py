@@ -20,7 +20,12 @@ from arrivals.scenarios.reproduce.svalse.factor_graph import (
     draw_factor_graph,
     factors,
 )
-from arrivals.scenarios.reproduce.svalse.forms import PRINTED_7D, UNMERGED_7D
+from arrivals.scenarios.reproduce.svalse.forms import (
+    PRINTED_7D,
+    STARTS,
+    UNMERGED_7D,
+    start_label,
+)
 from arrivals.scenarios.reproduce.svalse.paper_claims import CLAIMS as SVALSE
 from arrivals.scenarios.reproduce.svalse.step_metrics import STEP_METRICS, gospa_steps
 from arrivals.scenarios.reproduce.swellex96.decisions import SCORES, SeaResults
@@ -47,7 +52,7 @@ def test_claim_is_decided_by_both_forms() -> None:
     assert paper is not None
     assert ours is not None
     assert (paper.holds, ours.holds) == (False, True)
-    assert ours.numbers == "1 and 2 degrees, paired difference -1.00 ± 0.03"
+    assert ours.numbers == "SVALSE: 1; VALSE: 2 degrees, paired difference -1.00 ± 0.03"
 
 
 def test_claims_are_left_out_without_their_methods_and_not_decided_within_the_error() -> None:
@@ -105,7 +110,7 @@ def test_limits_convergence_and_the_largest_part() -> None:
     ]
     given = [decision for decision in decisions if decision is not None]
     assert [decision.holds for decision in given] == [True, False, True, False]
-    assert given[-1].numbers == "in 97.5% of the steps, at 0 dB 95.0%"
+    assert given[-1].numbers == "in 97.5% of the steps, at worst 95.0% at 0 dB"
 
 
 @pytest.mark.parametrize(("gospa", "holds"), [(24.0, True), (20.0, False)])
@@ -115,9 +120,69 @@ def test_certain_births_as_printed_are_compared_with_the_paper(gospa: float, hol
     decision = sv.as_printed_7d(results)
     assert decision is not None
     assert decision.holds == holds
-    assert "the paper's run 25.79" in decision.numbers
+    assert f"as printed {gospa:.2f} degrees" in decision.numbers
     results.pop(("gospa", PRINTED_7D, ""))
     assert sv.as_printed_7d(results) is None
+
+
+@pytest.mark.parametrize(("mean", "words"), [(-0.5, "0.5 ± 0.029 sources too few"),
+                                             (0.5, "0.5 ± 0.029 sources too many")])  # fmt: skip
+def test_number_of_sources_is_too_low_or_too_high(mean: float, words: str) -> None:
+    results = {("number_bias", "svalse", "0"): mean + JITTER}
+    decision = sv.below_limit("number_bias", "svalse", 0.0, "0", unit="too few or many")[1](results)
+    assert decision is not None
+    assert decision.holds == (mean < 0)
+    assert decision.numbers == words
+
+
+def test_shares_are_percentages_with_the_names_of_their_methods() -> None:
+    results = {("found", "valse", ""): 0.7 + JITTER / 10, ("found", "svalse", ""): np.full(6, 0.9)}
+    decision = sv.lower("found", "valse", "svalse", unit="% of them")[1](results)
+    assert decision is not None
+    assert decision.numbers.startswith("VALSE: 70; SVALSE: 90 % of them, paired difference -20.")
+    limited = sv.below_limit("found", "svalse", 0.95, unit="% are found")[1](results)
+    assert limited is not None
+    assert limited.numbers == "90 ± 0 % are found"
+
+
+def test_noise_that_starts_elsewhere_is_compared_with_20_db_by_both_forms() -> None:
+    results = {("started, missed", start_label(snr_db, ours), ""): snr_db + JITTER + 5 * ours * n
+               for ours in (False, True) for n, snr_db in enumerate(STARTS)}  # fmt: skip
+    decisions = [decide(results) for decide in sv.starts("missed", STARTS[2], "degrees")]
+    given = [decision for decision in decisions if decision is not None]
+    assert [decision.holds for decision in given] == [True, True]
+    assert given[1].numbers.startswith("VALSE from 20 dB: 25; VALSE from 40 dB: 50 degrees")
+    high = sv.starts("missed", STARTS[0], "degrees")[0](results)
+    assert high is not None
+    assert high.holds is False
+    quick = {key: runs for key, runs in results.items() if "by ours" in key[1]}
+    assert sv.starts("missed", STARTS[2], "degrees")[0](quick) is None
+
+
+@pytest.mark.parametrize(("shift", "width", "holds"), [(0.1, 1.05, True), (0.3, 1.0, False),
+                                                       (0.1, 0.8, False)])  # fmt: skip
+def test_mixture_is_judged_by_means_and_widths(shift: float, width: float, holds: bool) -> None:
+    results = {
+        ("shift", "mixture", ""): np.full(5, shift),
+        ("width", "mixture", ""): np.full(5, width),
+    }
+    decision = sv.mixture_is_accurate(results)
+    assert decision is not None
+    assert decision.holds == holds
+    assert f"means {shift:.2f} deviations off" in decision.numbers
+    assert sv.mixture_is_accurate({}) is None
+
+
+def test_captions_of_fig_7_are_judged_by_gospa_and_rmse() -> None:
+    captions = [
+        claim for claim in SVALSE if claim.study == "svalse-fig7" and "in one run" in claim.text
+    ]
+    texts = [claim.text for claim in captions]
+    assert len(captions) == 8
+    assert "RMSE of 5.36 degrees in one run with p_d 0.25, p_a 0" in texts
+    results = {("rmse", sv.PANELS[2], ""): 5.36 + JITTER}
+    decided = [claim.text for claim in captions if claim.decide(results).holds]
+    assert decided == ["RMSE of 5.36 degrees in one run with p_d 0.25, p_a 0"]
 
 
 def test_every_entry_of_the_table_is_once_there_and_names_its_place() -> None:
@@ -128,18 +193,24 @@ def test_every_entry_of_the_table_is_once_there_and_names_its_place() -> None:
 
 def test_claims_on_the_field_by_its_facts() -> None:
     scores = {name: np.full((3, len(SCORES)), mean) + 0.01 * np.arange(3)[:, None]
-              for name, mean in {"svalse": 1.0, "valse": 2.0, "cbf": 3.0}.items()}  # fmt: skip
+              for method, mean in {"svalse": 1.0, "valse": 2.0, "cbf": 3.0}.items()
+              for name in (method, sv.paper_form(method))}  # fmt: skip
     facts = FieldFacts(
-        0.004, 0.97, 0.94, (-12.0, -18.0), 18.0, 11.0, 0.9, (16.0, 23.0, -19.0, -27.0), 208, 0.86,
-        ("BSBSBSBS", "BSBSBS", "BSBS", "BSB"), (0.25, 0.74, 1.4), 0.93, 0.8, 0.9, (0.6, 0.6, 2.0),
+        0.004, 0.003, 0.97, 0.94, (-12.0, -18.0), 18.0, 11.0, 0.9, (16.0, 23.0, -19.0, -27.0), 208,
+        0.86, ("BSBSBSBS", "BSBSBS", "BSBS", "BSB"), (0.25, 0.74, 1.4), 0.93, 0.8, 0.9,
+        (0.6, 0.6, 2.0),
     )  # fmt: skip
     verdicts = verdicts_of("swellex96", SeaResults(scores, facts))
     failed = [verdict.claim.text for verdict in verdicts if verdict.holds is False]
-    assert failed == ["they arrive from 15 and -17 degrees"]
+    assert failed == ["BSR and BSBR arrive from 15 and -17 degrees: steps 220 to 250"]
     assert counts(verdicts)["paper"] == [13, 1, 0]
+    of_field = [verdict for verdict in verdicts if verdict.claim.by_paper is None][:10]
+    assert all("by ours (simulated field: " in verdict.line() for verdict in of_field)
     worse = facts._replace(beyond_critical=0.1, many_bounces=0.3, pair_gap=(2.0, 3.0, 4.0))
     verdicts = verdicts_of("swellex96", SeaResults(scores, worse))
     assert counts(verdicts)["paper"] == [10, 4, 0]
+    (sentence,) = [verdict.line() for verdict in verdicts if "21.6" in verdict.claim.text]
+    assert "10.0% of the power is from beyond it, median of steps 1 to 350" in sentence
 
 
 def run_of(doa_deg: list[list[float]], like: Run) -> Run:

@@ -189,8 +189,10 @@ def test_swellex96_study_writes_table_claims_and_figures(
     assert len(set(first_100)) == 1  # the paper's forms have directions of these steps only
     page = (tmp_path / "swellex96.md").read_text(encoding="utf-8")
     assert "every second step" in page
-    assert "SVALSE is more accurate than VALSE: GOSPA, steps 1 to 100. **Not decided**" in page
-    assert "BS and BSB dominate: steps 220 to 249. **Holds**" in page
+    assert "more accurate than VALSE: a lower GOSPA, steps 1 to 100. **Not decided**" in page
+    assert (
+        "(our BS and BSB) dominate: steps 220 to 250. **Holds** by ours (simulated field: " in page
+    )
 
 
 def test_paper_form_at_sea_is_coordinate_ascent_from_the_first_element() -> None:
