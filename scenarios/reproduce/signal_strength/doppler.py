@@ -35,7 +35,8 @@ BARS = "bars: two standard errors of the mean of the runs"
 SETTLED = 6  # steps after which errors count
 REMARKS = (
     "One source of 80 dB on a straight path through 100 sensors in a disc of 100 m, 24 steps of "
-    "5 m, N = 50, noise 40 dB, sound at 343 m/s; `ConstantVelocity`, started 5 m and 3 m/s off (standard deviations). "
+    "5 m, N = 50, noise 40 dB, sound at 343 m/s; `ConstantVelocity`, started 5 m and 3 m/s off "
+    "(standard deviations). "
     "The readings have the factor (1 - v/c cos ψ)⁻² of a moving monopole. The lead is the mean "
     "error in the direction of motion. NEES, the normalised estimation error squared, is 2 if the "
     "stated covariances are true. ± is the standard error of the mean of the runs. q = 1 m²/s³.",

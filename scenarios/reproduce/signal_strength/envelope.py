@@ -27,7 +27,6 @@ from arrivals.scenarios.reproduce.signal_strength.envelope_plots import (
 )
 from arrivals.scenarios.reproduce.signal_strength.range_estimates import (
     FORMS,
-    DRAWS as N_RANGES,
     distribution_distance,
     position_errors,
     range_bound,
@@ -92,7 +91,7 @@ def envelope_study(runs: int, seed: int) -> Report:
     captions = {
         "fig2": f"Fig. 2: one synthetic sound; right: {RECORDS} sounds",
         "detection": "Detection by one sensor: formulas",
-        "range": f"(a) formulas; (b), (c) {N_RANGES} draws of one sensor; (d) {runs} networks",
+        "range": f"(a) formulas; (b), (c) 20 000 draws of one sensor; (d) {runs} networks",
     }
     return Report(title, columns, rows, REMARKS, figures, columns, results, captions)
 

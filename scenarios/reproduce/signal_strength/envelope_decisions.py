@@ -105,8 +105,8 @@ def _better_stated(form: str, other: str, N: int, results: EnvelopeResults) -> D
     d, error = jackknife(off, len(both[0].error))
     squares = [f"{normalised_square(one):.2g}" for one in both]
     numbers = (
-        f"mean square of the errors over the stated one: {form} {squares[0]}, {other} {squares[1]}; "
-        "1 if true"
+        f"mean square of the errors over the stated one: {form} {squares[0]}, {other} "
+        f"{squares[1]}; 1 if true"
     )
     return Decision(negative(d, error), numbers)
 

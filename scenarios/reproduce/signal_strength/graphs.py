@@ -80,7 +80,10 @@ def _draw_network(ax: Axes, trial: RSSTrial) -> None:
     ax.annotate("", sensor, source, arrowprops={"arrowstyle": "<->", "color": "0.2"})
     along = (sensor - source) / distance[i]
     beside = 9.0 * np.array([-along[1], along[0]])  # m, off the arrow
-    ax.text(*(0.5 * (sensor + source) + beside), f"R = {distance[i]:.0f} m", fontsize=9, zorder=5,
+    centre = 0.5 * (sensor + source)
+    place = max((centre + beside, centre - beside),
+                key=lambda at: np.hypot(*(model.sensors - at).T).min())  # fmt: skip
+    ax.text(place[0], place[1], f"R = {distance[i]:.0f} m", fontsize=9, zorder=5,
             ha="center", va="center", bbox=LABEL)  # fmt: skip
     for radius in (distance[i] / 3, 2 * distance[i] / 3, distance[i]):
         phi = np.linspace(0, 2 * np.pi, 200)

@@ -39,7 +39,7 @@ REMARKS = (
     "the entropy, `sensor_choice=\"nearest\"` those nearest to a source; `update_by_cells` of "
     "`arrivals.trackers.rss.sensor_subset` updates by one cell after the other. Cells are sectors.",
     "First picture, left, after Fig. 1 of the paper: a source, its wavefronts and its velocity; "
-    "right, Fig. 3. ξ are the readings, Np (neper, 8.69 dB).",
+    "right, Fig. 3.",
 )  # fmt: skip
 
 
@@ -155,7 +155,8 @@ def _draw(results: Results) -> Figure:
     for (form, n), one in results.items():
         if form != ALL:
             place = numbers_sent(form, n, 3), float(np.exp(np.log(one.median).mean()))
-            ax.annotate(f"{n}", place, (4, -12 if form == INFORMATION else 6), textcoords="offset points", fontsize=8,
+            offset = 4, -12 if form == INFORMATION else 6
+            ax.annotate(f"{n}", place, offset, textcoords="offset points", fontsize=8,
                         color=COLOURS[form])  # fmt: skip
     ax.set(xlabel="numbers sent in a step", yscale="log",
            ylabel="median error, m (geometric mean of the runs)")  # fmt: skip
