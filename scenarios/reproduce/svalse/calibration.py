@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LEVELS = (0.50, 0.68, 0.90, 0.95)
-SETTLED = 5  # steps after which errors count
+SETTLED, FEW_RUNS = 5, 8  # steps after which errors count; fewer runs decide nothing
 
 
 class Statements(NamedTuple):
@@ -121,7 +121,8 @@ def calibration(runs: int, seed: int) -> Report:
         for n, scene in enumerate(SCENES)
     }
     columns = ("scene", "50 %", "68 %", "90 %", "95 %", "NEES", "GOSPA", "ECE", "Brier",
-               "log score", "68 %, never stops", "95 %, never stops", "GOSPA, change", "its error")  # fmt: skip
+               "log score", "68 %, never stops", "95 %, never stops", "GOSPA, change",
+               "its error")  # fmt: skip
     remarks = (
         "Share of errors within the stated intervals, %, of estimates within 10 degrees of a "
         f"source, from step {SETTLED} on; NEES is the squared error over the stated variance. "
@@ -153,7 +154,8 @@ def _pooled(parts: Sequence[Statements]) -> Statements:
 
 def spread(statistic: Callable[[Statements], float], stated: Statements) -> float:
     """Return the standard error of a statistic, by leaving out groups of runs."""
-    return jackknife(lambda runs: statistic(stated.select(runs)), int(stated.of_pair.max()) + 1)[1]
+    n = len(stated.gospa)
+    return np.nan if n < FEW_RUNS else jackknife(lambda runs: statistic(stated.select(runs)), n)[1]
 
 
 def share_errors(result: Statements) -> list[float]:
@@ -179,10 +181,9 @@ def _row(scene: CalibrationScene, result: Paired) -> tuple[Any, ...]:
     stated = result.default
     r = reliability(stated.existence, stated.hit)
     covered = [100 * share for share in shares(stated)]
-    nees = circular_nees(stated.error, stated.std)
     gospa, (_, c68, _, c95) = float(stated.gospa.mean()), shares(result.never_stops)
-    before = (100 * c68, 100 * c95, *change(result)[:2])
-    return (scene.label, *covered, nees, gospa, r.ece, r.brier, r.log_score, *before)
+    scores = (circular_nees(stated.error, stated.std), gospa, r.ece, r.brier, r.log_score)
+    return (scene.label, *covered, *scores, 100 * c68, 100 * c95, *change(result)[:2])
 
 
 def reliability_of(pooled: Pooled, loud: bool) -> Reliability:
@@ -220,6 +221,7 @@ def changes(scene: CalibrationScene, limit: float, pooled: Pooled) -> Decision |
     if scene not in pooled:
         return None
     mean, error, *_ = change(pooled[scene])
+    error = np.nan if len(pooled[scene].default.gospa) < FEW_RUNS else error
     return Decision(negative(mean - limit, error), f"change {mean:+.2f} ± {error:.2f} degrees")
 
 
@@ -247,7 +249,7 @@ def existence_score(name: str, limit: float, pooled: Pooled) -> Decision:
                 for scene, result in pooled.items()}  # fmt: skip
         return float(getattr(reliability_of(some, loud=True), name))
 
-    value, error = jackknife(score, n)
+    value, error = jackknife(score, n) if n >= FEW_RUNS else (score(np.arange(n)), np.nan)
     return Decision(negative(value - limit, error), f"{value:.4f} ± {error:.4f}")
 
 

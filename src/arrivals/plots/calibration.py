@@ -122,5 +122,5 @@ def plot_coverage(
     ax.set_axisbelow(True)
     bars = "" if errors is None else "\nbars: two standard errors"
     ax.legend(fontsize=8, title=f"stated interval, dashed{bars}", title_fontsize=8,
-              loc="lower left")  # fmt: skip
+              loc="best")  # fmt: skip
     return ax

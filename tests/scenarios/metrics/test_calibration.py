@@ -139,10 +139,10 @@ def stated(share: float, runs: int) -> calibration.Statements:
 @pytest.mark.parametrize(("share", "holds"), [(0.90, True), (0.5, False), (0.80, None)])
 def test_coverage_is_not_decided_at_its_limit(share: float, holds: bool | None) -> None:
     limits = Coverage((0.80, 0.95), (0.80, 0.95))
-    pooled = {SCENES[0]: calibration.Paired(*[stated(share, 4)] * 2)}
+    pooled = {SCENES[0]: calibration.Paired(*[stated(share, 8)] * 2)}
     decision = calibration.covers(SCENES[0], limits, 0, pooled)
     if holds is None:  # every run at the limit, give or take one error
-        some = stated(share, 4)
+        some = stated(share, 8)
         some.error[[0, 180]] = 9.0, 0.1
         pooled = {SCENES[0]: calibration.Paired(some, some)}
         decision = calibration.covers(SCENES[0], limits, 0, pooled)
@@ -157,12 +157,17 @@ def test_limits_of_ours_are_checks_in_plain_words() -> None:
     assert not [
         word for word in ("brier", "log_score", "n_sources", "doas", "ECE") if word in words
     ]
-    pooled = {SCENES[0]: calibration.Paired(*[stated(0.7, 4)] * 2)}
+    pooled = {SCENES[0]: calibration.Paired(*[stated(0.7, 8)] * 2)}
     assert calibration.existence_score("brier", 0.007, pooled).holds
     change = calibration.changes(SCENES[0], 0.1, pooled)
     assert change is not None
     assert change.holds
     assert "degrees" in change.numbers
+    few = {SCENES[0]: calibration.Paired(*[stated(0.7, 2)] * 2)}  # as in a quick study
+    assert calibration.existence_score("brier", 0.0, few).holds is None
+    change = calibration.changes(SCENES[0], -1.0, few)
+    assert change is not None
+    assert change.holds is None
 
 
 def test_coverage_has_bars_and_a_legend_with_its_unit() -> None:
