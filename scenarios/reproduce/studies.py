@@ -186,9 +186,8 @@ def _write(
     """Write a report's table, figures with their origin, and page."""
     report.to_csv(folder / f"{name}.csv")
     files = [f"{name}-{key}.png" for key in report.figures]
-    runs = f"{stamp['runs']} run{'s' * (stamp['runs'] != 1)}"
     for path, (key, figure) in zip(files, report.figures.items(), strict=True):
-        shown = report.captions.get(key, f"{report.title} · {runs}")
+        shown = report.captions.get(key, report.title)
         origin = f"{name}, seed {stamp['seed']} · arrivals {stamp['version']}"
         save_picture(figure, folder / path, f"{shown} · {origin}")
     page = report.markdown(files, verdicts)

@@ -1,4 +1,4 @@
-"""Where the iterations end: few against many cycles, jumps, local maxima, and their detection."""
+"""Where the iterations end: few against many cycles, steps, divergence and local maxima."""
 
 from __future__ import annotations
 
@@ -9,15 +9,18 @@ import numpy as np
 from arrivals.measurement_models import db_to_neper
 from arrivals.scenarios.reproduce.rss.published_values import FEW_ITERATIONS, VB_ITERATIONS
 from arrivals.scenarios.reproduce.rss.trials import SOLVERS, Draws, TrialEstimates
-from arrivals.trackers.rss.inference.joint_posterior import POOR_FIT
+from arrivals.trackers.rss.inference.factors import update_amplitudes, update_positions
+from arrivals.trackers.rss.inference.joint_posterior import ExpansionPoint
 from arrivals.trackers.rss.inference.map_search import maximize
 from arrivals.trackers.rss.rss_vb import variational_posterior
 from arrivals.trackers.rss.settings import VariationalSolver
 from arrivals.typing import Bool, Float
 
 SAME_PLACE, SAME_LEVEL = 1.0, 0.5  # m and dB between ends that count as the same
-JUMP = 100.0  # m in one cycle
+JUMP = 100.0  # m in one cycle, or one search for a mode
 JUMP_CYCLES = 15  # in which jumps are searched
+OUTSIDE = 30.0  # m: estimates farther outside the sensors have diverged
+MODE_STEPS = 40  # of Newton, in a search for a mode
 BELOW_MAXIMUM = 3.0  # of the log posterior: a maximum lower than this is a local one
 
 
@@ -64,8 +67,8 @@ def ends(trials: Draws, method: str) -> Ends:
     return Ends(TrialEstimates(few.u, few.theta, 0.0), near & level, stopped.converged & finite)
 
 
-def jumped(trials: Draws, method: str) -> Bool:
-    """Return in which trials a cycle moves a source by more than 100 m.
+def longest_steps(trials: Draws, method: str) -> Float:
+    """Return the longest way of a source in one cycle of each trial, m; infinite if not finite.
 
     Parameters
     ----------
@@ -87,19 +90,82 @@ def jumped(trials: Draws, method: str) -> Bool:
             problem = problem._replace(prior=problem.prior._replace(
                 mu=after.u, w=after.w, theta=after.theta, P=after.P
             ))  # fmt: skip
-    return np.asarray(farthest > JUMP)
+    return farthest
 
 
-class LocalMaxima(NamedTuple):
-    """Which trials end near a local maximum, and which of them the goodness of fit flags.
+def diverged(theta: Float, disc: float) -> Bool:
+    """Return in which trials an estimate is more than 30 m outside the sensors, or not finite.
 
     Parameters
     ----------
-    stuck, flagged : ndarray of bool, shape (n_runs,)
+    theta : ndarray, shape (n_runs, n_sources, 2)
+        Estimated positions, m.
+    disc : float
+        Radius of the sensors about the origin, m.
+
+    Examples
+    --------
+    >>> diverged(np.array([[[0.0, 0.0]], [[140.0, 0.0]]]), 100.0)
+    array([False,  True])
+    """
+    return np.asarray(~(np.linalg.norm(theta, axis=-1) <= disc + OUTSIDE).all(axis=1))
+
+
+def unmoved(trials: Draws, theta: Float) -> Bool:
+    """Return in which trials a search moves no source by more than 1 m from its start."""
+    way = np.linalg.norm(theta - trials.problem.prior.theta, axis=-1)
+    return np.asarray((way < SAME_PLACE).all(axis=1))
+
+
+class ModeSteps(NamedTuple):
+    """The longest way of a source in the first search for modes, m, (n_runs,).
+
+    Parameters
+    ----------
+    with_prior, without_prior : ndarray, shape (n_runs,)
+        By the prior of the positions, and by one of a thousand times its deviation.
+    """
+
+    with_prior: Float
+    without_prior: Float
+
+
+def mode_steps(trials: Draws) -> ModeSteps:
+    """Return how far the first search for modes (12) moves the sources.
+
+    Parameters
+    ----------
+    trials : Draws
+
+    Examples
+    --------
+    >>> from arrivals.scenarios import create
+    >>> from arrivals.scenarios.reproduce.rss.trials import draws
+    >>> mode_steps(draws(create("rss_table1_k3"), runs=2, seed=0)).with_prior.shape
+    (2,)
+    """
+    prior, found = trials.problem.prior, []
+    for factor in (1.0, 1e-6):
+        problem = trials.problem._replace(prior=prior._replace(P=factor * prior.P))
+        point = ExpansionPoint.at(problem, prior.mu, prior.theta)
+        _, _, r = update_amplitudes(problem, point, False)
+        theta, _ = update_positions(problem, point, r, False, MODE_STEPS, SAME_PLACE / 100)
+        found.append(np.linalg.norm(theta - prior.theta, axis=-1).max(axis=1))
+    return ModeSteps(*found)
+
+
+class LocalMaxima(NamedTuple):
+    """Which trials end near a local maximum, and how well the estimates fit the readings.
+
+    Parameters
+    ----------
+    stuck : ndarray of bool, shape (n_runs,)
+    misfit : ndarray, shape (n_runs,)
+        q = Σ W (ξ - log σ_y)², NaN if not finite.
     """
 
     stuck: Bool
-    flagged: Bool
+    misfit: Float
 
 
 def local_maxima(trials: Draws, ends: dict[str, TrialEstimates], n: int) -> dict[str, LocalMaxima]:
@@ -125,21 +191,15 @@ def local_maxima(trials: Draws, ends: dict[str, TrialEstimates], n: int) -> dict
     height = {name: _maxima(trials, got.u[:n], got.theta[:n]) for name, got in ends.items()}
     best = np.max([_maxima(trials, trials.u[:n], trials.theta[:n]), *height.values()], axis=0)
     return {
-        name: LocalMaxima(height[name] < best - BELOW_MAXIMUM, _flagged(trials, got, n))
+        name: LocalMaxima(height[name] < best - BELOW_MAXIMUM, _misfit(trials, got, n))
         for name, got in ends.items()
     }
 
 
-def _flagged(trials: Draws, ends: TrialEstimates, n: int) -> Bool:
-    """Return which trials the goodness of fit flags."""
-    from scipy.special import chdtrc
-
-    u, theta = ends.u[:n], ends.theta[:n]
+def _misfit(trials: Draws, ends: TrialEstimates, n: int) -> Float:
     problem = trials.problem.select(slice(n))
-    # q = Σ W (ξ - log σ_y)² ~ χ² of M - 3K degrees of freedom
     with np.errstate(over="ignore", invalid="ignore"):
-        q = problem.misfit(problem.propagation.levels(u, theta))
-    return np.asarray(~(chdtrc(problem.W.shape[1] - 3 * u.shape[1], q) >= POOR_FIT))
+        return problem.misfit(problem.propagation.levels(ends.u[:n], ends.theta[:n]))
 
 
 def _maxima(trials: Draws, u: Float, theta: Float) -> Float:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MAX_TRIALS = 300  # drawn
+POWERS_DB = 15  # from the mean of the prior: edge of the histograms
 VB, ML, OURS, TRUTH = "#1f77b4", "#ff7f0e", "#2ca02c", "#d62728"
 
 
@@ -51,10 +52,11 @@ def draw_figure_4(
                 row[3].set_title(f"({next(letters)}) {case}: powers", fontsize=9)
         row[0].set_ylabel("y, m")
     edge, dots, truth = axes[0, 0].get_lines()
-    figure.legend([edge, dots, truth, *axes[0, 3].get_lines()],
-                  ["edge of the sensors", "start or estimate of a trial", "true position",
-                   "power: truth", "power: VB, Algorithm 1", "power: ML", "power: ours"],
-                  fontsize=8, loc="outside upper center", ncols=7, frameon=False)  # fmt: skip
+    handles = [edge, dots, truth, *axes[0, 3].patches, *axes[0, 3].get_lines()]
+    names = ["edge of the sensors", "start or estimate of a trial", "true position",
+             "powers: truth", "powers: start, all trials", "VB, Algorithm 1", "ML",
+             "ours: VB, prior fixed"]  # fmt: skip
+    figure.legend(handles, names, fontsize=8, loc="outside upper center", ncols=8, frameon=False)
     return figure
 
 
@@ -66,25 +68,40 @@ def _draw_positions(ax: Axes, theta: Float, truth: Float, disc: float, colour: s
     ax.plot(shown[:, 0], shown[:, 1], ".", color=colour, markersize=1.5)
     ax.plot(truth[:, 0], truth[:, 1], "o", color=TRUTH, fillstyle="none", markersize=9,
             markeredgewidth=1.6)  # fmt: skip
-    ax.set(xlim=(-1.3 * disc, 1.3 * disc), ylim=(-1.3 * disc, 1.3 * disc), xlabel="x, m")
+    edge = 1.3 * disc
+    beyond = len(flat) - int((np.abs(shown) <= edge).all(axis=1).sum())
+    ax.set(xlim=(-edge, edge), ylim=(-edge, edge),
+           xlabel=f"x, m ({beyond} of {len(flat)} beyond the frame)")  # fmt: skip
+    ax.xaxis.label.set_fontsize(8)
     ax.set_aspect("equal")
 
 
 def _draw_powers(ax: Axes, drawn: Draws, found: Mapping[str, TrialEstimates]) -> None:
-    """Draw histograms of the powers as lines; estimates beyond 15 dB are left out."""
+    """Draw histograms of the powers within 15 dB of the prior's mean; the others are counted."""
     mean = float(neper_to_db(drawn.problem.prior.mu[0, 0]))
-    edges = np.linspace(mean - 15, mean + 15, 41)
+    edges = np.linspace(mean - POWERS_DB, mean + POWERS_DB, 41)
+    truth = neper_to_db(drawn.u)
+    ax.stairs(_density(truth, edges), edges, fill=True, color="0.85")
+    ax.axvline(mean, color="0.3", linestyle=":", linewidth=1.4)
     levels = {
-        (TRUTH, ":"): neper_to_db(drawn.u),
         (VB, "-"): estimated_powers(found["vb_literal"], drawn),
         (ML, "--"): estimated_powers(found["lm"], drawn),
         (OURS, "-."): estimated_powers(found["vb"], drawn),
     }
+    beyond = []
     for (colour, style), level in levels.items():
-        density, _ = np.histogram(level, edges)
-        heights = density / (level.size * np.diff(edges))
-        ax.step(edges[:-1], heights, style, where="post", color=colour, linewidth=1.2)
-    ax.set(xlabel="power, dB", ylabel="density, 1/dB")
+        ax.step(edges[:-1], _density(level, edges), style, where="post", color=colour,
+                linewidth=1.2)  # fmt: skip
+        beyond.append(level.size - int((np.abs(level - mean) <= POWERS_DB).sum()))
+    vb, ml, ours = beyond
+    outside = f"VB {vb}, ML {ml}, ours {ours} of {truth.size} beyond"
+    ax.set(xlabel=f"power, dB ({outside})", ylabel="density, 1/dB")
+    ax.xaxis.label.set_fontsize(8)
+
+
+def _density(level: Float, edges: Float) -> Float:
+    """Return the density of powers, 1/dB, with those beyond the edges counted in its unit."""
+    return np.asarray(np.histogram(level, edges)[0] / (level.size * np.diff(edges)))
 
 
 def estimated_powers(got: TrialEstimates, drawn: Draws) -> Float:

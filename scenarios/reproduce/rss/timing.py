@@ -62,7 +62,7 @@ def _work(trial: Draws) -> dict[str, tuple[Callable[[], object], int]]:
     n = maximize(one, one.prior.mu, one.prior.theta, search).iterations
     work: dict[str, tuple[Callable[[], object], int]] = {
         SEARCH: (lambda: maximize(one, one.prior.mu, one.prior.theta, search), n),
-        DIFFERENCES: (lambda: _numeric_bfgs(one, CYCLES), CYCLES),
+        DIFFERENCES: (lambda: search_by_differences(one, CYCLES), CYCLES),
     }
     for name in ("vb", "vb_literal"):
         solver = SOLVERS[name].replace(max_iterations=CYCLES, tol_u=0.0, tol_theta=1e-6)
@@ -73,8 +73,15 @@ def _work(trial: Draws) -> dict[str, tuple[Callable[[], object], int]]:
     return work
 
 
-def _numeric_bfgs(problem: JointPosterior, iterations: int) -> None:
-    """Run iterations of BFGS with gradients by differences."""
+def search_by_differences(problem: JointPosterior, iterations: int) -> bool:
+    """Return whether iterations of BFGS with gradients by differences raise the posterior.
+
+    Parameters
+    ----------
+    problem : JointPosterior
+        Its prior mean is the start.
+    iterations : int
+    """
     from scipy.optimize import minimize
 
     K = len(problem.prior.mu)
@@ -85,7 +92,7 @@ def _numeric_bfgs(problem: JointPosterior, iterations: int) -> None:
         return -float(problem.log_posterior(u, theta))
 
     x = np.concatenate([problem.prior.mu, problem.prior.theta.ravel()]) / scale
-    minimize(cost, x, method="BFGS", options={"maxiter": iterations})
+    return bool(minimize(cost, x, method="BFGS", options={"maxiter": iterations}).fun < cost(x))
 
 
 def _ms(function: Callable[[], object]) -> float:

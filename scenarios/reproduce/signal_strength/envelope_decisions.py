@@ -64,7 +64,8 @@ def _less_biased(form: str, other: str, N: int, results: EnvelopeResults) -> Dec
     d = np.sign(first.mean()) * first - np.sign(second.mean()) * second
     error = float(d.std() / np.sqrt(len(d)))
     numbers = (
-        f"{first.mean():.2f} and {second.mean():.2f} %, difference {d.mean():.2f} ± {error:.2f}"
+        f"{form} {first.mean():.2f} %, {other} {second.mean():.2f} %; "
+        f"difference {d.mean():.3f} ± {error:.3f} %"
     )
     return Decision(negative(float(d.mean()), error), numbers)
 
@@ -78,7 +79,8 @@ def _nearer(form: str, other: str, N: int, results: EnvelopeResults) -> Decision
     first, second = (
         np.linalg.norm(results.positions[name, N].error, axis=1) for name in (form, other)
     )
-    return below(first, second, "m")
+    holds, numbers = below(first, second, "m")
+    return Decision(holds, f"mean distance, {form} and {other}: {numbers}")
 
 
 def normalised_square(errors: Errors) -> float:
@@ -101,21 +103,31 @@ def _better_stated(form: str, other: str, N: int, results: EnvelopeResults) -> D
         return float(one - two)
 
     d, error = jackknife(off, len(both[0].error))
-    squares = " and ".join(f"{normalised_square(one):.2g}" for one in both)
-    numbers = f"square over the stated one {squares}, 1 if true"
+    squares = [f"{normalised_square(one):.2g}" for one in both]
+    numbers = (
+        f"mean square of the errors over the stated one: {form} {squares[0]}, {other} "
+        f"{squares[1]}; 1 if true"
+    )
     return Decision(negative(d, error), numbers)
 
 
 def gaussian(results: EnvelopeResults) -> Decision:
     """Decide that the envelope is circular Gaussian."""
     p, q = results.law.p_gaussian, results.law.p_circular
-    return Decision(min(p, q) > SIGNIFICANCE, f"probabilities {p:.2f} and {q:.2f}, limit 0.01")
+    return Decision(
+        min(p, q) > SIGNIFICANCE,
+        f"probability of such a deviation from a Gaussian {p:.2f}, from circular "
+        f"{q:.2f}; below 0.01 it is rejected",
+    )
 
 
 def uncorrelated(results: EnvelopeResults) -> Decision:
     """Decide that envelope samples 15 ms apart are uncorrelated."""
     p, one = results.law.p_uncorrelated, results.law.correlation[1]
-    numbers = f"probability {p:.2f}, limit 0.01; adjacent segments of 2.5 ms: {one:.2f}"
+    numbers = (
+        f"probability of such a correlation {p:.2f}, below 0.01 it is rejected; correlation of "
+        f"adjacent segments, 2.5 ms apart, {one:.2f}"
+    )
     return Decision(p > SIGNIFICANCE, numbers)
 
 
@@ -132,13 +144,15 @@ def _near_bound(form: str, N: int, results: EnvelopeResults) -> Decision:
         return float(rms / np.sqrt(np.square(bound[rows]).mean()))
 
     ratio, error = jackknife(excess, len(bound))
-    return Decision(negative(ratio - 1.1, error), f"{ratio:.3f} ± {error:.3f} of it")
+    return Decision(negative(ratio - 1.1, error), f"{ratio:.3f} ± {error:.3f} times the bound")
 
 
 def formula(results: EnvelopeResults) -> Decision:
     """Decide that the simulated probability of detection is that of the formula."""
     exact, found, error = results.detected
-    return Decision(abs(exact - found) < 3 * error, f"{exact:.4f} and {found:.4f} ± {error:.4f}")
+    return Decision(
+        abs(exact - found) < 3 * error, f"formula {exact:.4f}, simulated {found:.4f} ± {error:.4f}"
+    )
 
 
 CLAIMS: tuple[Claim, ...] = (

@@ -136,7 +136,10 @@ def draw_ranges(results: EnvelopeResults) -> Figure:
         if form != EXACT:
             e2 = [np.square(results.positions[form, N].error).sum(axis=1) for N in NUMBERS]
             rms = np.array([float(np.sqrt(e.mean())) for e in e2])
-            half = [float(e.std() / np.sqrt(len(e)) / r) for e, r in zip(e2, rms, strict=True)]
+            half = [
+                float(e.std() / np.sqrt(len(e)) / r)  # 2 errors of the root
+                for e, r in zip(e2, rms, strict=True)
+            ]
             axes[3].errorbar(NUMBERS, rms, half, color=colour, marker=MARKS[form], capsize=3,
                              label="_")  # fmt: skip
     axes[2].plot(NUMBERS, [100 * range_bound(N) for N in NUMBERS], "k:", label="Cramér-Rao bound")
@@ -152,5 +155,6 @@ def draw_ranges(results: EnvelopeResults) -> Figure:
         ax.title.set_fontsize(10)
     handles = [line for ax in (axes[0], axes[2]) for line in ax.get_lines()
                if not str(line.get_label()).startswith("_")]  # fmt: skip
-    figure.legend(handles=handles, fontsize=8, loc="outside upper center", ncols=5, frameon=False)
+    figure.legend(handles=handles, fontsize=8, loc="outside upper center", ncols=5, frameon=False,
+                  title="bars: two standard errors", title_fontsize=8)  # fmt: skip
     return figure

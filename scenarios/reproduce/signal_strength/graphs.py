@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+LABEL = {"facecolor": "white", "edgecolor": "none", "alpha": 0.9, "pad": 1.0}
 KNOWN, LATENT, OBSERVED = "known", "latent", "observed"
 SYMBOLS = {
     "mu": "μ₀", "w": "v₀", "theta": "θ₀", "P": "Σ₀", "sensors": "ζ", "log_noise": "σₙ",
@@ -77,8 +78,13 @@ def _draw_network(ax: Axes, trial: RSSTrial) -> None:
     i = int(np.argsort(distance)[len(distance) // 4])
     sensor = model.sensors[i]
     ax.annotate("", sensor, source, arrowprops={"arrowstyle": "<->", "color": "0.2"})
-    x, y = 0.7 * sensor + 0.3 * source
-    ax.text(x - 4, y + 5, f"R = {distance[i]:.0f} m", fontsize=9)
+    along = (sensor - source) / distance[i]
+    beside = 9.0 * np.array([-along[1], along[0]])  # m, off the arrow
+    centre = 0.5 * (sensor + source)
+    place = max((centre + beside, centre - beside),
+                key=lambda at: np.hypot(*(model.sensors - at).T).min())  # fmt: skip
+    ax.text(place[0], place[1], f"R = {distance[i]:.0f} m", fontsize=9, zorder=5,
+            ha="center", va="center", bbox=LABEL)  # fmt: skip
     for radius in (distance[i] / 3, 2 * distance[i] / 3, distance[i]):
         phi = np.linspace(0, 2 * np.pi, 200)
         ax.plot(source[0] + radius * np.cos(phi), source[1] + radius * np.sin(phi), "--",
@@ -86,7 +92,7 @@ def _draw_network(ax: Axes, trial: RSSTrial) -> None:
     v = source + np.array([22.0, -12.0])
     ax.annotate("", v, source, arrowprops={"arrowstyle": "->", "color": "#d62728", "lw": 1.6})
     ax.text(v[0] + 1.5, v[1] + 1.5, "v", fontsize=11, color="#d62728")
-    ax.set(xlabel="x, m", ylabel="y, m", title="(Fig. 1) sources, wavefronts and sensors")
+    ax.set(xlabel="x, m", ylabel="y, m", title="Fig. 1: sources, wavefronts and sensors")
     ax.set_aspect("equal")
     ax.legend(fontsize=8, loc="lower left")
 
@@ -117,7 +123,7 @@ def _draw_nodes(ax: Axes, n_sources: int, n_sensors: int) -> None:
                                     linestyle=style))  # fmt: skip
         ax.text(x, y - 0.22, label, fontsize=9)
     ax.text(-0.6, -1.15, "σⱼ log-normal, θⱼ Gaussian; ξᵢ ~ N(log σ of sensor i, 1/4N)", fontsize=9)
-    ax.set(xlim=(-0.7, 5.2), ylim=(-1.2, 3.1), title="(Fig. 3) graph of the model")
+    ax.set(xlim=(-0.7, 5.2), ylim=(-1.2, 3.1), title="Fig. 3: graph of the model")
     ax.set_axis_off()
 
 

@@ -61,8 +61,16 @@ class CalibrationScene:
     @property
     def label(self) -> str:
         """Name of the scene."""
-        details = [f"{name} {value}" for name, value in self.parameters.items()]
+        details = [_in_words(name, value) for name, value in self.parameters.items()]
         return ", ".join([self.scenario.removeprefix("svalse_"), *details, f"{self.snr_db:g} dB"])
+
+
+def _in_words(name: str, value: Any) -> str:
+    """Return a parameter of a scenario in words."""
+    if name == "doas":
+        return f"sources at {' and '.join(f'{doa:g}' for doa in value)} degrees"
+    nouns = {"n_sources": "sources", "n_bins": "frequencies", "n_snapshots": "snapshots"}
+    return "1 source" if (name, value) == ("n_sources", 1) else f"{value} {nouns[name]}"
 
 
 HONEST = Coverage((0.65, 0.71), (0.93, 0.97))

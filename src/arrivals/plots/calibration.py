@@ -64,7 +64,11 @@ def plot_reliability(table: Any, *, label: str | None = None, ax: Axes | None = 
 
 
 def plot_coverage(
-    covered: Mapping[str, Sequence[float]], levels: ArrayLike, *, ax: Axes | None = None
+    covered: Mapping[str, Sequence[float]],
+    levels: ArrayLike,
+    *,
+    errors: Mapping[str, Sequence[float]] | None = None,
+    ax: Axes | None = None,
 ) -> Axes:
     """Draw the share of errors within the stated intervals, one row for each scene.
 
@@ -74,6 +78,8 @@ def plot_coverage(
         Shares by scene, in the order of `levels`.
     levels : array_like, shape (n_levels,)
         Nominal coverage, in (0, 1).
+    errors : mapping of str to sequence of float, optional
+        Standard errors of the shares, drawn as bars of two of them.
     ax : matplotlib Axes, optional
         Axes of a new figure if None.
 
@@ -106,11 +112,15 @@ def plot_coverage(
     for n, level in enumerate(nominal):
         colour = PALETTE[n % len(PALETTE)]
         ax.axvline(100 * level, color=colour, linewidth=0.8, linestyle="--")
-        ax.plot(100 * shares[:, n], rows, "o", color=colour, markersize=4, label=f"{level:.0%}")
+        half = None if errors is None else [200 * errors[scene][n] for scene in covered]
+        ax.errorbar(100 * shares[:, n], rows, xerr=half, fmt="o", color=colour, markersize=4,
+                    elinewidth=0.8, label=f"{100 * level:g} %")  # fmt: skip
     ax.set_yticks(rows, list(covered))
     ax.invert_yaxis()
     ax.set(xlabel="errors within the stated interval, %", xlim=(0, 100))
     ax.grid(color="0.92", axis="x")
     ax.set_axisbelow(True)
-    ax.legend(fontsize=8, title="interval", loc="lower left")
+    bars = "" if errors is None else "\nbars: two standard errors"
+    ax.legend(fontsize=8, title=f"stated interval, dashed{bars}", title_fontsize=8,
+              loc="best")  # fmt: skip
     return ax

@@ -13,7 +13,7 @@ from arrivals.scenarios import create, monte_carlo, reliability
 from arrivals.scenarios.metrics import METRICS
 from arrivals.scenarios.reproduce.studies import reproduce
 from arrivals.scenarios.reproduce.svalse import calibration
-from arrivals.scenarios.reproduce.svalse.calibration_scenes import SCENES
+from arrivals.scenarios.reproduce.svalse.calibration_scenes import SCENES, Coverage
 
 statements = st.lists(st.tuples(st.floats(0, 1), st.booleans()), min_size=1, max_size=60)
 
@@ -124,3 +124,55 @@ def test_plots_show_shares_and_intervals() -> None:
 def test_static_directions_beyond_endfire_are_refused(doas: Any) -> None:
     with pytest.raises(ValueError, match=r"doas must be directions in \[-90, 90\] degrees; got"):
         create("static", doas=doas)
+
+
+def stated(share: float, runs: int) -> calibration.Statements:
+    """Return statements of which a share of every run is within 68 and 95 % intervals."""
+    error = np.tile(np.where(np.arange(100) < 100 * share, 0.1, 9.0), runs)
+    of = np.repeat(np.arange(runs), 100)
+    hit = np.ones(len(of), dtype=bool)
+    return calibration.Statements(
+        error, np.ones(len(of)), 0.99 * hit, hit, np.linspace(1.0, 1.2, runs), of, of
+    )
+
+
+@pytest.mark.parametrize(("share", "holds"), [(0.90, True), (0.5, False), (0.80, None)])
+def test_coverage_is_not_decided_at_its_limit(share: float, holds: bool | None) -> None:
+    limits = Coverage((0.80, 0.95), (0.80, 0.95))
+    pooled = {SCENES[0]: calibration.Paired(*[stated(share, 8)] * 2)}
+    decision = calibration.covers(SCENES[0], limits, 0, pooled)
+    if holds is None:  # every run at the limit, give or take one error
+        some = stated(share, 8)
+        some.error[[0, 180]] = 9.0, 0.1
+        pooled = {SCENES[0]: calibration.Paired(some, some)}
+        decision = calibration.covers(SCENES[0], limits, 0, pooled)
+    assert decision is not None
+    assert decision.holds is holds
+    assert decision.numbers.startswith("of 68 %")
+
+
+def test_limits_of_ours_are_checks_in_plain_words() -> None:
+    assert {claim.source for claim in calibration.CLAIMS} == {"check"}
+    words = " ".join(claim.text for claim in calibration.CLAIMS)
+    assert not [
+        word for word in ("brier", "log_score", "n_sources", "doas", "ECE") if word in words
+    ]
+    pooled = {SCENES[0]: calibration.Paired(*[stated(0.7, 8)] * 2)}
+    assert calibration.existence_score("brier", 0.007, pooled).holds
+    change = calibration.changes(SCENES[0], 0.1, pooled)
+    assert change is not None
+    assert change.holds
+    assert "degrees" in change.numbers
+    few = {SCENES[0]: calibration.Paired(*[stated(0.7, 2)] * 2)}  # as in a quick study
+    assert calibration.existence_score("brier", 0.0, few).holds is None
+    change = calibration.changes(SCENES[0], -1.0, few)
+    assert change is not None
+    assert change.holds is None
+
+
+def test_coverage_has_bars_and_a_legend_with_its_unit() -> None:
+    ax = plot_coverage({"walk": [0.67, 0.95]}, [0.68, 0.95], errors={"walk": [0.02, 0.01]})
+    legend = ax.get_legend()
+    assert legend is not None
+    assert [text.get_text() for text in legend.get_texts()] == ["68 %", "95 %"]
+    assert "two standard errors" in legend.get_title().get_text()
