@@ -115,6 +115,8 @@ def compared(names: tuple[str, str], low: Float, high: Float, unit: str) -> Deci
     --------
     >>> compared(("svalse", "ssbl"), np.array([0.1, 0.2]), np.array([0.5, 0.6]), "%").numbers
     'SVALSE: 15; SSBL: 55 %, paired difference -40.00 ± 0.00'
+    >>> compared(("svalse", "svalse paper's form"), np.zeros(2), np.ones(2), "degrees").numbers
+    "svalse: 0; svalse paper's form: 1 degrees, paired difference -1.00 ± 0.00"
     """
     both = ~np.isnan(low - high)
     if not both.any():
@@ -122,6 +124,8 @@ def compared(names: tuple[str, str], low: Float, high: Float, unit: str) -> Deci
     scale = 100.0 if unit.startswith("%") else 1.0
     decision = below(scale * low[both], scale * high[both], unit)
     first, second = (title(name) for name in names)
+    if first == second:  # two forms of a method
+        first, second = names
     means = decision.numbers.replace(" and ", f"; {second}: ", 1)
     return decision._replace(numbers=f"{first}: {means}")
 
