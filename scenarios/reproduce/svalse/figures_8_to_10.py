@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from arrivals.plots.study import METHOD_COLOURS, plot_metric
+from arrivals.scenarios.base import Scenario
 from arrivals.scenarios.bounds.snapshot import LineBound, line_bound
-from arrivals.scenarios.experiments.methods import methods
+from arrivals.scenarios.experiments.methods import Method, methods
 from arrivals.scenarios.experiments.monte_carlo import StudySettings, compute_study
 from arrivals.scenarios.experiments.results_file import Results
 from arrivals.scenarios.experiments.study import Study
@@ -24,7 +25,6 @@ from arrivals.scenarios.reproduce.svalse.forms import (
     PAPER_FORM,
     batch_of,
     paper_forms,
-    table_methods,
 )
 from arrivals.scenarios.reproduce.svalse.plots import panels
 from arrivals.scenarios.reproduce.svalse.published_values import SWEEP, SWEPT
@@ -36,24 +36,29 @@ if TYPE_CHECKING:
 
 SCENES = {"svalse_scenario1": "three static sources", "svalse_scenario2": "six static sources"}
 SNR_DB = tuple(float(snr) for snr in range(0, 45, 5))
-PAPER_FORM_RUNS = 10  # at most: the two forms take 700 s a run
+SLOW_DB, SLOW_RUNS = 15.0, 3  # from this SNR on the paper's forms take 10 to 60 s a run
 OFF_GRID_DB = (30.0, 40.0)
 OFF_GRID = 0.25  # degrees, halfway between the directions of (S)SBL
 PARTS = ("gospa", "distance", "missed", "false", "rmse", "cardinality", "converged")
 MEASURED = {name: METRICS[name] for name in PARTS} | {"number_bias": STEP_METRICS["number_bias"]}
 SHOWN = (*SWEPT[:2], *PAPER_FORM.values(), "valse", "svalse")  # in the tables of the page
-COMPARED_OFF_GRID = ("ssbl", PAPER_FORM["svalse"], "svalse")
+COMPARED_OFF_GRID = ("ssbl", "svalse")
 
 
 @lru_cache(maxsize=2)  # Fig. 10 uses the results of Figs 8 and 9
 def sweep(name: str, runs: int, seed: int, out: Path | None, quick: bool) -> Study:
     """Run all methods on a scene at every SNR; the cases are the SNRs."""
     cases = {f"{snr:g}": create(name, snr_db=snr) for snr in SNR_DB}
-    ours = compute_study(cases, methods(FAST), runs, seed, _settings(runs, out))
+    ours = _study(cases, methods(FAST), runs, seed, out)
     if quick:
         return ours
-    fewer = min(runs, PAPER_FORM_RUNS)
-    return joined(ours, compute_study(cases, paper_forms(), fewer, seed, _settings(fewer, out)))
+    low, high = ({f"{snr:g}": cases[f"{snr:g}"] for snr in SNR_DB if (snr < SLOW_DB) == is_low}
+                 for is_low in (True, False))  # fmt: skip
+    return joined(
+        ours,
+        _study(low, paper_forms(), runs, seed, out),
+        _study(high, paper_forms(), min(runs, SLOW_RUNS), seed, out),
+    )
 
 
 def off_grid(name: str, runs: int, seed: int, out: Path | None) -> Study:
@@ -61,20 +66,28 @@ def off_grid(name: str, runs: int, seed: int, out: Path | None) -> Study:
     cases = {
         f"{snr:g} off grid": create(name, snr_db=snr, offset_deg=OFF_GRID) for snr in OFF_GRID_DB
     }
-    compared = [one for one in table_methods(quick=False) if one.label in COMPARED_OFF_GRID]
-    fewer = min(runs, PAPER_FORM_RUNS)
-    return compute_study(cases, compared, fewer, seed, _settings(fewer, out))
+    ours = _study(cases, methods(COMPARED_OFF_GRID), runs, seed, out)
+    return joined(ours, _study(cases, paper_forms()[1:], min(runs, SLOW_RUNS), seed, out))
 
 
-def _settings(runs: int, out: Path | None) -> StudySettings:
-    return StudySettings(MEASURED, out, batch=batch_of(runs))
+def _study(
+    cases: Mapping[str, Scenario],
+    compared: Sequence[Method],
+    runs: int,
+    seed: int,
+    out: Path | None,
+) -> Study:
+    settings = StudySettings(MEASURED, out, batch=batch_of(runs))
+    return compute_study(cases, compared, runs, seed, settings)
 
 
-def joined(first: Study, second: Study) -> Study:
-    """Return the results of two studies of the same cases and seed as one, in memory."""
-    config = {**first.config, "methods": first.config["methods"] + second.config["methods"]}
-    results = Results(config, None)
-    results.add([*first.rows(), *second.rows()])
+def joined(first: Study, *others: Study) -> Study:
+    """Return the results of studies of the same seed, cases all in the first, as one in memory."""
+    labelled = {
+        method["label"]: method for one in (first, *others) for method in one.config["methods"]
+    }
+    results = Results({**first.config, "methods": list(labelled.values())}, None)
+    results.add(row for one in (first, *others) for row in one.rows())
     return Study(results)
 
 
@@ -111,23 +124,25 @@ def parts(name: str, figure: str, runs: int, seed: int, out: Path | None, quick:
 
 
 def numbers(runs: int, quick: bool) -> str:
-    """Return the number of runs, and that of the paper's forms, for a title.
+    """Return the number of runs, and that of the paper's forms at high SNR, for a title.
 
     Examples
     --------
     >>> numbers(2, quick=True)
     '2 runs'
     """
-    fewer = min(runs, PAPER_FORM_RUNS)
-    return f"{runs} runs" if quick or fewer == runs else f"{runs} runs (paper's form {fewer})"
+    fewer = min(runs, SLOW_RUNS)
+    if quick or fewer == runs:
+        return f"{runs} runs"
+    return f"{runs} runs (paper's form from {SLOW_DB:g} dB on: {fewer})"
 
 
 def fewer_runs(runs: int) -> str:
     """Return the remark on the number of runs of the paper's forms."""
     return (
-        f"The paper has 100 runs, this table {runs}; the paper's forms of VALSE and SVALSE, and "
-        f"all methods off the grid, have the first {min(runs, PAPER_FORM_RUNS)} of them; paired "
-        "differences are over the runs that both methods have."
+        f"The paper has 100 runs, this table {runs}. From {SLOW_DB:g} dB on, the paper's forms of "
+        f"VALSE and SVALSE have the first {min(runs, SLOW_RUNS)} of them; paired differences are "
+        "over the runs that both methods have."
     )
 
 
