@@ -189,7 +189,7 @@ def test_track_of_a_band_is_equal_for_wav_and_stream(
         (("--tracker", "svalse", "--band", "600", "2500"), "half the rate, 2000 Hz"),
         (("--band", "600", "3000"), "half the rate, 2000 Hz"),
         (("--tracker", "ekf"), "requires motion, measurement, x, P, not an array file"),
-        (("--set", "variant=Z"), "variant must be one of 'B'"),
+        (("--set", "variant=Z"), "variant must be one of 'literal', 'B'"),
     ],
 )
 def test_track_of_a_band_with_invalid_arguments_is_refused(
