@@ -178,7 +178,7 @@ def below(lower: ArrayLike, higher: ArrayLike, unit: str = "") -> Decision:
     Examples
     --------
     >>> below([1.0, 1.2, 1.1], [2.0, 2.1, 2.3])
-    Decision(holds=True, numbers='1.1 and 2.1, paired difference -1.03 ± 0.09')
+    Decision(holds=True, numbers='1.1 and 2.13, paired difference -1.03 ± 0.09')
     """
     first, second = np.asarray(lower, dtype=float), np.asarray(higher, dtype=float)
     d = first - second
