@@ -1,14 +1,16 @@
-"""Statistics over the runs of a study: bootstrap intervals and paired differences."""
+"""Statistics over the runs of a study: standard errors, intervals and paired differences."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
 
-from arrivals.typing import Float
+from arrivals.typing import Float, Int
 from arrivals.validation import LARGEST, SMALLEST, number, real
+
+GROUPS = 25  # of runs, for the jackknife
 
 
 class Difference(NamedTuple):
@@ -38,8 +40,19 @@ def paired_difference(first: Mapping[int, float], second: Mapping[int, float]) -
     """
     d = np.array([first[run] - second[run] for run in first if run in second], dtype=np.float64)
     n = len(d)
-    error = float(d.std(ddof=1) / np.sqrt(n)) if n > 1 else np.nan
-    return Difference(float(d.mean()) if n else np.nan, error, int((d < 0).sum()), n)
+    mean = float(d.mean()) if n else np.nan
+    return Difference(mean, standard_error(d), int((d < 0).sum()), n)
+
+
+def standard_error(values: Float) -> float:
+    """Return the standard error of the mean; NaN for fewer than two values.
+
+    Examples
+    --------
+    >>> standard_error(np.array([1.0, 3.0]))
+    1.0
+    """
+    return float(values.std(ddof=1) / np.sqrt(len(values))) if len(values) > 1 else np.nan
 
 
 def bootstrap_interval(values: Float, level: float = 0.95) -> tuple[float, float]:
@@ -70,3 +83,33 @@ def bootstrap_interval(values: Float, level: float = 0.95) -> tuple[float, float
         rng=np.random.default_rng(0),
     ).confidence_interval  # fmt: skip
     return float(interval.low), float(interval.high)
+
+
+def jackknife(statistic: Callable[[Int], float], n_runs: int) -> tuple[float, float]:
+    """Return a statistic of all runs, and its standard error by leaving out groups of runs.
+
+    Parameters
+    ----------
+    statistic : callable
+        Takes indices of runs.
+    n_runs : int
+
+    References
+    ----------
+    Efron, *The Jackknife, the Bootstrap and Other Resampling Plans*, 1982, ch. 3.
+
+    Examples
+    --------
+    >>> mean, error = jackknife(lambda runs: float(runs.mean()), 100)
+    >>> mean, round(error, 2)
+    (49.5, 5.89)
+    """
+    rows = np.arange(n_runs)
+    groups = min(GROUPS, n_runs)
+    if groups < 2:
+        return statistic(rows), np.nan
+    left = np.array([
+        statistic(np.delete(rows, part)) for part in np.array_split(rows, groups)
+    ])  # fmt: skip
+    spread = np.square(left - left.mean()).sum() * (groups - 1) / groups
+    return statistic(rows), float(np.sqrt(spread))

@@ -1,13 +1,12 @@
-"""Claims, functions that decide them, and verdicts: one line each."""
+"""Claims and the verdicts on them: one line each."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple, TypeAlias
+from typing import Any, Literal
 
-import numpy as np
-from numpy.typing import ArrayLike
+from arrivals.scenarios.reproduce.decisions import WORDS, Decide, Decision
 
 Source = Literal["paper", "ours", "check"]
 HEADINGS: dict[Source, str] = {
@@ -16,25 +15,6 @@ HEADINGS: dict[Source, str] = {
     "check": "Checks of these programs",
 }
 FORMS = ("by the paper's form", "by ours")
-WORDS = {True: "holds", False: "does not hold", None: "not decided"}
-
-
-class Decision(NamedTuple):
-    """Whether a claim holds, and the numbers that decide it.
-
-    Parameters
-    ----------
-    holds : bool or None
-        None where the runs do not decide it.
-    numbers : str
-        The numbers, with their units.
-    """
-
-    holds: bool | None
-    numbers: str
-
-
-Decide: TypeAlias = Callable[[Any], Decision | None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,49 +121,3 @@ def counts(verdicts: Iterable[Verdict]) -> dict[str, list[int]]:
         row = table.setdefault(verdict.claim.source, [0, 0, 0])
         row[(True, False, None).index(verdict.holds)] += 1
     return table
-
-
-def negative(mean: float, error: float) -> bool | None:
-    """Return True if a mean is below zero, None if it is within two standard errors of zero.
-
-    Examples
-    --------
-    >>> negative(-1.0, 0.1), negative(-0.1, 0.1), negative(-1.0, float("nan"))
-    (True, None, None)
-    """
-    return mean < 0 if abs(mean) > 2 * error else None
-
-
-def all_of(decisions: Iterable[bool | None]) -> bool | None:
-    """Return True if all hold, False if one does not, else None.
-
-    Examples
-    --------
-    >>> all_of([True, None]), all_of([None, False])
-    (None, False)
-    """
-    found = set(decisions)
-    return False if False in found else None if None in found else True
-
-
-def below(lower: ArrayLike, higher: ArrayLike, unit: str = "") -> Decision:
-    """Decide by paired runs that one figure is below another.
-
-    Parameters
-    ----------
-    lower, higher : array_like, shape (n_runs,)
-    unit : str
-        Unit of the figures.
-
-    Examples
-    --------
-    >>> below([1.0, 1.2, 1.1], [2.0, 2.1, 2.3])
-    Decision(holds=True, numbers='1.1 and 2.13, paired difference -1.03 ± 0.09')
-    """
-    first, second = np.asarray(lower, dtype=float), np.asarray(higher, dtype=float)
-    d = first - second
-    error = float(d.std(ddof=1) / np.sqrt(len(d))) if len(d) > 1 else np.nan
-    of = f" {unit}" if unit else ""
-    means = f"{first.mean():.3g} and {second.mean():.3g}{of}"
-    spread = f"paired difference {d.mean():.2f} ± {error:.2f}" if len(d) > 1 else "one run"
-    return Decision(negative(float(d.mean()), error), f"{means}, {spread}")

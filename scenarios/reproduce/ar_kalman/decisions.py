@@ -4,16 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 
+from arrivals.scenarios.experiments.statistics import standard_error
 from arrivals.scenarios.reproduce.ar_kalman.experiments import INNER, LITERAL, OURS, REPORT
 from arrivals.scenarios.reproduce.ar_kalman.scores import Results
-from arrivals.scenarios.reproduce.claims import Decide, Decision, all_of, below, negative
+from arrivals.scenarios.reproduce.decisions import (
+    Both,
+    Decide,
+    Decision,
+    all_of,
+    below,
+    by_forms,
+    mean_negative,
+    negative,
+    share,
+)
 from arrivals.typing import Float
 
-Both: TypeAlias = tuple[Decide, Decide]  # by the report's form, and by ours
 CONVERGED, HALF = 0.5, 2.5  # degrees; half of the initial error of moving sources
 DIFFERENCE = 0.25  # of a score: smaller ones are not significant
 SYSTEMATIC = 0.2  # of a processor time: differences between machines and loads
@@ -22,7 +32,7 @@ VOICES = ("voice 1", "voice 2")
 
 def by_both(decide: Callable[..., Decision | None], *args: Any) -> Both:
     """Return a function that decides by the report's form, and one by ours."""
-    return partial(decide, REPORT, *args), partial(decide, OURS, *args)
+    return by_forms((REPORT, OURS), decide, *args)
 
 
 def values(results: Results, metric: str, form: str, *names: str) -> list[Float] | None:
@@ -32,29 +42,9 @@ def values(results: Results, metric: str, form: str, *names: str) -> list[Float]
     return given if len(given) == len(found) else None
 
 
-def error_of(runs: Float) -> float:
-    """Return the standard error of the mean; NaN for one run.
-
-    Examples
-    --------
-    >>> error_of(np.array([1.0, 3.0]))
-    1.0
-    """
-    return float(runs.std(ddof=1) / np.sqrt(len(runs))) if len(runs) > 1 else float("nan")
-
-
-def paired(names: tuple[str, str], lower: Float, higher: Float, unit: str = "degrees") -> Decision:
-    """Decide by the same runs that one figure is below another one; name both in the numbers."""
-    decision = below(lower, higher)
-    spread = decision.numbers.partition(", ")[2]
-    first, second = (f"{name}: {one.mean():.3g}"
-                     for name, one in zip(names, (lower, higher), strict=True))  # fmt: skip
-    return Decision(decision.holds, f"{first}; {second} {unit}, {spread}")
-
-
 def named_means(names: Sequence[str], found: Sequence[Float], unit: str) -> str:
     """Return the means of parts with their standard errors, with names if there are several."""
-    each = [f"{one.mean():.2g} ± {error_of(one):.1g}" for one in found]
+    each = [f"{one.mean():.2g} ± {standard_error(one):.1g}" for one in found]
     if len(each) > 1:
         each = [f"{name}: {mean}" for name, mean in zip(names, each, strict=True)]
     return f"{'; '.join(each)} {unit}"
@@ -66,12 +56,12 @@ def under(metric: str, limit: float, *names: str, unit: str = "degrees") -> Both
 
 
 def _under(
-    form: str, metric: str, limit: float, names: Sequence[str], unit: str, results: Results
+    metric: str, limit: float, names: Sequence[str], unit: str, form: str, results: Results
 ) -> Decision | None:
     found = values(results, metric, form, *names)
     if found is None:
         return None
-    holds = all_of(negative(float(one.mean()) - limit, error_of(one)) for one in found)
+    holds = all_of(mean_negative(one - limit) for one in found)
     return Decision(holds, named_means(names, found, unit))
 
 
@@ -81,12 +71,12 @@ def lower(metric: str, lowest: str, highest: str, unit: str = "degrees") -> Both
 
 
 def _lower(
-    form: str, metric: str, lowest: str, highest: str, unit: str, results: Results
+    metric: str, lowest: str, highest: str, unit: str, form: str, results: Results
 ) -> Decision | None:
     found = values(results, metric, form, lowest, highest)
     if found is None:
         return None
-    return paired((lowest, highest), np.abs(found[0]), np.abs(found[1]), unit)
+    return below(np.abs(found[0]), np.abs(found[1]), unit, (lowest, highest))
 
 
 def better_than(method: str, *names: str) -> Both:
@@ -94,14 +84,14 @@ def better_than(method: str, *names: str) -> Both:
     return by_both(_better_than, method, names)
 
 
-def _better_than(form: str, method: str, names: Sequence[str], results: Results) -> Decision | None:
+def _better_than(method: str, names: Sequence[str], form: str, results: Results) -> Decision | None:
     mine = values(results, "rmse", form, *names)
     others = values(results, "rmse", method, *names)
     if mine is None or others is None:
         return None
     n = min(map(len, others))
     first, second = (np.mean([one[:n] for one in many], axis=0) for many in (mine, others))
-    return paired(("tracker", method.upper()), first, second)
+    return below(first, second, "degrees", ("tracker", method.upper()))
 
 
 def mainly_bias(*names: str) -> Both:
@@ -109,12 +99,13 @@ def mainly_bias(*names: str) -> Both:
     return by_both(_mainly_bias, names)
 
 
-def _mainly_bias(form: str, names: Sequence[str], results: Results) -> Decision | None:
+def _mainly_bias(names: Sequence[str], form: str, results: Results) -> Decision | None:
     bias, spread = (values(results, metric, form, *names) for metric in ("bias", "spread"))
     if bias is None or spread is None:
         return None
     size = [np.sign(one.mean()) * one for one in bias]
-    decision = paired(("spread", "bias"), np.mean(spread, axis=0), np.mean(size, axis=0))
+    means = np.mean(spread, axis=0), np.mean(size, axis=0)
+    decision = below(*means, "degrees", ("spread", "bias"))
     each = ", ".join(f"{one.mean():.2g}" for one in size)
     return Decision(decision.holds, f"bias {each} degrees; on average {decision.numbers}")
 
@@ -124,19 +115,18 @@ def grows_more(low: str, high: str) -> Both:
     return by_both(_grows_more, low, high)
 
 
-def _grows_more(form: str, low: str, high: str, results: Results) -> Decision | None:
+def _grows_more(low: str, high: str, form: str, results: Results) -> Decision | None:
     doa = values(results, "rmse", form, low, high)
     models = values(results, "ar error", form, low, high)
     if doa is None or models is None:
         return None
     directions, others = (np.log2(one[0] / one[1]) for one in (doa, models))
-    holds = below(others, directions).holds
     d = directions - others
     numbers = (
         f"the error grows by {directions.mean():.2f} octaves of the directions, "
-        f"{others.mean():.2f} of the AR models, difference {d.mean():.2f} ± {error_of(d):.2f}"
+        f"{others.mean():.2f} of the AR models, difference {d.mean():.2f} ± {standard_error(d):.2f}"
     )
-    return Decision(holds, numbers)
+    return Decision(mean_negative(-d), numbers)
 
 
 def same(metric: str, name: str, other: str, unit: str = "degrees") -> Both:
@@ -145,7 +135,7 @@ def same(metric: str, name: str, other: str, unit: str = "degrees") -> Both:
 
 
 def _same(
-    form: str, metric: str, name: str, other: str, unit: str, results: Results
+    metric: str, name: str, other: str, unit: str, form: str, results: Results
 ) -> Decision | None:
     found = values(results, metric, form, name, other)
     if found is None:
@@ -153,22 +143,10 @@ def _same(
     one, right = found
     # beyond the upper limit, and beyond the lower one
     beyond = one - (1 + DIFFERENCE) * right, (1 - DIFFERENCE) * right - one
-    holds = all_of(negative(float(d.mean()), error_of(d)) for d in beyond)
+    holds = all_of(map(mean_negative, beyond))
     d = one - right
     numbers = f"{name}: {one.mean():.3g}; {other}: {right.mean():.3g} {unit}"
-    return Decision(holds, f"{numbers}, difference {d.mean():.2g} ± {error_of(d):.1g}")
-
-
-def share_above(values: Float, limit: float) -> tuple[float, float]:
-    """Return the share of values above a limit, and its standard error, not zero for few values.
-
-    Examples
-    --------
-    >>> share_above(np.array([1.0, 2.0, 2.0, 2.0]), 0.5)
-    (1.0, 0.125)
-    """
-    share = float((values > limit).mean())
-    return share, float(np.sqrt((share * (1 - share) + 0.25 / len(values)) / len(values)))
+    return Decision(holds, f"{numbers}, difference {d.mean():.2g} ± {standard_error(d):.1g}")
 
 
 def fails(limit: float, *names: str) -> Both:
@@ -176,13 +154,13 @@ def fails(limit: float, *names: str) -> Both:
     return by_both(_fails, limit, names)
 
 
-def _fails(form: str, limit: float, names: Sequence[str], results: Results) -> Decision | None:
+def _fails(limit: float, names: Sequence[str], form: str, results: Results) -> Decision | None:
     found = values(results, "rmse", form, *names)
     if found is None:
         return None
-    share, error = share_above(np.concatenate(found), limit)
-    numbers = f"in {share:.0%} of the runs, RMSE {named_means(names, found, 'degrees')}"
-    return Decision(negative(0.5 - share, error), numbers)
+    part, error = share(np.concatenate(found) > limit)
+    numbers = f"in {part:.0%} of the runs, RMSE {named_means(names, found, 'degrees')}"
+    return Decision(negative(0.5 - part, error), numbers)
 
 
 def doubles(metric: str, name: str, right: str, unit: str = "degrees") -> Both:
@@ -191,26 +169,28 @@ def doubles(metric: str, name: str, right: str, unit: str = "degrees") -> Both:
 
 
 def _doubles(
-    form: str, metric: str, name: str, right: str, unit: str, results: Results
+    metric: str, name: str, right: str, unit: str, form: str, results: Results
 ) -> Decision | None:
     found = values(results, metric, form, name, right)
     if found is None:
         return None
     d = found[0] / found[1]
-    holds = negative(2 - float(d.mean()), error_of(d))
+    holds = mean_negative(2 - d)
     means = f"{name}: {found[0].mean():.3g}; right: {found[1].mean():.3g} {unit}"
-    return Decision(holds, f"{means}, {d.mean():.2f} ± {error_of(d):.2f} times")
+    return Decision(holds, f"{means}, {d.mean():.2f} ± {standard_error(d):.2f} times")
 
 
 def averaging() -> Both:
     """Decide that all pairs together have a smaller spread than the inner pair alone."""
-    return partial(_averaging, REPORT), partial(_averaging, OURS)
+    return by_both(_averaging)
 
 
 def _averaging(form: str, results: Results) -> Decision | None:
     whole = values(results, "spread", form, "M = 2")
     inner = values(results, "spread", INNER[form], "M = 2")
-    return paired(("all", "inner"), whole[0], inner[0]) if whole and inner else None
+    if not whole or not inner:
+        return None
+    return below(whole[0], inner[0], "degrees", ("all", "inner"))
 
 
 def in_real_time(name: str) -> Both:
@@ -218,11 +198,11 @@ def in_real_time(name: str) -> Both:
     return by_both(_in_real_time, name)
 
 
-def _in_real_time(form: str, name: str, results: Results) -> Decision | None:
+def _in_real_time(name: str, form: str, results: Results) -> Decision | None:
     used, lasts = results.get(("cpu ms", form, name)), results.get(("duration ms", "", name))
     if used is None or lasts is None:
         return None
-    n, spread = round(8 * lasts[0]), max(error_of(used), SYSTEMATIC * float(used.mean()))
+    n, spread = round(8 * lasts[0]), max(standard_error(used), SYSTEMATIC * float(used.mean()))
     numbers = f"{used.mean():.1f} ms of the processor for {n} samples, {lasts[0]:.2f} ms at 8 kHz"
     return Decision(negative(float(used.mean() - lasts[0]), spread), numbers)
 
@@ -250,5 +230,5 @@ def _literal_fails(limit: float, names: Sequence[str], results: Results) -> Deci
     found = values(results, "rmse", LITERAL, *names)
     if found is None:
         return None
-    holds = all_of(negative(limit - float(one.mean()), error_of(one)) for one in found)
+    holds = all_of(mean_negative(limit - one) for one in found)
     return Decision(holds, f"RMSE {named_means(names, found, 'degrees')}")

@@ -8,13 +8,12 @@ import numpy as np
 
 from arrivals.scenarios.reproduce.ar_kalman.decisions import (
     literal_fails,
-    paired,
-    share_above,
     values,
 )
 from arrivals.scenarios.reproduce.ar_kalman.experiments import OURS, REPORT
 from arrivals.scenarios.reproduce.ar_kalman.scores import Results
-from arrivals.scenarios.reproduce.claims import Claim, Decision, all_of, negative
+from arrivals.scenarios.reproduce.claims import Claim
+from arrivals.scenarios.reproduce.decisions import Decision, all_of, below, negative, share
 
 STUDY = "ar-kf"
 # Largest medians of the RMSE that are accepted, degrees
@@ -26,7 +25,9 @@ ACCEPTED = {"30 dB": 0.12, "N = 3, d = .5, 1": 0.85, "N = 30, d = .5, 1": 0.2, "
 def improved(name: str, results: Results) -> Decision | None:
     """Decide that our form has less error than the report's."""
     ours, report = (values(results, "rmse", form, name) for form in (OURS, REPORT))
-    return paired(("ours", "report's form"), ours[0], report[0]) if ours and report else None
+    if not ours or not report:
+        return None
+    return below(ours[0], report[0], "degrees", ("ours", "report's form"))
 
 
 def within_limits(results: Results) -> Decision | None:
@@ -37,7 +38,7 @@ def within_limits(results: Results) -> Decision | None:
         return None
     medians = {name: float(np.median(one)) for name, one in runs.items()}
     worst = max(medians, key=lambda name: medians[name])
-    shares = [share_above(one, 1.0) for one in runs.values()]
+    shares = [share(one > 1.0) for one in runs.values()]
     holds = all_of(negative(share - 0.5, error) for share, error in shares)
     return Decision(holds, f"at most {medians[worst]:.0%} of the limit, at {worst}")
 

@@ -10,7 +10,15 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from arrivals.scenarios.reproduce.claims import Decision, all_of, below, negative
+from arrivals.scenarios.experiments.statistics import standard_error
+from arrivals.scenarios.reproduce.decisions import (
+    Decision,
+    all_of,
+    difference,
+    mean_negative,
+    negative,
+    share,
+)
 from arrivals.typing import Float
 
 # Values of the trials by the study's case, such as (source, method, direction)
@@ -62,7 +70,7 @@ def lower_variance(
         return None
     d = first - factor * second
     numbers = f"{method} {first.mean():.3g}, {than} {second.mean():.3g} degrees²"
-    return Decision(negative(float(d.mean()), standard_error(d)), numbers)
+    return Decision(mean_negative(d), numbers)
 
 
 def zero_variance(method: str, results: Results, *, cases: Iterable[Any] = ()) -> Decision | None:
@@ -150,15 +158,8 @@ def smaller_at_75(method: str, results: Results, *, source: str) -> Decision | N
     if not {15.0, 75.0} <= set(ends):
         return None
     first, second = ((ends[doa] - ends[doa].mean()) ** 2 for doa in (75.0, 15.0))
-    holds, spread = _paired(first, second)
     numbers = f"{method} {first.mean():.3g} at 75 and {second.mean():.3g} degrees² at 15"
-    return Decision(holds, f"{numbers}, {spread}")
-
-
-def _paired(first: Float, second: Float) -> tuple[bool | None, str]:
-    """Return whether one figure is below another one in the same trials, and the difference."""
-    decision = below(first, second)
-    return decision.holds, decision.numbers.partition(", ")[2]
+    return Decision(mean_negative(first - second), f"{numbers}, {difference(first - second)}")
 
 
 # -- Figs 2 to 8: errors by (figure's case, method, ...) ---------------------------------------
@@ -176,11 +177,9 @@ def mostly_near(
     errors = results.get((*key, method))
     if errors is None:
         return None
-    near = np.abs(errors) < limit
-    share = float(near.mean())
-    spread = float(np.sqrt((share * (1 - share) + 0.25 / len(near)) / len(near)))
+    near, spread = share(np.abs(errors) < limit)
     median = f"median error {np.median(np.abs(errors)):.2g} {unit}".rstrip()
-    return Decision(negative(0.5 - share, spread), f"{method} {share:.0%} of the trials, {median}")
+    return Decision(negative(0.5 - near, spread), f"{method} {near:.0%} of the trials, {median}")
 
 
 def smaller(
@@ -192,9 +191,8 @@ def smaller(
     if not len(first) == len(second) == len(cases):
         return None
     mine, others = np.mean(first, axis=0), np.mean(second, axis=0)
-    holds, spread = _paired(mine, others)
     numbers = f"{method} {mine.mean():.3g}, {than} {others.mean():.3g} {unit}"
-    return Decision(holds, f"{numbers}, {spread}")
+    return Decision(mean_negative(mine - others), f"{numbers}, {difference(mine - others)}")
 
 
 def rms_below(
@@ -210,7 +208,7 @@ def rms_below(
     d = first - second
     rms = [float(np.sqrt(np.mean(each))) for each in (first, second)]
     numbers = f"{method} {rms[0]:.3g}, {than} {rms[1]:.3g} degrees"
-    return Decision(negative(float(d.mean()), standard_error(d)), numbers)
+    return Decision(mean_negative(d), numbers)
 
 
 def variance_below(
@@ -230,7 +228,7 @@ def variance_below(
         return None
     d = first - factor * second
     numbers = f"{method} {first.mean():.3g}, {than} {second.mean():.3g} degrees²"
-    return Decision(negative(float(d.mean()), standard_error(d)), numbers)
+    return Decision(mean_negative(d), numbers)
 
 
 def _squares_of(
@@ -253,15 +251,4 @@ def near_bound(
     ratio = np.mean([(results[(*c, method)] / results[(*c, "CRB")]) ** 2 for c in cases], axis=0)
     error = standard_error(ratio)
     numbers = f"{ratio.mean():.2f} ± {error:.2f} times that of the bound"
-    return Decision(negative(float(ratio.mean()) - CLOSE, error), numbers)
-
-
-def standard_error(values: Float) -> float:
-    """Return the standard error of the mean; NaN for one value.
-
-    Examples
-    --------
-    >>> standard_error(np.array([1.0, 3.0]))
-    1.0
-    """
-    return float(values.std(ddof=1) / np.sqrt(len(values))) if len(values) > 1 else float("nan")
+    return Decision(mean_negative(ratio - CLOSE), numbers)

@@ -8,12 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any, TypeAlias
+from typing import Any
 
-from arrivals.scenarios.reproduce.claims import WORDS, Decide, Decision
+from arrivals.scenarios.reproduce.decisions import WORDS, Both, Decide, Decision
 from arrivals.scenarios.reproduce.interpolation.decisions import Results
 
-Both: TypeAlias = tuple[Decide, Decide]  # by the paper's form, and by ours
 PAPER, PRINTED, OURS = "frozen", "literal", "C"
 SOURCE_NAMES = {"tone": "a tone", "band": "a band", "qpc": "coupled tones"}
 

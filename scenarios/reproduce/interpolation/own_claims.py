@@ -6,9 +6,11 @@ from functools import partial
 
 import numpy as np
 
-from arrivals.scenarios.reproduce.claims import Claim, Decision, all_of, negative
+from arrivals.scenarios.experiments.statistics import standard_error
+from arrivals.scenarios.reproduce.claims import Claim
+from arrivals.scenarios.reproduce.decisions import Decision, all_of, negative
 from arrivals.scenarios.reproduce.interpolation import decisions as itp
-from arrivals.scenarios.reproduce.interpolation.decisions import Results, standard_error
+from arrivals.scenarios.reproduce.interpolation.decisions import Results
 from arrivals.scenarios.reproduce.interpolation.forms import OURS, PAPER, SOURCE_NAMES
 from arrivals.scenarios.reproduce.interpolation.trials import SOURCES, bound_deg
 

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from arrivals.scenarios.experiments.statistics import standard_error
 from arrivals.scenarios.experiments.workers import parallel_map
-from arrivals.scenarios.reproduce.interpolation.decisions import CUT_OFF, standard_error
+from arrivals.scenarios.reproduce.interpolation.decisions import CUT_OFF
 from arrivals.scenarios.reproduce.interpolation.plots import LEAVES, draw_rmse, make_figure
 from arrivals.scenarios.reproduce.interpolation.trials import (
     SOURCES,

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from arrivals.scenarios.reproduce.claims import Decision, negative
+from arrivals.scenarios.experiments.statistics import standard_error
+from arrivals.scenarios.reproduce.decisions import Decision, negative
 from arrivals.scenarios.reproduce.interpolation.beamformers import Method
-from arrivals.scenarios.reproduce.interpolation.decisions import Results, standard_error
+from arrivals.scenarios.reproduce.interpolation.decisions import Results
 from arrivals.scenarios.reproduce.interpolation.plots import COLOURS, make_figure
 from arrivals.scenarios.reproduce.interpolation.trials import (
     SOURCES,

@@ -6,7 +6,15 @@ from functools import partial
 
 import numpy as np
 
-from arrivals.scenarios.reproduce.claims import Decide, Decision, negative
+from arrivals.scenarios.experiments.statistics import jackknife
+from arrivals.scenarios.reproduce.decisions import (
+    Both,
+    Decide,
+    Decision,
+    by_forms,
+    negative,
+    share,
+)
 from arrivals.scenarios.reproduce.rss.convergence import JUMP
 from arrivals.scenarios.reproduce.rss.decisions import (
     FEW,
@@ -14,12 +22,9 @@ from arrivals.scenarios.reproduce.rss.decisions import (
     LITERAL,
     ML,
     OURS,
-    Both,
     Key,
     Table1Results,
     at_most,
-    jackknife,
-    share,
 )
 from arrivals.scenarios.reproduce.rss.timing import DIFFERENCES
 from arrivals.typing import Bool, Float, Int
@@ -33,12 +38,11 @@ FEWEST = 5  # trials of a kind, and others, that are ranked
 
 def mostly(field: str, case: str) -> Both:
     """Decide that something happens in more than half of the runs."""
-    paper, ours = (partial(_mostly, field, (case, name)) for name in (LITERAL, OURS))
-    return paper, ours
+    return by_forms((LITERAL, OURS), _mostly, field, case)
 
 
-def _mostly(field: str, key: Key, results: Table1Results) -> Decision | None:
-    flags = getattr(results, field).get(key)
+def _mostly(field: str, case: str, method: str, results: Table1Results) -> Decision | None:
+    flags = getattr(results, field).get((case, method))
     return None if flags is None else _more_than(0.5, flags)
 
 
@@ -59,12 +63,11 @@ def _jumps_mostly(key: Key, results: Table1Results) -> Decision | None:
 
 def always(field: str, case: str) -> Both:
     """Decide that something happens in all runs; not decided by few runs."""
-    paper, ours = (partial(_always, field, (case, name)) for name in (LITERAL, OURS))
-    return paper, ours
+    return by_forms((LITERAL, OURS), _always, field, case)
 
 
-def _always(field: str, key: Key, results: Table1Results) -> Decision | None:
-    flags = getattr(results, field).get(key)
+def _always(field: str, case: str, method: str, results: Table1Results) -> Decision | None:
+    flags = getattr(results, field).get((case, method))
     if flags is None:
         return None
     holds = False if not flags.all() else True if len(flags) >= MANY_RUNS else None
@@ -73,8 +76,7 @@ def _always(field: str, key: Key, results: Table1Results) -> Decision | None:
 
 def as_good_after_few(case: str) -> Both:
     """Decide that the location error after 9 cycles is within a tenth of that after 30."""
-    paper, ours = (partial(_as_good, case, name) for name in (LITERAL, OURS))
-    return paper, ours
+    return by_forms((LITERAL, OURS), _as_good, case)
 
 
 def _as_good(case: str, method: str, results: Table1Results) -> Decision | None:
@@ -87,8 +89,7 @@ def _as_good(case: str, method: str, results: Table1Results) -> Decision | None:
 
 def more_stuck(case: str) -> Both:
     """Decide that ML ends near a local maximum more often than VB."""
-    paper, ours = (partial(_more_stuck, case, name) for name in (LITERAL, OURS))
-    return paper, ours
+    return by_forms((LITERAL, OURS), _more_stuck, case)
 
 
 def _more_stuck(case: str, method: str, results: Table1Results) -> Decision | None:
@@ -100,8 +101,7 @@ def _more_stuck(case: str, method: str, results: Table1Results) -> Decision | No
 
 def more_divergent(case: str) -> Both:
     """Decide that VB diverges more often than ML."""
-    paper, ours = (partial(_more_divergent, case, name) for name in (LITERAL, OURS))
-    return paper, ours
+    return by_forms((LITERAL, OURS), _more_divergent, case)
 
 
 def _more_divergent(case: str, method: str, results: Table1Results) -> Decision | None:
@@ -140,12 +140,11 @@ def without_direction(case: str) -> Both:
 
     By the paper's form the search has gradients by differences; ours has analytic ones.
     """
-    paper, ours = (partial(_without_direction, (case, name)) for name in (DIFFERENCES, ML))
-    return paper, ours
+    return by_forms((DIFFERENCES, ML), _without_direction, case)
 
 
-def _without_direction(key: Key, results: Table1Results) -> Decision | None:
-    flags = results.unmoved.get(key)
+def _without_direction(case: str, method: str, results: Table1Results) -> Decision | None:
+    flags = results.unmoved.get((case, method))
     return None if flags is None else _more_than(OFTEN, flags)
 
 
@@ -166,22 +165,21 @@ def ranked(score: Float, event: Bool) -> float:
 
 def visible(case: str) -> Both:
     """Decide that the divergence of VB is easy to detect by its largest step."""
-    paper, ours = (partial(_visible, (case, name)) for name in (LITERAL, OURS))
-    return paper, ours
+    return by_forms((LITERAL, OURS), _visible, case)
 
 
-def _visible(key: Key, results: Table1Results) -> Decision | None:
-    found = _of_steps(key, results)
+def _visible(case: str, method: str, results: Table1Results) -> Decision | None:
+    found = _of_steps((case, method), results)
     if found is None:
         return None
     value, error = found
-    return Decision(negative(EASY - value, error), _shown(value, error, results.diverged[key]))
+    numbers = _shown(value, error, results.diverged[case, method])
+    return Decision(negative(EASY - value, error), numbers)
 
 
 def harder(case: str) -> Both:
     """Decide that local maxima of ML are harder to detect than the divergence of VB."""
-    paper, ours = (partial(_harder, case, name) for name in (LITERAL, OURS))
-    return paper, ours
+    return by_forms((LITERAL, OURS), _harder, case)
 
 
 def _harder(case: str, method: str, results: Table1Results) -> Decision | None:

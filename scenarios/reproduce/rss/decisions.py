@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import partial
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from arrivals.scenarios.experiments.statistics import jackknife
 from arrivals.scenarios.metrics.position_errors import PositionErrors
-from arrivals.scenarios.reproduce.claims import Decide, Decision, negative
+from arrivals.scenarios.reproduce.decisions import Both, Decide, Decision, by_forms, negative
 from arrivals.scenarios.reproduce.rss.convergence import LocalMaxima, ModeSteps
 from arrivals.scenarios.reproduce.rss.published_values import TABLE_1
 from arrivals.scenarios.reproduce.rss.timing import Times
 from arrivals.typing import Bool, Float, Int
 
-Both: TypeAlias = tuple[Decide, Decide]  # by the paper's form, and by ours
 Key: TypeAlias = tuple[str, str]  # case and method
 LITERAL, OURS, ML = "vb_literal", "vb", "lm"
-GROUPS = 25  # of runs, for standard errors
 ONE = "K=1 prior"  # case
 FEW = "after 9 cycles"  # of a method
 SHOULDER_DB = 84.0
@@ -60,36 +59,6 @@ class Table1Results(NamedTuple):
     maxima: Mapping[Key, LocalMaxima]
     modes: Mapping[str, ModeSteps]
     times: Times
-
-
-def jackknife(statistic: Callable[[Int], float], n_runs: int) -> tuple[float, float]:
-    """Return a statistic of all runs, and its standard error by leaving out groups of runs.
-
-    Parameters
-    ----------
-    statistic : callable
-        Takes indices of runs.
-    n_runs : int
-
-    References
-    ----------
-    Efron, *The Jackknife, the Bootstrap and Other Resampling Plans*, 1982, ch. 3.
-
-    Examples
-    --------
-    >>> mean, error = jackknife(lambda runs: float(runs.mean()), 100)
-    >>> mean, round(error, 2)
-    (49.5, 5.89)
-    """
-    rows = np.arange(n_runs)
-    groups = min(GROUPS, n_runs)
-    if groups < 2:
-        return statistic(rows), np.nan
-    left = np.array([
-        statistic(np.delete(rows, part)) for part in np.array_split(rows, groups)
-    ])  # fmt: skip
-    spread = np.square(left - left.mean()).sum() * (groups - 1) / groups
-    return statistic(rows), float(np.sqrt(spread))
 
 
 def power_spread(level: Float) -> float:
@@ -152,8 +121,7 @@ def _figure(metric: str, key: Key, results: Table1Results, rows: Int) -> float:
 
 def competitive(case: str) -> Both:
     """Decide that the location error of VB is at most 1.2 times that of ML."""
-    paper, ours = (partial(_competitive, case, name) for name in (LITERAL, OURS))
-    return paper, ours
+    return by_forms((LITERAL, OURS), _competitive, case)
 
 
 def _competitive(case: str, method: str, results: Table1Results) -> Decision | None:
@@ -175,17 +143,3 @@ def at_most(
     each = [one.summary().location_rms for one in (here, there)]
     numbers = f"{name} {each[0]:.3g} m, {other} {each[1]:.3g} m: {value:.2f} ± {error:.2f} times"
     return Decision(negative(value - factor, error), numbers)
-
-
-def share(flags: Bool) -> tuple[float, float]:
-    """Return the share of runs, and its standard error.
-
-    Examples
-    --------
-    >>> share(np.array([True, False] * 50))
-    (0.5, 0.05)
-    """
-    p, n = float(flags.mean()), len(flags)
-    least = min(2 / n, 0.5)  # no run of n is not never
-    q = min(max(p, least), 1 - least)
-    return p, float(np.sqrt(q * (1 - q) / n))

@@ -6,8 +6,9 @@ from functools import partial
 
 import numpy as np
 
-from arrivals.scenarios.reproduce.claims import Decision, negative
-from arrivals.scenarios.reproduce.rss.decisions import LITERAL, OURS, Both, Table1Results
+from arrivals.scenarios.experiments.statistics import standard_error
+from arrivals.scenarios.reproduce.decisions import Both, Decision, by_forms, negative
+from arrivals.scenarios.reproduce.rss.decisions import LITERAL, OURS, Table1Results
 from arrivals.scenarios.reproduce.rss.operations import cycle_operations, search_operations
 from arrivals.scenarios.reproduce.rss.timing import CYCLE, DIFFERENCES, N_SENSORS, SEARCH
 from arrivals.typing import Float
@@ -48,17 +49,15 @@ def _faster(
 
 def linear() -> Both:
     """Decide that a cycle is linear in the number of sources."""
-    paper, ours = (partial(_growth, f"{CYCLE} {name}", LINEAR) for name in (LITERAL, OURS))
-    return paper, ours
+    return by_forms((f"{CYCLE} {LITERAL}", f"{CYCLE} {OURS}"), _growth, LINEAR)
 
 
 def exponential() -> Both:
     """Decide that an iteration of ML is exponential in the number of sources."""
-    paper, ours = (partial(_growth, name, EXPONENTIAL) for name in (DIFFERENCES, SEARCH))
-    return paper, ours
+    return by_forms((DIFFERENCES, SEARCH), _growth, EXPONENTIAL)
 
 
-def _growth(name: str, limit: float, results: Table1Results) -> Decision | None:
+def _growth(limit: float, name: str, results: Table1Results) -> Decision | None:
     few, many = (results.times.get((name, K)) for K in (FEW_SOURCES, MANY_SOURCES))
     if few is None or many is None:
         return None
@@ -96,7 +95,7 @@ def log_ratio(first: Float, second: Float) -> tuple[float, float]:
     0.0
     """
     d = np.log(first / second)
-    return float(d.mean()), float(d.std(ddof=1) / np.sqrt(len(d))) if len(d) > 1 else np.nan
+    return float(d.mean()), standard_error(d)
 
 
 def _times(ratio: float, error: float) -> str:

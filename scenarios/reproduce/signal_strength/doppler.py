@@ -11,7 +11,9 @@ import numpy as np
 from arrivals.measurement_models import AveragedEnvelope, LogGains, LogNormalRSS, db_to_neper
 from arrivals.measurement_models.signal_strength.path_loss import doppler_log_gain
 from arrivals.motion_models import ConstantVelocity
-from arrivals.scenarios.reproduce.claims import Claim, Decide, Decision, below, negative
+from arrivals.scenarios.experiments.statistics import standard_error
+from arrivals.scenarios.reproduce.claims import Claim
+from arrivals.scenarios.reproduce.decisions import Both, Decision, below, by_forms, negative
 from arrivals.scenarios.reproduce.report import Report
 from arrivals.scenarios.simulations.signal_strength import in_disc
 from arrivals.trackers import RSSVB, AmplitudePrior
@@ -71,7 +73,7 @@ def doppler(runs: int, seed: int) -> Report:
         each = [_run(speed, np.random.default_rng([seed, run])) for run in range(runs)]
         for form in FORMS:
             one = results[speed, form] = DopplerErrors(*np.array([r[form] for r in each]).T)
-            error = float(one.error.std(ddof=1) / np.sqrt(runs))
+            error = standard_error(one.error)
             rows.append((speed, form, *(float(part.mean()) for part in one), error))
     columns = ("speed m/s", "form", "error m", "lead m", "NEES", "± of the error")
     figures = {"lead": _draw(results)}
@@ -133,7 +135,7 @@ def _draw(results: Results) -> Figure:
     ):
         for n, form in enumerate(FORMS):
             parts = [getattr(results[speed, form], name) for speed in SPEEDS]
-            half = [2 * float(part.std(ddof=1) / np.sqrt(len(part))) for part in parts]
+            half = [2 * standard_error(part) for part in parts]
             x = np.array(SPEEDS) + 0.3 * (n - 1)
             ax.errorbar(x, [float(part.mean()) for part in parts], half, color=colours[form],
                         marker="o", capsize=3, label=form)  # fmt: skip
@@ -148,16 +150,15 @@ def _draw(results: Results) -> Figure:
 # -- claims -------------------------------------------------------------------------------------
 
 
-def negligible(speed: int) -> tuple[Decide, Decide]:
+def negligible(speed: int) -> Both:
     """Decide that Doppler in the sound makes the error at most a tenth larger."""
-    paper, ours = (partial(_negligible, speed, form) for form in (IGNORED, USED))
-    return paper, ours
+    return by_forms((IGNORED, USED), _negligible, speed)
 
 
 def _negligible(speed: int, form: str, results: Results) -> Decision:
     here, without = (results[speed, name].error for name in (form, ABSENT))
     d = here - NEGLIGIBLE * without
-    error = float(d.std(ddof=1) / np.sqrt(len(d)))
+    error = standard_error(d)
     numbers = (
         f"{form}: {here.mean():.2f} m, without Doppler in the sound {without.mean():.2f} m, "
         f"{here.mean() / without.mean():.2f} ± {error / without.mean():.2f} times"

@@ -8,8 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arrivals.scenarios.reproduce.claims import Claim, Decide, Decision, below, negative
-from arrivals.scenarios.reproduce.rss.decisions import jackknife
+from arrivals.scenarios.experiments.statistics import jackknife, standard_error
+from arrivals.scenarios.reproduce.claims import Claim
+from arrivals.scenarios.reproduce.decisions import Decide, Decision, below, negative
 from arrivals.scenarios.reproduce.signal_strength.drive_by import EnvelopeLaw
 from arrivals.scenarios.reproduce.signal_strength.range_estimates import Errors
 from arrivals.typing import Float, Int
@@ -62,7 +63,7 @@ def less_biased(form: str, other: str, n_snapshots: int) -> Decide:
 def _less_biased(form: str, other: str, N: int, results: EnvelopeResults) -> Decision:
     first, second = (100 * results.ranges[name, N].error for name in (form, other))
     d = np.sign(first.mean()) * first - np.sign(second.mean()) * second
-    error = float(d.std() / np.sqrt(len(d)))
+    error = standard_error(d)
     numbers = (
         f"{form} {first.mean():.2f} %, {other} {second.mean():.2f} %; "
         f"difference {d.mean():.3f} ± {error:.3f} %"

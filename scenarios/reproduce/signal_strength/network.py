@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from arrivals.scenarios import create
-from arrivals.scenarios.reproduce.claims import Claim, Decide, Decision, negative
+from arrivals.scenarios.experiments.statistics import standard_error
+from arrivals.scenarios.reproduce.claims import Claim
+from arrivals.scenarios.reproduce.decisions import Decide, Decision, negative
 from arrivals.scenarios.reproduce.report import Report
 from arrivals.scenarios.reproduce.signal_strength.graphs import draw_graph
 from arrivals.scenarios.simulations.signal_strength import RSSTrial
@@ -85,7 +87,7 @@ def network(runs: int, seed: int) -> Report:
     results = {key: NetworkErrors(*np.array(rows).T) for key, rows in each.items()}
     table: list[tuple[Any, ...]] = []
     for (form, n), one in results.items():
-        error = float(one.median.std(ddof=1) / np.sqrt(runs))
+        error = standard_error(one.median)
         table.append(
             (form, n, numbers_sent(form, n, 3), *(float(part.mean()) for part in one), error)
         )
@@ -148,7 +150,7 @@ def _draw(results: Results) -> Figure:
         points = [(numbers_sent(*key, 3), one.median) for key, one in results.items()
                   if key[0] == form]  # fmt: skip
         level = np.array([float(np.log(m).mean()) for _, m in points])
-        half = np.array([2 * float(np.log(m).std(ddof=1) / np.sqrt(len(m))) for _, m in points])
+        half = np.array([2 * standard_error(np.log(m)) for _, m in points])
         bars = np.exp(level) * np.stack([1 - np.exp(-half), np.exp(half) - 1])
         ax.errorbar([x for x, _ in points], np.exp(level), bars, color=colour, marker="o",
                     capsize=3, label=form)  # fmt: skip
@@ -181,7 +183,7 @@ def _within(
 ) -> Decision:
     here, there = (np.log(results[form].median) for form in (first, second))
     d = here - there
-    error = float(d.std(ddof=1) / np.sqrt(len(d)))
+    error = standard_error(d)
     means = [f"{_name(*form)} {np.exp(log.mean()):.2f} m with {numbers_sent(*form, 3)} numbers"
              for form, log in ((first, here), (second, there))]  # fmt: skip
     ratio = float(np.exp(d.mean()))

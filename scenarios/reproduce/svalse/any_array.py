@@ -15,10 +15,12 @@ import numpy as np
 
 from arrivals.motion_models import BernoulliVonMises
 from arrivals.scenarios.base import Trial
+from arrivals.scenarios.experiments.statistics import standard_error
 from arrivals.scenarios.experiments.workers import parallel_map
 from arrivals.scenarios.metrics.gospa import Gospa, mean_gospa
 from arrivals.scenarios.registry import create
-from arrivals.scenarios.reproduce.claims import Claim, Decision
+from arrivals.scenarios.reproduce.claims import Claim
+from arrivals.scenarios.reproduce.decisions import Decision
 from arrivals.scenarios.reproduce.report import Report
 from arrivals.scenarios.reproduce.svalse.decisions import compared
 from arrivals.scenarios.simulations.planar_arrays import Circle
@@ -101,7 +103,7 @@ def any_array(runs: int, seed: int) -> Report:
     scores = np.array(parallel_map(_scores, runs_of_cases)).reshape(len(CASES), runs, 4)
     rows = []
     for case, parts in zip(CASES, scores, strict=True):
-        error = parts[:, 0].std(ddof=1) / np.sqrt(runs)
+        error = standard_error(parts[:, 0])
         name = NAMES[case.method]
         rows.append((case.label, name, *parts.mean(axis=0).tolist(), float(error), case.prototype))
     columns = ("scene", "method", "GOSPA", "distance", "missed", "false", "std error", "prototype")

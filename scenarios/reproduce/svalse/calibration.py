@@ -12,15 +12,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from arrivals.scenarios.base import Trial
-from arrivals.scenarios.experiments.statistics import Difference, paired_difference
+from arrivals.scenarios.experiments.statistics import Difference, jackknife, paired_difference
 from arrivals.scenarios.experiments.workers import parallel_map
 from arrivals.scenarios.metrics.calibration import Reliability, reliability
 from arrivals.scenarios.metrics.consistency import circular_nees, coverage
 from arrivals.scenarios.metrics.registry import METRICS, existence_and_hits, pairs_of
 from arrivals.scenarios.registry import create
-from arrivals.scenarios.reproduce.claims import Claim, Decide, Decision, negative
+from arrivals.scenarios.reproduce.claims import Claim
+from arrivals.scenarios.reproduce.decisions import Decide, Decision, all_of, negative
 from arrivals.scenarios.reproduce.report import Report
-from arrivals.scenarios.reproduce.rss.decisions import jackknife
 from arrivals.scenarios.reproduce.svalse.calibration_scenes import (
     SCENES,
     CalibrationScene,
@@ -210,10 +210,8 @@ def covers(scene: CalibrationScene, limits: Coverage, form: int, pooled: Pooled)
         for share, error, (low, high) in ((c68, e68, limits.share68), (c95, e95, limits.share95))
         for side in (low - share, share - high)
     ]
-    holds = False if False in sides else None if None in sides else True
-    return Decision(
-        holds, f"of 68 %: {c68:.1%} ± {e68:.1%}, of 95 %: {c95:.1%} ± {e95:.1%} of the errors"
-    )
+    numbers = f"of 68 %: {c68:.1%} ± {e68:.1%}, of 95 %: {c95:.1%} ± {e95:.1%} of the errors"
+    return Decision(all_of(sides), numbers)
 
 
 def changes(scene: CalibrationScene, limit: float, pooled: Pooled) -> Decision | None:

@@ -8,8 +8,9 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from arrivals.scenarios.experiments.statistics import standard_error
 from arrivals.scenarios.experiments.study import Study
-from arrivals.scenarios.reproduce.claims import Decide, Decision, below, negative
+from arrivals.scenarios.reproduce.decisions import Both, Decide, Decision, below, negative
 from arrivals.scenarios.reproduce.svalse.forms import (
     PAPER_FORM,
     PRINTED_7D,
@@ -24,7 +25,6 @@ from arrivals.typing import Float
 # By (metric, method, case), one value a run, NaN where it is missing; the case of a study with a
 # single one is ""
 Results: TypeAlias = Mapping[tuple[str, str, str], Float]
-Both: TypeAlias = tuple[Decide, Decide]  # by the paper's form, and by ours
 MIN_RUNS = 5  # for a deviation over runs
 LOW, HIGH = ("0", "5"), ("30", "35", "40")  # cases of Figs 8 and 9: SNR, dB
 OFF_GRID = tuple(f"{snr} off grid" for snr in (HIGH[0], HIGH[-1]))
@@ -122,12 +122,10 @@ def compared(names: tuple[str, str], low: Float, high: Float, unit: str) -> Deci
     if not both.any():
         return None
     scale = 100.0 if unit.startswith("%") else 1.0
-    decision = below(scale * low[both], scale * high[both], unit)
     first, second = (title(name) for name in names)
-    if first == second:  # two forms of a method
-        first, second = names
-    means = decision.numbers.replace(" and ", f"; {second}: ", 1)
-    return decision._replace(numbers=f"{first}: {means}")
+    if first != second:  # else two forms of a method
+        names = first, second
+    return below(scale * low[both], scale * high[both], unit, names)
 
 
 def title(method: str) -> str:
@@ -169,17 +167,6 @@ def _limited(
     if unit == "too few or many":
         mean, unit = abs(mean), "sources too few" if mean < 0 else "sources too many"
     return Decision(holds, f"{scale * mean:.3g} ± {scale * error:.2g} {unit}")
-
-
-def standard_error(runs: Float) -> float:
-    """Return the standard error of the mean; NaN for one run.
-
-    Examples
-    --------
-    >>> standard_error(np.array([1.0, 3.0]))
-    1.0
-    """
-    return float(runs.std(ddof=1) / np.sqrt(len(runs))) if len(runs) > 1 else float("nan")
 
 
 def published(metric: str, method: str, value: float) -> Decide:

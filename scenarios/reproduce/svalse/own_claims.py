@@ -7,7 +7,8 @@ from functools import partial
 
 import numpy as np
 
-from arrivals.scenarios.reproduce.claims import Claim, Decision
+from arrivals.scenarios.reproduce.claims import Claim
+from arrivals.scenarios.reproduce.decisions import Decision
 from arrivals.scenarios.reproduce.svalse.calibration_scenes import CONSERVATIVE
 from arrivals.scenarios.reproduce.svalse.decisions import Results, lower, paper_form, values
 from arrivals.scenarios.reproduce.svalse.forms import activation_label

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-from arrivals.scenarios.reproduce.claims import Claim, Decision
-from arrivals.scenarios.reproduce.svalse.decisions import Both, by_both, compared
+from arrivals.scenarios.reproduce.claims import Claim
+from arrivals.scenarios.reproduce.decisions import Both, Decision
+from arrivals.scenarios.reproduce.svalse.decisions import by_both, compared
 from arrivals.scenarios.reproduce.swellex96.field import FieldFacts
 from arrivals.typing import Float
 

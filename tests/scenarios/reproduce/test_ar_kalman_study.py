@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 from arrivals.scenarios.reproduce import studies
 from arrivals.scenarios.reproduce.ar_kalman import decisions as ar
 from arrivals.scenarios.reproduce.ar_kalman import figures_1_to_9
-from arrivals.scenarios.reproduce.ar_kalman.decisions import Both
 from arrivals.scenarios.reproduce.ar_kalman.experiments import (
     INNER,
     LITERAL,
@@ -30,7 +29,7 @@ from arrivals.scenarios.reproduce.ar_kalman.scores import (
     scores,
     unlabelled_rmse,
 )
-from arrivals.scenarios.reproduce.claims import Decide
+from arrivals.scenarios.reproduce.decisions import Both, Decide
 from arrivals.scenarios.reproduce.paper_claims import CLAIMS
 from arrivals.scenarios.reproduce.pictures import save_picture
 from arrivals.scenarios.reproduce.studies import reproduce
@@ -93,11 +92,12 @@ def test_numbers_name_their_parts() -> None:
 def test_few_runs_do_not_decide_shares_and_limits() -> None:
     failed = {("rmse", OURS, "a"): np.array([9.0, 9.0, 9.0, 1.0])}
     assert holds(ar.fails(2.5, "a")[1], failed) is None
-    medians = {("rmse", OURS, name): 0.5 * limit * np.ones(4) for name, limit in ACCEPTED.items()}
+    medians = {("rmse", OURS, name): 0.5 * limit * np.ones(8) for name, limit in ACCEPTED.items()}
     assert holds(within_limits, medians)
-    medians["rmse", OURS, "M = 2"] *= np.array([1.0, 1.0, 9.0, 9.0])
+    assert holds(within_limits, {key: runs[:4] for key, runs in medians.items()}) is None
+    medians["rmse", OURS, "M = 2"] *= np.repeat([1.0, 9.0], 4)
     assert holds(within_limits, medians) is None
-    medians["rmse", OURS, "M = 2"] = np.full(4, 9.0)
+    medians["rmse", OURS, "M = 2"] = np.full(8, 9.0)
     assert holds(within_limits, medians) is False
 
 

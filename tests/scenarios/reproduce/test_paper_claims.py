@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from arrivals.scenarios.reproduce.claims import Claim, Decision, counts
+from arrivals.scenarios.reproduce.claims import Claim, counts
+from arrivals.scenarios.reproduce.decisions import Decision
 from arrivals.scenarios.reproduce.paper_claims import CLAIMS, OWN, PAPERS
 from arrivals.scenarios.reproduce.results_page import add_stamp, write_page
 from arrivals.scenarios.reproduce.studies import STUDIES

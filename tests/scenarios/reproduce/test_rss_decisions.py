@@ -85,14 +85,6 @@ def test_bias_is_compared_without_its_sign() -> None:
     assert holds(both, fabricated(errors=biased)) == [True, False]
 
 
-def test_jackknife_is_the_standard_error_of_a_mean() -> None:
-    x = RNG.standard_normal(1000)
-    mean, error = rss.jackknife(lambda rows: float(x[rows].mean()), 1000)
-    assert mean == pytest.approx(x.mean())
-    assert error == pytest.approx(x.std() / np.sqrt(1000), rel=0.4)  # of 25 groups
-    assert np.isnan(rss.jackknife(lambda rows: 1.0, 1)[1])
-
-
 def test_competitive_is_at_most_a_fifth_worse_beyond_the_spread() -> None:
     assert holds(rss.competitive(THREE), fabricated()) == [False, True]
     near = {(THREE, "vb"): errors(1.2), (THREE, "lm"): PositionErrors(NORMAL[::-1], NORMAL[..., 0])}
