@@ -157,34 +157,6 @@ class FilterAssembly(FrozenModel):
         own = prior[..., :k, :k], x[..., :k], P[..., :k, :k]
         return ErrorCovariance(P, stage.updated_error(error.M, *own))
 
-    @property
-    def is_delay_alone(self) -> bool:
-        """True if one pairwise update is all, of a state that is the delay."""
-        single = self.acquire is None and isinstance(self.final, PairwiseUpdate)
-        return single and self.motion.dim_x == 1
-
-    def error_variances(
-        self, M: Float, priors: list[Float], x: Float, P: Float, F: Float, Q: Float,
-        gaps: list[Bool],
-    ) -> Float:  # fmt: skip
-        """Return variances of the errors after snapshots, (..., n_steps), where delays are alone.
-
-        `M` is the first one, `priors` are the filter's own before snapshots, `gaps` of those after
-        missing ones.
-        """
-        assert isinstance(self.final, PairwiseUpdate)
-        square, q = float(F[0, 0]) ** 2, float(Q[0, 0])
-
-        def before(k: int, M: Float) -> Float:
-            M = square * M + q
-            if not gaps[k].any():
-                return M
-            return widened(M[..., None, None], gaps[k], self.largest_variance)[..., 0, 0]
-
-        prior = np.stack(priors, axis=-1)
-        row = self.final.score_row(P)
-        return self.final.scores.variances(M, prior, x[..., 0], P[..., 0, 0], row, before)
-
     def limit(self, P: Float, n: int, misfit: Float) -> Float | None:
         """Return the limit of the residuals of snapshot n."""
         return gate_limit(self.gate, misfit, P[..., 0, 0], self.stage(n).gated_variance)

@@ -97,8 +97,6 @@ def beliefs(
     x, P = (np.broadcast_to(a, (*lead, *a.shape)) for a in self.belief())
     M = self.error.of(self.P).M
     error = ErrorCovariance(P, None if M is None else np.broadcast_to(M, (*lead, *M.shape)))
-    deferred = M is not None and assembly.is_delay_alone
-    first, priors, gaps = error.variance, [], []
     channels, buffer = self.channels.broadcast(lead), self.buffer.broadcast(lead)
     n_steps = snapshots.shape[-2]
     xs, Ps = np.empty((*lead, n_steps, len(F))), np.empty((*lead, n_steps, *F.shape))
@@ -106,21 +104,13 @@ def beliefs(
     for k in range(n_steps):
         x, P = predict(x, P, F, Q)
         P = prior = widened(P, buffer.missing, assembly.largest_variance)
-        if deferred:
-            priors.append(P[..., 0, 0])
-            gaps.append(buffer.missing)
-        else:
-            error = assembly.predicted_error(error, P, F, Q, buffer.missing)
+        error = assembly.predicted_error(error, P, F, Q, buffer.missing)
         channels, buffer = receive(self, channels, buffer, snapshots[..., k, :])
         samples = buffer.scaled(self.measurement)
         x, P, misfit = assembly.update(x, P, samples, buffer.n_snapshots, buffer.misfit)
         buffer = buffer.with_misfit(misfit)
-        xs[..., k, :], Ps[..., k, :, :] = x, P
-        if not deferred:
-            error = assembly.updated_error(error, prior, x, P, buffer.n_snapshots)
-            variances[..., k] = error.variance
-    if deferred:
-        variances = assembly.error_variances(first, priors, xs, Ps, F, Q, gaps)
+        error = assembly.updated_error(error, prior, x, P, buffer.n_snapshots)
+        xs[..., k, :], Ps[..., k, :, :], variances[..., k] = x, P, error.variance
     return xs, Ps, variances
 
 

@@ -8,9 +8,7 @@ of the error that they leave, after Huber's sandwich P (Σ var of the score) P.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
 
@@ -19,7 +17,6 @@ from arrivals.measurement_models.delays.source_correlation import SourceCorrelat
 from arrivals.parameters import FrozenModel
 from arrivals.typing import Complex, Float, Int
 
-Step: TypeAlias = Callable[[int, Float], Float]
 N_FREQUENCIES = 512
 DENSITY = 8  # delays of a table per sample: interpolation errors have the period of one sample
 TINY = np.finfo(float).tiny
@@ -103,38 +100,6 @@ class ScoreTable(FrozenModel):
         change = linear[..., None] * M[..., 0] - 0.5 * spread[..., None] * b
         change = b[..., :, None] * change[..., None, :]
         return np.asarray(M - change - np.swapaxes(change, -1, -2))
-
-    def variances(
-        self, M: Float, prior: Float, x: Float, P: Float, row: Int | int, before: Step
-    ) -> Float:
-        """Return those of `updated` after every snapshot of a state that is the delay alone.
-
-        Parameters
-        ----------
-        M : ndarray, shape (...)
-            Variance of the error at the start.
-        prior, x, P : ndarray, shape (..., n_steps)
-            The filter's variances before snapshots, and its means and variances after them.
-        row : int or ndarray, shape (..., n_steps)
-        before : callable
-            Returns the variance before snapshot k, (...), from that after k - 1.
-        """
-        g = 1 - P / np.maximum(prior, TINY)
-        pull = self.slope[row] * g
-        noise, square = self.noise_at(x, row) * P * g, pull * pull
-        omega2 = self.square_frequency
-        omega2 = None if omega2 is None else np.broadcast_to(omega2[row], pull.shape)
-        found = np.empty(pull.shape)
-        for k in range(pull.shape[-1]):
-            variance = reach = before(k, M)
-            linear = pull[..., k]
-            if omega2 is not None:  # the same linearization
-                u = omega2[..., k] * variance
-                linear = linear * np.exp(-0.5 * u)
-                reach = np.expm1(-2 * u) / (-2 * omega2[..., k])
-            M = variance * (1 - 2 * linear) + noise[..., k] + square[..., k] * reach
-            found[..., k] = M
-        return found
 
 
 def score_moments(models: list[InterpolationDelay], delays: Float) -> tuple[Float, Float, Float]:

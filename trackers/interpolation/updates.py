@@ -24,7 +24,7 @@ from arrivals.trackers.gaussian.equations import joseph, predict_gaussian, updat
 from arrivals.trackers.gaussian.linalg import apply, symmetric
 from arrivals.trackers.interpolation.error_covariance import ScoreTable
 from arrivals.trackers.interpolation.gating import is_used
-from arrivals.typing import Bool, Float, Int
+from arrivals.typing import Bool, Float
 
 Order: TypeAlias = bool | Literal["frozen", "literal"]  # `sequential_update` of `Variant`
 MAX_PHASE_STD = 0.35  # rad: of the phase of a baseline longer than 1, so that no cycle is lost
@@ -120,15 +120,11 @@ class PairwiseUpdate(FrozenModel):
 
     def updated_error(self, M: Float, prior: Float, x: Float, P: Float) -> Float:
         """Return the covariance of the error after a snapshot, as `ScoreTable.updated`."""
-        return self.scores.updated(M, prior, x, P, self.score_row(P))
-
-    def score_row(self, P: Float) -> Int | int:
-        """Return the row of `scores`: that of the baselines in use."""
         if len(self.scores.noise) == 1:
-            return 0
+            return self.scores.updated(M, prior, x, P, 0)
         lengths = {abs(model.baseline) for model in self.baseline_models}
         n = sum(np.asarray(m == 1 or self._is_unambiguous(m, P), np.int64) for m in lengths)
-        return np.maximum(n, 1) - 1
+        return self.scores.updated(M, prior, x, P, np.maximum(n, 1) - 1)
 
     def update(self, x: Float, P: Float, frames: Float, limit: Float | None) -> DelayUpdate:
         """Update beliefs by the newest of `frames`, (..., span or more, n_sensors).
