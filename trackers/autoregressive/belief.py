@@ -46,8 +46,8 @@ class SourceBelief:
         Triangular factor of the regression for the rows of the manifold.
     ar_factor : ndarray, shape (..., n_sources, p + 1, p + 1)
         Triangular factors of the regressions for the AR coefficients.
-    ar_weight : ndarray, shape (...)
-        Σ λ_a^age of the samples in `ar_factor`.
+    ar_weight : ndarray, shape (..., n_sources)
+        Σ λ_a^age of the samples in `ar_factor`, times their robust weights.
     covariance : ndarray, shape (..., n_sources, n_sources)
         Covariance of the errors of sin θ.
     sensitivity : ndarray, shape (..., n_sources, n, n)
@@ -130,7 +130,7 @@ def initialize_belief(
         power=power,
         manifold_factor=ridge_rows(regression.ridge * power, target),
         ar_factor=np.concatenate([rows, np.zeros_like(rows[..., :1, :])], axis=-2),
-        ar_weight=np.zeros(n_batch),
+        ar_weight=np.zeros(doa.shape),
         covariance=variance[..., None] * np.eye(doa.shape[-1]),
         sensitivity=np.zeros((*doa.shape, *P.shape[1:])),
         active=np.ones(doa.shape, dtype=np.bool_),

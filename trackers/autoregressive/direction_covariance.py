@@ -143,7 +143,7 @@ def with_direction_covariance(
     if not (all_active and filtered.has_pairs.all()):
         # A snapshot of an interval without data adds (1/λ - 1) r/n_parts (RᵀR)⁻¹ / L: the random
         # walk that makes λ the best forgetting; at most up to a uniform direction
-        missing = ~(new.active & filtered.has_pairs[..., None]) & (new.ar_weight > 0)[..., None]
+        missing = ~(new.active & filtered.has_pairs[..., None]) & (new.ar_weight > 0)
         walk = (1 / forgetting - 1) / (belief.x.shape[-2] * slope_matrix(manifold)[1])
         walk *= filtered.weights.shape[-1]
         growth = missing * walk * model.r[..., 0] * np.diagonal(step.inverse, axis1=-2, axis2=-1)

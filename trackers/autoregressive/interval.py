@@ -70,10 +70,10 @@ def finish_interval(
 
 def _with_kept_models(belief: SourceBelief, new: SourceBelief, active: Bool) -> SourceBelief:
     """Return a belief with the former AR models of inactive sources."""
-    weight = np.where(active.any(axis=-1), new.ar_weight, belief.ar_weight)
-    # their factors in proportion to the weight, which all sources share
+    weight = np.where(active.any(axis=-1, keepdims=True), new.ar_weight, belief.ar_weight)
+    # their factors in proportion to the weight, which grows for all sources
     scale = np.sqrt(weight / np.where(belief.ar_weight > 0, belief.ar_weight, 1.0))
-    kept_factor = scale[..., None, None, None] * belief.ar_factor
+    kept_factor = scale[..., None, None] * belief.ar_factor
     return replace(
         new,
         a=np.where(active[..., None], new.a, belief.a),

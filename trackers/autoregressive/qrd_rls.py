@@ -18,7 +18,7 @@ TINY = np.finfo(np.float64).tiny
 # A factor [R | U] is triangular, (..., n_coef + n_rhs, n_coef + n_rhs): RᵀR is the Gram matrix of
 # the regressors, R⁻¹U the solution, and the block below U the factor of the residuals.
 
-MAX_SWEEPS, SWEEP_TOLERANCE = 1000, 1e-12  # over the coefficients, and their change in one
+MAX_SWEEPS, SWEEP_TOLERANCE = 1000, 1e-12  # over the coefficients; relative change in one
 
 
 def huber_weight(error: ArrayLike, threshold: ArrayLike) -> Float:
@@ -117,16 +117,18 @@ class QRDRLS(Configurable):
         self.weight = np.zeros(goal.shape[:-2])
 
     @classmethod
-    def from_factor(cls, factor: Float, n_coef: int) -> Self:
-        """Return the regression that continues a factor, for `append` and `solve`, unchecked.
+    def from_factor(cls, factor: Float, n_coef: int, forgetting: float, ridge: float) -> Self:
+        """Return the regression that continues a factor, for `append` and `solve`.
 
         Parameters
         ----------
         factor : ndarray, shape (..., n_coef, n_coef + n_rhs) or with more rows
         n_coef : int
+        forgetting, ridge : float
+            As in the class.
         """
-        made = cls.__new__(cls)
-        made.factor, made.n_coef, made.huber, made.l1 = factor, n_coef, None, None
+        made = cls(n_coef, factor.shape[-1] - n_coef, forgetting=forgetting, ridge=ridge)
+        made.factor = factor
         return made
 
     def update(
@@ -236,9 +238,9 @@ class QRDRLS(Configurable):
                 G_n, v = G[..., n, None, :], W[..., n, :] - goal[..., n, :]
                 b = B[..., n, :] - (G_n @ W)[..., 0, :] + G_n[..., n] * v
                 size = np.sqrt((b * b).sum(axis=-1, keepdims=True))
-                kept = np.maximum(1 - penalty[n] / (2 * np.maximum(size, TINY)), 0.0)
+                kept = np.maximum(size - penalty[n] / 2, 0.0) / np.maximum(size, TINY)
                 W[..., n, :] = goal[..., n, :] + kept * b / G_n[..., n]
-            if np.abs(W - before).max() <= SWEEP_TOLERANCE:
+            if np.abs(W - before).max() <= SWEEP_TOLERANCE * np.abs(W).max():
                 break
         return W
 
@@ -255,7 +257,12 @@ class QRDRLS(Configurable):
         return np.asarray((below**2).sum(axis=-2) / weight[..., None])
 
     def _penalties(self) -> Float:
-        value = np.broadcast_to(real("l1", 0.0 if self.l1 is None else self.l1), (self.n_coef,))
+        value = real("l1", 0.0 if self.l1 is None else self.l1)
+        if value.shape not in ((), (self.n_coef,)):
+            raise ValueError(
+                f"l1 must be one number or have shape ({self.n_coef},); got {value.shape}"
+            )
+        value = np.broadcast_to(value, (self.n_coef,))
         if not ((value >= 0) & (value < np.inf)).all():
             raise ValueError(f"l1 must be finite, not negative; got {self.l1!r}")
         return value

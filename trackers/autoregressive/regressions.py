@@ -33,7 +33,7 @@ def estimate_directions(
     """Return the factor of the regression for the rows of A_T, and the directions: (6), (7)."""
     k, n_parts = model.A.shape[-1], belief.x.shape[-2]
     target = manifold.pairs_of(transposed(model.A))  # the row of ones is never estimated
-    rls = QRDRLS.from_factor(belief.manifold_factor, k)
+    rls = QRDRLS.from_factor(belief.manifold_factor, k, regression.forgetting, regression.ridge)
     # [√λ^N [R | U]; w_j [s_j | y_j]; [Lᵀ | 0]; √(μ (1 - λ^N)) [I | A_Tᵀ]]   (3.2)
     w = np.repeat(filtered.weights, n_parts, axis=-1)
     samples, share = beside(filtered.X[..., :k], manifold.pairs_of(filtered.y)), None
@@ -145,7 +145,7 @@ def estimate_ar_models(
     layout: CompanionLayout,
     regression: RegressionSettings,
 ) -> tuple[Float, Float, Float, Float]:
-    """Return factors and weight of the AR regressions, coefficients, and innovation variances.
+    """Return factors and weights of the AR regressions, coefficients, and innovation variances.
 
     Parameters
     ----------
@@ -164,7 +164,8 @@ def estimate_ar_models(
     if not layout.used.all():
         samples = samples * regression_mask(layout)
     samples, share = np.swapaxes(samples, -3, -2), None
-    rls = QRDRLS.from_factor(belief.ar_factor, layout.used.shape[-1])
+    p, settings = layout.used.shape[-1], (regression.ar_forgetting, regression.ar_ridge)
+    rls = QRDRLS.from_factor(belief.ar_factor, p, *settings)
     if regression.huber is not None:
         threshold = regression.huber * np.sqrt(belief.q)
         w, share = with_robust_weights(w, rls.robust_weights(samples, threshold, n_parts))
@@ -174,11 +175,12 @@ def estimate_ar_models(
         rows.append(scaled(transposed(cholesky_root(covariance)), share))
     ridge = regression.ar_ridge * (1 - filtered.ar_decay)[..., None, None] * belief.power[..., None]
     ridge = np.broadcast_to(ridge, present.a.shape)
-    rls.append(filtered.ar_decay[..., None], *rows, ridge_rows(ridge, present.a[..., None]))
-    weight = filtered.ar_decay * belief.ar_weight + (filtered.ar_weights**2).sum(axis=-1)
+    decay = filtered.ar_decay[..., None]
+    rls.append(decay, *rows, ridge_rows(ridge, present.a[..., None]))
+    weight = decay * belief.ar_weight + (w * w).sum(axis=-1) / n_parts
     # a = R⁻¹ U, poles inside 0.995   (4.4);  q = ρ² / Σ w²   (4.3)
     a = stabilised(rls.solve()[..., 0])
-    q = rls.factor[..., -1, -1] ** 2 / np.maximum(weight, TINY)[..., None]
+    q = rls.factor[..., -1, -1] ** 2 / np.maximum(weight, TINY)
     return rls.factor, weight, a, np.maximum(q, MIN_INNOVATION * belief.power)
 
 

@@ -43,6 +43,7 @@ class RegressionSettings(FrozenModel):
     huber : float, optional
         M-estimation in both regressions: a sample whose error is beyond this many standard
         deviations of the noise, or of the innovations, has less weight. None: least squares.
+        Innovation variances are then too small where there are no outliers, at 1.5 by an eighth.
 
     Raises
     ------

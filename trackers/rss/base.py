@@ -82,7 +82,7 @@ class RSSTracker(Tracker):
         self.n_sources = None if n_sources is None else count("n_sources", n_sources, maximum=1000)
         self.amplitude = instance("amplitude", amplitude, AmplitudePrior)
         self.births = birth_death(births)
-        self.doppler = Doppler.of(motion, amplitude.wave_speed, bool(self.births))
+        Doppler.of(motion, amplitude.wave_speed, bool(self.births))  # raises
         self.search = instance("search", search, GridSearch)
         if correlation_time is not None:
             positive("correlation_time", correlation_time)
@@ -177,13 +177,13 @@ class RSSTracker(Tracker):
 
     def observe(self, z: ArrayLike | None) -> WeightedReadings | None:
         """Return one set of readings with its weights, batch axis in front; None if missing."""
-        z = self._vector(z)
+        z = self.vector(z)
         if np.isnan(z).all():
             return None
         readings = self.weighted(self.measurement.readings(z)[None], np.array([self.elapsed]))
         return readings if readings.W.any() else None
 
-    def _vector(self, z: ArrayLike | None) -> Float:
+    def vector(self, z: ArrayLike | None) -> Float:
         """Return a measurement as (n_sensors,); NaN everywhere if it is missing."""
         m = self.measurement.dim_z
         array = real_numbers("z", np.nan if z is None else z)
@@ -207,8 +207,8 @@ class RSSTracker(Tracker):
     def joint_posterior(self, sources: SourceBeliefs, readings: WeightedReadings) -> JointPosterior:
         """Return the joint posterior (7) of predicted sources and readings."""
         prior, propagation = sources.prior(self.position), self.measurement.propagation
-        if self.doppler is not None:  # β of (1)
-            propagation = self.doppler.applied(propagation, prior.theta, sources.x)
+        if doppler := Doppler.of(self.motion, self.amplitude.wave_speed, bool(self.births)):
+            propagation = doppler.applied(propagation, prior.theta, sources.x)  # β of (1)
         return JointPosterior(propagation, readings.xi, readings.W, prior)
 
     def update_sources(
@@ -284,7 +284,7 @@ class RSSTracker(Tracker):
         detected = sources.u.size == 0 or self.settling or self.line is not None
         if self.births or not equal or detected:
             return super().run_batch(sequences, dt)
-        z = np.array([[self._vector(one) for one in sequence] for sequence in sequences])
+        z = np.array([[self.vector(one) for one in sequence] for sequence in sequences])
         tracks = self.current_tracks(len(sources.u))
         return run_in_chunks(
             BatchStart(sources, tracks, self.elapsed, self.n_slots, self.position),

@@ -51,7 +51,7 @@ class Doppler(NamedTuple):
         Doppler(entries=(1, 3), speed=340.0)
         >>> Doppler.of(RandomWalk(q=1.0), 340.0, births=False)
         Traceback (most recent call last):
-        ValueError: wave_speed needs a motion with vx and vy: use ConstantVelocity; got RandomWalk
+        ValueError: motion must have vx and vy for wave_speed; got RandomWalk: use ConstantVelocity
         """
         if wave_speed is None:
             return None
@@ -59,10 +59,10 @@ class Doppler(NamedTuple):
         if not {"vx", "vy"} <= set(names):
             got = type(motion).__name__
             raise ValueError(
-                f"wave_speed needs a motion with vx and vy: use ConstantVelocity; got {got}"
+                f"motion must have vx and vy for wave_speed; got {got}: use ConstantVelocity"
             )
         if births:
-            raise ValueError("wave_speed must be None where sources may appear; got births")
+            raise ValueError(f"wave_speed must be None where sources may appear; got {wave_speed}")
         return cls((names.index("vx"), names.index("vy")), wave_speed)
 
     def applied(self, propagation: PropagationModel, theta: Float, x: Float) -> PropagationModel:

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.signal_strength.path_loss import slopes
-from arrivals.measurements import real_numbers
 from arrivals.messages import shown
 from arrivals.trackers.rss.inference.joint_posterior import JointPosterior
 from arrivals.typing import Bool, Float, Int
@@ -80,15 +79,15 @@ def update_by_cells(tracker: RSSTracker, z: ArrayLike | None, cells: Sequence[Ar
     """Update a tracker by one cell of sensors after the other.
 
     Each cell needs its own readings and the posterior of the cell before it: means and
-    covariances of the sources, seven numbers each. The cells linearise at different points, and
-    covariances between sources are not passed on, so the result differs from that of all sensors
-    together.
+    covariances of the sources, seven numbers for each power and position. The cells linearise at
+    different points, and covariances between sources are not passed on, so the result differs from
+    that of all sensors together.
 
     Parameters
     ----------
     tracker : RSSTracker
-        With sources; it has the posterior of the last cell afterwards, and the sum of the log
-        likelihoods.
+        With a constant number of sources; it has the posterior of the last cell with readings
+        afterwards, and the sum of the log likelihoods.
     z : array_like, shape (n_sensors,), or None
         Readings, Np; NaN where missing, None if all are.
     cells : sequence of array_like
@@ -97,7 +96,8 @@ def update_by_cells(tracker: RSSTracker, z: ArrayLike | None, cells: Sequence[Ar
     Raises
     ------
     ValueError
-        If a sensor is in two cells, there is no such sensor, or the readings have another shape.
+        If a sensor is in two cells, there is no such sensor, the readings have another shape, or
+        sources may appear or have to be found: their detection needs all sensors.
 
     References
     ----------
@@ -116,18 +116,19 @@ def update_by_cells(tracker: RSSTracker, z: ArrayLike | None, cells: Sequence[Ar
     array([[-25.,  10.]])
     """
     n = tracker.measurement.dim_z
-    parts = _disjoint(cells, n)
-    if z is None:
+    readings, parts = tracker.vector(z), _disjoint(cells, n)
+    if tracker.births or not len(tracker.tracks.label):
+        got = "births" if tracker.births else "none"
+        raise ValueError(f"tracker must have a constant number of sources, at least 1; got {got}")
+    parts = [part for part in parts if not np.isnan(readings[part]).all()]
+    if not parts:
         tracker.update(None)
         return
-    readings = real_numbers("z", z)
-    if readings.shape != (n,):
-        raise ValueError(f"z must have shape ({n},); got {readings.shape}")
     total, elapsed = 0.0, tracker.elapsed
     for part in parts:
         own: Float = np.full(n, np.nan)
         own[part] = readings[part]
-        tracker.elapsed = elapsed
+        tracker.elapsed = elapsed  # all cells are of one step
         tracker.update(own)
         total += tracker.log_likelihood
     tracker.log_likelihood = total

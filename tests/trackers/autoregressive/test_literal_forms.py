@@ -113,6 +113,18 @@ def test_huber_reduces_the_error_by_outliers_and_costs_little_without(correction
     assert robust < 0.8 * plain
 
 
+def test_huber_states_innovation_variances_an_eighth_too_small_without_outliers() -> None:
+    array = symmetric_array(0.25)
+    z = snapshots(array, DOA, sources(TWO, 1, N)[0])
+    q = []
+    for huber in (None, 1.5):
+        tracker = make_tracker(array, forgetting=0.99, huber=huber)
+        tracker.run(z)
+        assert tracker.belief is not None
+        q.append(tracker.belief.q[0])
+    assert np.abs(q[1] / q[0] - 7 / 8).max() < 0.03
+
+
 def test_forms_without_a_derivation_state_no_deviation() -> None:
     array = symmetric_array(0.25)
     z = recordings(array, 1)[0][:300]

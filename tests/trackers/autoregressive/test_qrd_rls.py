@@ -194,3 +194,10 @@ def test_weighted_l1_meets_the_conditions_of_its_minimum() -> None:
     assert abs(slope[2]) < weights[2]
     with pytest.raises(ValueError, match="l1 must be finite, not negative"):
         QRDRLS(3, l1=-1.0)
+
+
+def test_l1_before_data_is_its_target_and_names_its_shape() -> None:
+    with np.errstate(all="raise"):
+        np.testing.assert_array_equal(QRDRLS(2, l1=10.0).solve(), np.zeros((2, 1)))
+    with pytest.raises(ValueError, match=r"l1 must be one number or have shape \(2,\); got \(3,\)"):
+        QRDRLS(2, l1=[1.0, 2.0, 3.0])

@@ -7,7 +7,7 @@ import pytest
 
 from arrivals.measurement_models import LogGains, LogNormalRSS
 from arrivals.measurement_models.signal_strength.path_loss import doppler_log_gain
-from arrivals.motion_models import ConstantVelocity
+from arrivals.motion_models import ConstantVelocity, RandomWalk
 from arrivals.trackers import RSSML, RSSVB, AmplitudePrior
 from arrivals.typing import Float
 
@@ -69,3 +69,12 @@ def test_wave_speed_needs_a_velocity_and_a_constant_number_of_sources() -> None:
         RSSVB(
             ConstantVelocity(1.0), RSS, X0, P0, births=True, amplitude=AmplitudePrior(wave_speed=C)
         )
+
+
+def test_wave_speed_set_later_is_that_of_the_constructor() -> None:
+    _, z = readings(4)
+    later, first = tracker(), tracker(wave_speed=C)
+    later.set_params(amplitude__wave_speed=C)
+    np.testing.assert_array_equal(later.run(z, dt=0.2).position, first.run(z, dt=0.2).position)
+    with pytest.raises(ValueError, match="motion must have vx and vy for wave_speed; got Random"):
+        tracker(wave_speed=C).set_params(motion=RandomWalk(q=1.0, n_dims=4))

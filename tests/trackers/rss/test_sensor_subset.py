@@ -118,8 +118,29 @@ def test_cells_are_disjoint_sets_of_sensors(cells: Any, message: str) -> None:
     assert own.x is before
 
 
+def test_cell_without_readings_is_left_out() -> None:
+    z = TRIAL.measurements[0].copy()
+    z[50:] = np.nan
+    halves, whole = tracker(), tracker()
+    update_by_cells(halves, z, [range(50), range(50, 100)])
+    whole.update(z)
+    np.testing.assert_array_equal(halves.x, whole.x)
+    assert halves.elapsed == whole.elapsed == 0
+    assert halves.diagnostics.iterations == whole.diagnostics.iterations > 0
+
+
+@pytest.mark.parametrize(
+    ("params", "got"),
+    [({"births": True}, "births"), ({"x0": None, "n_sources": 1, "P0": np.eye(4)}, "none")],
+)
+def test_cells_need_sources(params: dict[str, Any], got: str) -> None:
+    searching = RSSVB(**{**TRIAL.tracker_arguments(), **params})
+    with pytest.raises(ValueError, match=f"a constant number of sources, at least 1; got {got}"):
+        update_by_cells(searching, TRIAL.measurements[0], [range(50)])
+
+
 def test_readings_of_cells_have_one_number_a_sensor() -> None:
-    with pytest.raises(ValueError, match=r"z must have shape \(100,\); got \(99,\)"):
+    with pytest.raises(ValueError, match=r"z must have shape \(100,\) or \(100, 1\); got \(99,\)"):
         update_by_cells(tracker(), TRIAL.measurements[0][:99], [range(10)])
 
 
