@@ -51,8 +51,8 @@ class ARKalmanQRDRLS(BlockProcessor):
     ----------
     measurement : ArraySnapshot
         A line, symmetric about its centre: M pairs and a centre sensor are 2M + 1 sensors. Without
-        the centre sensor, as with two sensors, convergence takes longer. Its noise is the initial
-        estimate.
+        the centre sensor, as with two sensors, convergence takes longer and needs initial
+        directions: acquisition is off by up to 20 degrees. Its noise is the initial estimate.
     motion : AutoregressiveSources
         Initial AR models; their powers, the expected long-term powers of the sources, should be
         right within 10 dB. Real-valued sources are received with half of the noise.

@@ -88,6 +88,7 @@ def directions_of_rows(
         d = d[:1] if regression.pairs == "inner" else d
         u = phases[..., : len(d)] / (2 * np.pi * d)
         doa = np.arcsin(np.minimum(np.maximum(u, -1.0), 1.0)).mean(axis=-1)
+    # a quotient has no whole turns, which the limit excludes
     return doa if is_ratio else limit_phase_step(before, doa, float(d[-1]))
 
 

@@ -96,7 +96,7 @@ def update_by_cells(tracker: RSSTracker, z: ArrayLike | None, cells: Sequence[Ar
     Raises
     ------
     ValueError
-        If a sensor is in two cells, there is no such sensor, the readings have another shape, or
+        If a sensor is in two cells, a sensor does not exist, the readings have another shape, or
         sources may appear or have to be found: their detection needs all sensors.
 
     References

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -196,8 +196,12 @@ class VariationalSolver(FrozenModel):
     sensor_choice: SensorChoice = "information"
 
     @classmethod
-    def as_printed(cls) -> VariationalSolver:
+    def as_printed(cls) -> Self:
         """Return Algorithm 1 of the paper as printed: 30 parallel updates, each the next prior.
+
+        Returns
+        -------
+        VariationalSolver
 
         Examples
         --------
@@ -207,7 +211,7 @@ class VariationalSolver(FrozenModel):
         """
         return cls(
             sweep="jacobi", damping=1.0, refresh="literal", tol_u=0.0, tol_theta=1e-6,
-            covariance="factor",
+            max_iterations=30, covariance="factor",
         )  # fmt: skip
 
     def __post_init__(self) -> None:

@@ -68,7 +68,7 @@ class VALSE(BatchDirectionTracker):
     `existence` of an estimate is the posterior probability of the component, the noise integrated
     out. `std` is the marginal circular standard deviation of the angle, for unknown noise; with
     coordinate ascent that of the angle given the other components, which with several sources is
-    too small: of Figs 4 to 6 by a factor of four. Below half a wavelength of spacing, components
+    too small: of Figs 4 to 6 by factors of 4 to 7. Below half a wavelength of spacing, components
     to which no real direction belongs are left out of the estimate.
 
     References

@@ -4,7 +4,7 @@ Ours take joint Newton steps, count phases from the middle of the array, and hav
 direction that may stand still. The paper's form has coordinate ascent to a tolerance of 1e-6, the
 first sensor as phase reference, and a walk in the electrical angle; the densities of the angles are
 integrated by quadrature. As printed, they are mixtures of von Mises densities, (38)-(48), which
-takes five times as long.
+takes several times as long.
 """
 
 from __future__ import annotations

@@ -114,15 +114,18 @@ class CoordinateSolver(SolverSettings):
         """Raise ValueError if the mixture does not support such measurements."""
         if self.posterior == "quadrature":
             return
-        unmet = {
-            'memory="von_mises"': n_moments > 0,
-            "a line on a uniform grid, at one wavelength": manifold.coefficients is not None,
-            "one snapshot a step": n_snapshots > 1 or len(manifold.nuisance_weights) > 1,
-        }
-        for required, is_unmet in unmet.items():
-            if is_unmet:
+        n_bins = len(manifold.nuisance_weights)
+        needs = (
+            ('memory="von_mises"', n_moments == 0, 'memory="posterior"'),
+            ("a line on a uniform grid, at one wavelength", manifold.coefficients is None,
+             type(manifold).__name__),
+            ("one snapshot a step", max(n_snapshots, n_bins) == 1,
+             f"{n_snapshots} snapshots, {n_bins} wavelengths"),
+        )  # fmt: skip
+        for required, is_met, got in needs:
+            if not is_met:
                 raise ValueError(
-                    f'posterior="mixture" requires {required}: the general form is '
+                    f'posterior="mixture" requires {required}; got {got}: the general form is '
                     'posterior="quadrature"'
                 )
 

@@ -62,14 +62,12 @@ class InitialSupport:
         array([0.5, 0.5, 0.5, 0.5])
         """
         if prior is None or len(prior.mu) == 0:
-            half = max(L // 2, 1)
-            # ρ = ⌊L/2⌋/L of the published program; p = 0.5 in section VI.B
-            given = first_existence is not None
-            probability = first_existence if first_existence is not None else half / L
-            n_expected = probability * L if given else half
+            # K₀ = ⌊L/2⌋ of the published program; p = 0.5 in section VI.B
+            estimated = first_existence is None
+            K0 = max(L // 2, 1) if first_existence is None else first_existence * L
             noise, none = None if prior is None else prior.noise, np.zeros(0)
-            empty = ComponentPrior(none, none, none, probability, noise=noise)
-            return cls(empty, 0, np.full(L, probability), n_expected, estimate_rho=not given)
+            empty = ComponentPrior(none, none, none, K0 / L, noise=noise)
+            return cls(empty, 0, np.full(L, K0 / L), K0, estimate_rho=estimated)
         n = min(len(prior.mu), L)
         rho = np.concatenate([prior.existence[:n], np.full(L - n, prior.birth)])
         return cls(prior, n, rho, int((rho == rho.max()).sum()), estimate_rho=False)
