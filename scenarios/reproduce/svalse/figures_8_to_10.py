@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 SCENES = {"svalse_scenario1": "three static sources", "svalse_scenario2": "six static sources"}
 SNR_DB = tuple(float(snr) for snr in range(0, 45, 5))
-SLOW_DB, SLOW_RUNS = 15.0, 2  # from this SNR on the paper's forms take 10 to 60 s a run
+SLOW_DB, SLOW_RUNS = 15.0, 3  # from this SNR on the paper's forms take 10 to 60 s a run
 OFF_GRID_DB = (30.0, 40.0)
 OFF_GRID = 0.25  # degrees, halfway between the directions of (S)SBL
 PARTS = ("gospa", "distance", "missed", "false", "rmse", "cardinality", "converged")
