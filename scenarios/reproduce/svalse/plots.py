@@ -220,10 +220,9 @@ def draw_parts(study: Study, name: str) -> Figure:
                 label="95 % interval of the mean")  # fmt: skip
     rebuilt = {method: values.gospa for method, values in REBUILT[name].items()}
     for values, marker, origin in ((rebuilt, "D", "rebuilt"), (PAPER[name], "*", "paper, one run")):
-        beside = {paper_form(method): value for method, value in values.items()}
-        if not set(beside) <= set(labels):  # a quick study, without the paper's form
-            beside = {method: value for method, value in beside.items() if method in labels}
-        if not beside:
+        known = {paper_form(method): value for method, value in values.items()}
+        beside = {label: known[label] for label in known if label in labels}
+        if not beside:  # a quick study, without the paper's form
             continue
         index = [labels.index(label) for label in beside]
         ax.plot(np.array(index) + 0.2, list(beside.values()), marker, color="black",

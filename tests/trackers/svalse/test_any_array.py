@@ -308,7 +308,7 @@ def test_sparse_line_warns_of_two_ambiguous_directions() -> None:
         (
             ArraySnapshot(SensorArray.ula(8, 0.5), 1.0, n_snapshots=2),
             {"solver": MIXTURE},
-            "requires one snapshot a step; got 2 snapshots, 1 wavelengths: the general form",
+            "requires one snapshot a step; got 2 at 1 wavelengths: the general form",
         ),
         (
             ArraySnapshot(SensorArray.ula(8, 0.5), 1.0),

@@ -120,7 +120,7 @@ class CoordinateSolver(SolverSettings):
             ("a line on a uniform grid, at one wavelength", manifold.coefficients is None,
              type(manifold).__name__),
             ("one snapshot a step", max(n_snapshots, n_bins) == 1,
-             f"{n_snapshots} snapshots, {n_bins} wavelengths"),
+             f"{n_snapshots} at {n_bins} wavelengths"),
         )  # fmt: skip
         for required, is_met, got in needs:
             if not is_met:
