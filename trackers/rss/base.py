@@ -23,7 +23,7 @@ from arrivals.trackers.rss.arguments import (
 )
 from arrivals.trackers.rss.batch import BatchStart, run_in_chunks
 from arrivals.trackers.rss.belief import SourceBeliefs, keep_finite
-from arrivals.trackers.rss.doppler import Doppler
+from arrivals.trackers.rss.doppler import Doppler, check_doppler
 from arrivals.trackers.rss.inference.joint_posterior import JointPosterior
 from arrivals.trackers.rss.inference.solution import Diagnostics, Solution, WeightedReadings
 from arrivals.trackers.rss.mirror import Line
@@ -82,7 +82,7 @@ class RSSTracker(Tracker):
         self.n_sources = None if n_sources is None else count("n_sources", n_sources, maximum=1000)
         self.amplitude = instance("amplitude", amplitude, AmplitudePrior)
         self.births = birth_death(births)
-        Doppler.of(motion, amplitude.wave_speed, bool(self.births))  # raises
+        check_doppler(motion, amplitude.wave_speed, bool(self.births))
         self.search = instance("search", search, GridSearch)
         if correlation_time is not None:
             positive("correlation_time", correlation_time)
@@ -199,16 +199,16 @@ class RSSTracker(Tracker):
         """Return readings (n_batch, n_sensors) with the weights min(1, Δt/τ)/r, 0 if missing."""
         valid = ~np.isnan(xi)
         precision = valid / self.measurement.variance
-        fraction = np.ones(len(xi))
-        if self.correlation_time is not None:
-            fraction = np.minimum(1.0, elapsed / self.correlation_time)
+        tau = self.correlation_time
+        fraction = np.ones(len(xi)) if tau is None else np.minimum(1.0, elapsed / tau)
         return WeightedReadings(np.where(valid, xi, 0.0), fraction[:, None] * precision, precision)
 
     def joint_posterior(self, sources: SourceBeliefs, readings: WeightedReadings) -> JointPosterior:
         """Return the joint posterior (7) of predicted sources and readings."""
         prior, propagation = sources.prior(self.position), self.measurement.propagation
-        if doppler := Doppler.of(self.motion, self.amplitude.wave_speed, bool(self.births)):
-            propagation = doppler.applied(propagation, prior.theta, sources.x)  # β of (1)
+        if (c := self.amplitude.wave_speed) is not None:  # β of (1)
+            doppler = Doppler.of(self.motion, c, bool(self.births))
+            propagation = doppler.applied(propagation, prior.theta, sources.x)
         return JointPosterior(propagation, readings.xi, readings.W, prior)
 
     def update_sources(

@@ -36,8 +36,8 @@ class Doppler(NamedTuple):
     speed: float
 
     @classmethod
-    def of(cls, motion: MotionModel, wave_speed: float | None, births: bool) -> Doppler | None:
-        """Return the factor of a motion model; None without a wave speed.
+    def of(cls, motion: MotionModel, wave_speed: float, births: bool) -> Doppler:
+        """Return the factor of a motion model.
 
         Raises
         ------
@@ -53,8 +53,6 @@ class Doppler(NamedTuple):
         Traceback (most recent call last):
         ValueError: motion must have vx and vy for wave_speed; got RandomWalk: use ConstantVelocity
         """
-        if wave_speed is None:
-            return None
         names = motion.state_names
         if not {"vx", "vy"} <= set(names):
             got = type(motion).__name__
@@ -80,3 +78,9 @@ class Doppler(NamedTuple):
         v = velocity * (limit / np.maximum(length, limit))
         gain = doppler_log_gain(v, theta, propagation.sensors, self.speed)
         return propagation._replace(log_gain=propagation.log_gain + gain)
+
+
+def check_doppler(motion: MotionModel, wave_speed: float | None, births: bool) -> None:
+    """Raise a ValueError where a wave speed is given and the motion has no factor for it."""
+    if wave_speed is not None:
+        Doppler.of(motion, wave_speed, births)
