@@ -2,6 +2,7 @@
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.arrays.element_response import ElementResponse
+from arrivals.measurement_models.arrays.noise_coherence import NoiseCoherence
 from arrivals.measurement_models.arrays.sensor_array import SensorArray, steering_vector
 from arrivals.measurement_models.base import MeasurementModel
 from arrivals.measurement_models.bearing import Bearing
@@ -33,6 +34,7 @@ __all__ = [
     "steering_vector",
     # snapshots of an array
     "ArraySnapshot",
+    "NoiseCoherence",
     "composite",
     "DirectionMeasurement",
     "Manifold",

@@ -12,27 +12,29 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.arrays.ambiguity import ambiguous_pair, check_directions
 from arrivals.measurement_models.arrays.element_response import ElementResponse
+from arrivals.measurement_models.arrays.noise_coherence import (
+    NoiseCoherence,
+    coherence_of,
+    white_share,
+)
 from arrivals.measurement_models.arrays.plane_waves import PlaneWaves, frequency_bins, grid_of
 from arrivals.measurement_models.arrays.sensor_array import SensorArray, direction
 from arrivals.measurement_models.base import MeasurementModel
 from arrivals.measurement_models.manifolds.fourier import fourier_manifold
 from arrivals.measurement_models.manifolds.manifold import Manifold, Reference
 from arrivals.measurement_models.manifolds.uniform_line import grid_line
-from arrivals.measurement_models.single_source import SingleSourceSnapshot
-from arrivals.measurement_models.snapshot_gate import SnapshotGate
+from arrivals.measurement_models.manifolds.whitened import whitened_manifold
 from arrivals.measurement_models.snapshot_likelihood import (
-    from_composite,
-    log_known,
-    log_marginal,
     of_state,
 )
+from arrivals.measurement_models.snapshot_noise import SnapshotNoise
 from arrivals.measurements import numbers
-from arrivals.typing import Complex, Float
+from arrivals.typing import Complex
 from arrivals.validation import count, instance, one_of, positive, real
 
 
 @dataclass(frozen=True)
-class ArraySnapshot(SnapshotGate, SingleSourceSnapshot):
+class ArraySnapshot(SnapshotNoise):
     """Snapshots of plane waves on an array: z = Σ w a(β) + u, one or several in a step.
 
     Gridless methods use `observe` and `manifold`. A particle filter on directions uses
@@ -60,7 +62,15 @@ class ArraySnapshot(SnapshotGate, SingleSourceSnapshot):
         Grid of an unknown elevation, rad; waves are horizontal if None.
     angle : {"auto", "doa"}
         Angle in which a line is tracked: "auto" is the electrical angle where the sensors are on
-        a uniform grid, gaps allowed, of at most half of one wavelength; "doa" the direction.
+        a uniform grid, gaps allowed, of at most half of one wavelength, and the noise is white;
+        "doa" the direction.
+    noise_coherence : {"white", "diffuse"} or array_like
+        Coherence Γ of the noise between sensors: none; that of waves from all directions of the
+        sphere on isotropic elements, such as reverberation of a room or ambient noise of the sea,
+        Γ = (1 - white) sinc(2 d/λ) + white I; or matrices (n_bins, n_sensors, n_sensors) or
+        (n_sensors, n_sensors), Hermitian and positive definite with ones on the diagonal.
+    white : float
+        White share of the variance of "diffuse" noise, at least 1e-9.
 
     Notes
     -----
@@ -69,6 +79,11 @@ class ArraySnapshot(SnapshotGate, SingleSourceSnapshot):
     What marks a missing number: `arrivals.measurements`. A channel of zeros alone, in all bins and
     snapshots of a step, is missing, too, with one warning; a step of zeros alone is missing.
     `observe` leaves out bins and snapshots without valid data, then sensors with gaps.
+
+    Noise that is coherent is whitened: `observe` and `manifold` give L z and L a of the valid
+    sensors, L = chol(Γ)⁻¹; `whitening` and `whitened` are for other methods. `noise` remains the
+    variance at one sensor, amplitudes those of the waves, and `snapshot`, `steering_vector` and
+    `wave` are not whitened.
 
     Examples
     --------
@@ -89,6 +104,8 @@ class ArraySnapshot(SnapshotGate, SingleSourceSnapshot):
     slowness: Sequence[float] | None = None
     elevation: Sequence[float] | None = None
     angle: Literal["auto", "doa"] = "auto"
+    noise_coherence: Literal["white", "diffuse"] | ArrayLike | NoiseCoherence = "white"
+    white: float = 0.1
 
     def __post_init__(self) -> None:
         instance("array", self.array, SensorArray)
@@ -101,6 +118,9 @@ class ArraySnapshot(SnapshotGate, SingleSourceSnapshot):
             object.__setattr__(self, name, grid_of(name, getattr(self, name)))
         if self.response is not None:
             instance("response", self.response, ElementResponse)
+        object.__setattr__(self, "white", white_share(self.white))
+        coherence = coherence_of("noise_coherence", self.noise_coherence, self.n_bins, self.array)
+        object.__setattr__(self, "noise_coherence", coherence)
         self.waves  # noqa: B018  (refuses parts that do not fit each other)
 
     @property
@@ -114,7 +134,12 @@ class ArraySnapshot(SnapshotGate, SingleSourceSnapshot):
         return len(self.wavelengths)
 
     def plain_wavelength(self, method: str) -> float:
-        """Return the wavelength, m, for a method of one snapshot a step of isotropic sensors."""
+        """Return the wavelength, m, for a method of one snapshot a step of isotropic sensors.
+
+        The method takes the noise for white.
+        """
+        if self.coherence is not None:
+            raise ValueError(f"{method} requires noise_coherence='white'; got coherent noise")
         if not (self.is_single and self.response is None):
             elements = "isotropic" if self.response is None else "directional"
             raise ValueError(
@@ -155,7 +180,8 @@ class ArraySnapshot(SnapshotGate, SingleSourceSnapshot):
         """Return the response as a Fourier series of an angle.
 
         For lines on a uniform grid of at most half of one wavelength the angle is the electrical
-        one and the series is that of the sensors; for every other array it is the direction.
+        one and the series is that of the sensors; for every other array, and where the noise is
+        coherent, it is the direction.
 
         Raises
         ------
@@ -166,11 +192,16 @@ class ArraySnapshot(SnapshotGate, SingleSourceSnapshot):
         if reference not in self._manifolds:
             one_of("reference", reference, ("middle", "first"))
             check_directions(self.waves)
-            line = None
-            if self.angle == "auto" and self.n_bins == 1 and not self.slowness:
-                line = grid_line(self.array, self.wavelengths[0], reference)
-            self._manifolds[reference] = line or fourier_manifold(self.waves, reference)
+            self._manifolds[reference] = self._new_manifold(reference)
         return self._manifolds[reference]
+
+    def _new_manifold(self, reference: Reference) -> Manifold:
+        if self.coherence is not None:
+            return whitened_manifold(self.waves, self.coherence, reference)
+        line = None
+        if self.angle == "auto" and self.n_bins == 1 and not self.slowness:
+            line = grid_line(self.array, self.wavelengths[0], reference)
+        return line or fourier_manifold(self.waves, reference)
 
     @cached_property
     def _manifolds(self) -> dict[str, Manifold]:
@@ -179,36 +210,6 @@ class ArraySnapshot(SnapshotGate, SingleSourceSnapshot):
     def ambiguity(self) -> tuple[float, float] | None:
         """Return the first two directions, rad, of equal response at every frequency, or None."""
         return ambiguous_pair(self.waves)
-
-    def log_likelihood(
-        self, z: ArrayLike, doa: ArrayLike, amplitude: ArrayLike | None = None
-    ) -> Float:
-        """Return ln p(z | β) for directions (..., n_sources), rad.
-
-        z ~ CN(0, power Σ a aᴴ + noise I) in every snapshot, the amplitudes integrated out; sensors
-        that are NaN are left out of theirs. An unknown slowness or elevation is averaged over,
-        each value as likely.
-
-        Parameters
-        ----------
-        z : array_like, shape `shape` or (dim_z,)
-            One measurement, complex, or real as `composite` makes it.
-        doa : array_like, shape (..., n_sources)
-            Directions, rad.
-        amplitude : array_like, shape (..., n_sources), optional
-            Complex amplitudes where they are known: then z ~ CN(Σ w a, noise I).
-
-        Returns
-        -------
-        ndarray, shape (...)
-        """
-        z = from_composite(z, self.shape)
-        doa = real("doa", doa)
-        if amplitude is not None:
-            return log_known(self.snapshot(z), self.wave(doa, amplitude), self.noise)
-        a = self.waves.steering(doa.ravel())
-        a = a.reshape(*a.shape[:3], *doa.shape)
-        return log_marginal(self.snapshots(z), a, self.noise, self.power)
 
     def wave(self, doa: ArrayLike, amplitude: ArrayLike) -> Complex:
         """Return noiseless measurements of sources at `doa` (..., n_sources), as in `simulate`."""
@@ -236,8 +237,7 @@ class ArraySnapshot(SnapshotGate, SingleSourceSnapshot):
         instance("rng", rng, np.random.Generator)
         wave = self.wave(doa, amplitude)
         shape = np.broadcast_shapes(wave.shape, self.shape)
-        u = rng.standard_normal((*shape, 2)) @ np.array([1, 1j]) * np.sqrt(self.noise / 2)
-        return np.asarray(wave + u)
+        return np.asarray(wave + self.draw_noise(shape, rng))
 
     @property
     def dim_z(self) -> int:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.base import MeasurementModel, SelectedEntries, locate
 from arrivals.measurements import numbers
-from arrivals.typing import Complex, Float
+from arrivals.typing import Bool, Complex, Float
 
 
 def composite(z: ArrayLike) -> Float:
@@ -48,10 +48,12 @@ def from_composite(z: ArrayLike, shape: tuple[int, ...]) -> Complex | Float:
     return np.asarray(z[:n] + 1j * z[n:]).reshape(shape)
 
 
-def log_known(z: Complex, expected: Complex, noise: float) -> Float:
-    """Return ln CN(z; expected, noise I) of one measurement at expected ones (..., *z.shape).
+def log_known(
+    z: Complex, expected: Complex, noise: float, whitening: Complex | None = None
+) -> Float:
+    """Return ln CN(z; expected, noise Γ) of one measurement at expected ones (..., *z.shape).
 
-    Entries that are NaN in z are left out.
+    Entries that are NaN in z are left out. `whitening` is as in `log_marginal`.
 
     Examples
     --------
@@ -59,15 +61,23 @@ def log_known(z: Complex, expected: Complex, noise: float) -> Float:
     array([-2.1447, -2.1447, -2.1447])
     """
     there = ~np.isnan(z)
-    e = (z - expected)[..., there]
+    e, log_det = z - expected, 0.0
+    if whitening is not None:
+        F, M = len(whitening), z.shape[-1]
+        rows = np.where(there, e, 0).reshape(*e.shape[: e.ndim - z.ndim], F, -1, M, 1)
+        e = (whitening @ rows).reshape(e.shape)
+        log_det = float(_log_det(whitening, there.reshape(F, -1, M)).sum())
+    e = e[..., there]
     energy = (e.real**2 + e.imag**2).sum(axis=-1)
-    return np.asarray(-there.sum() * np.log(np.pi * noise) - energy / noise)
+    return np.asarray(log_det - there.sum() * np.log(np.pi * noise) - energy / noise)
 
 
-def log_marginal(Y: Complex, a: Complex, noise: float, power: float) -> Float:
+def log_marginal(
+    Y: Complex, a: Complex, noise: float, power: float, whitening: Complex | None = None
+) -> Float:
     """Return ln p(Y) of sources of unknown amplitudes w ~ CN(0, power), averaged over responses.
 
-    y ~ CN(0, power Σ a aᴴ + noise I) for every bin and snapshot, entries that are NaN left out.
+    y ~ CN(0, power Σ a aᴴ + noise Γ) for every bin and snapshot, entries that are NaN left out.
 
     Parameters
     ----------
@@ -77,6 +87,8 @@ def log_marginal(Y: Complex, a: Complex, noise: float, power: float) -> Float:
         Responses to the directions, for each equally probable value of a second parameter.
     noise, power : float
         Variances of the noise of one sensor and of the amplitudes.
+    whitening : ndarray of complex, shape (n_bins, n_snapshots or 1, n_sensors, n_sensors), optional
+        L, L Γ Lᴴ = I, of the sensors with data, zero for the others; Γ = I if None.
 
     Returns
     -------
@@ -90,10 +102,22 @@ def log_marginal(Y: Complex, a: Complex, noise: float, power: float) -> Float:
     n_dims = a.ndim - 4  # of the leading axes of the directions
     A = np.moveaxis(a, 2, -1)[:, :, None]  # (n_nuisance, n_bins, 1, ..., n_sources, n_sensors)
     y = np.moveaxis(Y, 1, 2).reshape(Y.shape[0], Y.shape[2], *[1] * n_dims, Y.shape[1])
-    each = _log_gaussian(y, A, noise, power)
+    log_det: Float | float = 0.0
+    if whitening is not None:
+        there = ~np.isnan(y)
+        W = whitening.reshape(*whitening.shape[:2], *[1] * n_dims, *whitening.shape[2:])
+        y = np.where(there, (W @ np.where(there, y, 0)[..., None])[..., 0], np.nan)
+        A, log_det = A @ np.swapaxes(W, -1, -2), _log_det(W, there)
+    each = _log_gaussian(y, A, noise, power) + log_det
     total = each.sum(axis=(1, 2))  # over bins and snapshots
     top = total.max(axis=0)
     return np.asarray(top + np.log(np.exp(total - top).mean(axis=0)))
+
+
+def _log_det(W: Complex, there: Bool) -> Float:
+    """Return ln |det L|² of triangular L (..., M, M) of the sensors with data (..., M): (...)."""
+    diagonal = np.where(there, np.diagonal(W, axis1=-2, axis2=-1).real, 1.0)
+    return np.asarray(2 * np.log(diagonal).sum(axis=-1))
 
 
 def _log_gaussian(Y: Complex, A: Complex, noise: float, power: float) -> Float:

@@ -18,8 +18,8 @@ NAMES = {
         ArrayManifold ArraySamples ArraySnapshot Autoregressive AveragedEnvelope Bearing
         CombinedMeasurement DelayInterpolator DelayLine DirectionMeasurement ElementResponse
         FlatBand FunctionMeasurement InterpolationDelay LinearMeasurement LogGains LogNormalRSS
-        Manifold MeasurementModel Phasor SensorArray Tones composite db_to_neper dbm_to_neper
-        neper_to_db steering_vector
+        Manifold MeasurementModel NoiseCoherence Phasor SensorArray Tones composite db_to_neper
+        dbm_to_neper neper_to_db steering_vector
     """,
     "trackers": """
         ARKalmanQRDRLS AmplitudePrior BirthDeath CBF CoordinateSolver DirectionEstimate

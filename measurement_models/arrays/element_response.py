@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from arrivals.parameters import FrozenModel
-from arrivals.typing import Complex, Float
+from arrivals.typing import Complex
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +47,7 @@ class ElementResponse(FrozenModel):
         except ValueError:
             raise ValueError("gains must have rows of one length; got a ragged list") from None
         if gains.dtype.kind not in "biufc":
-            gains = _of_texts(gains)
+            gains = complex_from_texts("gains", gains)
         gains = gains.astype(np.complex128)
         if gains.ndim not in (2, 3) or 0 in gains.shape:
             raise ValueError(
@@ -104,7 +105,7 @@ class ElementResponse(FrozenModel):
 
     def to_dict(self) -> dict[str, object]:
         """Return the configuration, complex numbers as text."""
-        return {"type": self.type_name(), "gains": _texts(self.gains)}
+        return {"type": self.type_name(), "gains": complex_to_texts(self.gains)}
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, ElementResponse):
@@ -115,14 +116,28 @@ class ElementResponse(FrozenModel):
         return hash((self.gains.shape, self.gains.tobytes()))
 
 
-def _texts(gains: Complex) -> list[object]:
-    """Return complex numbers as text, which JSON can hold."""
-    return [str(x) for x in gains.tolist()] if gains.ndim == 1 else [_texts(x) for x in gains]
+def complex_to_texts(values: Complex) -> list[object]:
+    """Return complex numbers as text, which JSON can hold.
+
+    Examples
+    --------
+    >>> complex_to_texts(np.array([[1 + 2j, 3j]]))
+    [['(1+2j)', '3j']]
+    """
+    if values.ndim == 1:
+        return [str(x) for x in values.tolist()]
+    return [complex_to_texts(x) for x in values]
 
 
-def _of_texts(gains: Float | Complex) -> Complex:
-    """Read what `_texts` wrote."""
+def complex_from_texts(name: str, values: NDArray[Any]) -> Complex:
+    """Return the complex numbers that `complex_to_texts` made text.
+
+    Examples
+    --------
+    >>> complex_from_texts("gains", np.array(["(1+2j)", "3j"]))
+    array([1.+2.j, 0.+3.j])
+    """
     try:
-        return np.asarray(np.vectorize(complex, otypes=[np.complex128])(gains))
+        return np.asarray(np.vectorize(complex, otypes=[np.complex128])(values))
     except (TypeError, ValueError, OverflowError):
-        raise TypeError(f"gains must be numbers; got {gains.dtype}") from None
+        raise TypeError(f"{name} must be numbers; got {values.dtype}") from None
