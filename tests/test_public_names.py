@@ -23,11 +23,12 @@ NAMES = {
     """,
     "trackers": """
         ARKalmanQRDRLS AmplitudePrior BirthDeath CBF CoordinateSolver DirectionEstimate
-        DirectionTracker EKF ESPRIT Estimate Filter FixedPointSolver GaussianFilter GridSearch IMM
-        InterpolationEKF Kalman MAPSolver MUSIC MVDR NewtonSolver PAST Particle PeaksGNN
-        PositionEstimate QRDRLS RSSML RSSVB RootMUSIC Run SBL SSBL SVALSE SourceEstimate
-        StateEstimate Tracker UKF VALSE VariationalSolver as_filterpy available create find
-        find_peaks is_missing refine_peaks register update_by_cells
+        DirectionTracker EKF ESPRIT Estimate Filter FixedPointSolver GaussianFilter GridSearch
+        IMM InterpolationEKF Kalman MAPSolver MUSIC MVDR MixtureSettings NewtonSolver PAST
+        Particle PeaksGNN PositionEstimate QRDRLS RSSML RSSVB RootMUSIC Run SBL SSBL SVALSE
+        SourceEstimate StateEstimate Tracker UKF VALSE VariationalSolver WidebandMixture
+        as_filterpy available create find find_peaks is_missing refine_peaks register
+        update_by_cells
     """,
     "trackers.filterpy": "ExtendedKalmanFilter IMMEstimator KalmanFilter UnscentedKalmanFilter",
     "scenarios": """

@@ -47,6 +47,8 @@ from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver
 from arrivals.trackers.svalse.newton.solver import NewtonSolver
 from arrivals.trackers.svalse.svalse import SVALSE
 from arrivals.trackers.svalse.valse import VALSE
+from arrivals.trackers.wideband.settings import MixtureSettings
+from arrivals.trackers.wideband.wideband_mixture import WidebandMixture
 
 __all__ = [
     "ARKalmanQRDRLS",
@@ -69,6 +71,7 @@ __all__ = [
     "MAPSolver",
     "MUSIC",
     "MVDR",
+    "MixtureSettings",
     "NewtonSolver",
     "PAST",
     "Particle",
@@ -88,6 +91,7 @@ __all__ = [
     "UKF",
     "VALSE",
     "VariationalSolver",
+    "WidebandMixture",
     "as_filterpy",
     "available",
     "create",

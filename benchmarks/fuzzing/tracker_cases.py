@@ -52,6 +52,7 @@ LINE = ArraySnapshot(SensorArray.ula(6, spacing=0.5), wavelength=1.0, noise=0.01
 CIRCLE = ArraySnapshot(
     SensorArray.uca(5, radius=0.5), wavelength=[1.0, 1.3], noise=0.01, n_snapshots=2
 )
+BANDS = CIRCLE.replace(wavelength=list(np.linspace(1.0, 3.0, 12)), n_snapshots=4)
 RING = ArraySnapshot(SensorArray.uca(5, radius=0.5), wavelength=1.0, noise=0.01)
 PAIRS = ArraySnapshot(SensorArray.symmetric([0.25, 0.5]), wavelength=1.0, noise=0.1)
 SOUND = ArraySamples(SensorArray.ula(4, spacing=0.5, speed=1.0), 4.0, Tones(0.2), snr_db=20.0)
@@ -130,6 +131,9 @@ CASES: dict[str, list[Case]] = {
     },
     "past": direction("past", n_directions=61, method="music"),
     **{name: direction(name) for name in ("root_music", "esprit", "peaks_gnn", "valse", "svalse")},
+    "wideband_mixture": [
+        (lambda: create("wideband_mixture", measurement=BANDS), snapshots(BANDS)),
+    ],
     "ar_kalman_qrd_rls": [
         (
             lambda: create(

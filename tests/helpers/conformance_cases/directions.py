@@ -11,8 +11,10 @@ from arrivals.trackers import (
     SVALSE,
     VALSE,
     CoordinateSolver,
+    MixtureSettings,
     NewtonSolver,
     PeaksGNN,
+    WidebandMixture,
 )
 from arrivals.trackers.conformance import MakeTracker, Measurements
 
@@ -22,6 +24,8 @@ WIDEBAND = CIRCLE.replace(wavelength=[1.0, 1.4], n_snapshots=2)
 SLOWNESS = WIDEBAND.replace(
     slowness=[0.9, 1.0, 1.1], response=ElementResponse.first_order([0.3] * 7)
 )
+MANY_BINS = CIRCLE.replace(wavelength=list(np.linspace(1.0, 3.0, 24)), n_snapshots=6)
+MANY_BINS_OF_A_LINE = LINE.replace(wavelength=list(np.linspace(1.0, 2.0, 16)), n_snapshots=4)
 GAPS = ArraySnapshot(SensorArray.ula(10, 0.4, missing=[2]), wavelength=1.0, noise=1e-3)
 
 
@@ -30,6 +34,17 @@ def two_sources(model: ArraySnapshot, n_steps: int = 4) -> Measurements:
     on = np.arange(n_steps) > 0
     doa = np.stack([0.5 + 0.02 * np.arange(n_steps), np.where(on, -0.4, np.nan)], axis=-1)
     z = model.simulate(doa, [1.0, 0.8j], np.random.default_rng(5))
+    z[1, ..., 3] = np.nan
+    z[-1] = 0.0
+    return z
+
+
+def talkers(model: ArraySnapshot, n_steps: int = 5) -> Measurements:
+    """Return bins of two sources of few bins each: the second starts late, a sensor fails."""
+    rng = np.random.default_rng(5)
+    doa = np.stack([np.full(n_steps, 0.5), np.where(np.arange(n_steps) > 0, -0.4, np.nan)], axis=-1)
+    level = rng.exponential(size=(n_steps, *model.shape[:-1], 2)) ** 4
+    z = model.simulate(doa, level, rng)
     z[1, ..., 3] = np.nan
     z[-1] = 0.0
     return z
@@ -65,5 +80,16 @@ TRACKERS: list[tuple[str, MakeTracker, Measurements]] = [
         "svalse",
         lambda: SVALSE(SLOWNESS, BernoulliVonMises(sigma_doa=0.05), memory="posterior"),
         two_sources(SLOWNESS),
+    ),
+    ("wideband_mixture", lambda: WidebandMixture(MANY_BINS), talkers(MANY_BINS)),
+    (
+        "wideband_mixture",
+        lambda: WidebandMixture(
+            MANY_BINS_OF_A_LINE.replace(slowness=[0.9, 1.0, 1.1]),
+            BernoulliVonMises(sigma_doa=0.2, p_activate=0.2, p_deactivate=0.2),
+            settings=MixtureSettings(tempering=10.0, max_sources=2),
+            step_duration=0.064,
+        ),
+        talkers(MANY_BINS_OF_A_LINE),
     ),
 ]

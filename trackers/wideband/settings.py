@@ -1,0 +1,109 @@
+"""Settings of the mixture over time-frequency bins."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from arrivals.parameters import FrozenModel
+from arrivals.validation import count, not_negative, one_of, positive, probability
+
+COUNTS = {"iterations": 100, "max_sources": 100, "max_births": 100, "min_bins": 1_000_000}
+PROBABILITIES = ("background", "birth_share", "min_share", "birth_existence")
+MAY_BE_ZERO = ("relocation", "merge", "birth_evidence")
+
+
+@dataclass(frozen=True)
+class MixtureSettings(FrozenModel):
+    """Settings of `WidebandMixture`; times in seconds, so that they hold for any step length.
+
+    Parameters
+    ----------
+    grid_step : float
+        Distance of the scan directions, rad.
+    diffuse : bool
+        True to replace white noise of the measurement model by diffuse noise; other noise of the
+        model is kept.
+    source_ratio : float
+        Power ξ of a source in its bins over that of the diffuse sound.
+    tempering : float
+        Number T of bins that count as one independent bin.
+    deviation_tempering : float
+        The same for the stated standard deviation; calibrated on simulated rooms.
+    iterations : int
+        Variational iterations of a fit.
+    background, birth_share, min_share : float
+        Shares of the bins: of diffuse sound at the start of a fit, of a new source when its
+        direction is searched, and the least that a source has.
+    birth_evidence : float
+        Log evidence of a new source over ln G, G the number of scan directions.
+    birth_existence : float
+        Existence of a new source before its first bins are counted.
+    max_births, max_sources : int
+        New sources in one step, and reported sources.
+    merge : float
+        Least distance of two sources, rad.
+    pause : float
+        Time constant of the existence while no bin counts, s.
+    relocation : float
+        Rate at which the density of an inactive source becomes uniform, 1/s.
+    memory, confirm : float
+        Time for which an inactive source keeps its label, and for which one that never had a
+        label is kept, s.
+    min_bins : int
+        Counted bins of a step below which it is a pause.
+    floor_db, floor_rise : float
+        Level over its noise floor from which a bin counts, dB; rise of the floor, dB/s.
+    onset_db, decay : float
+        A bin counts if its level exceeds the highest before, which falls by `decay`, dB/s, by
+        `onset_db`, dB: echoes follow later and weaker.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If a number is out of its range.
+
+    Examples
+    --------
+    >>> MixtureSettings(memory=5.0).replace(max_sources=2).max_sources
+    2
+    """
+
+    grid_step: float = float(np.deg2rad(3.0))
+    diffuse: bool = True
+    source_ratio: float = 3.0
+    tempering: float = 25.0
+    deviation_tempering: float = 5.0
+    iterations: int = 3
+    background: float = 0.3
+    birth_share: float = 0.15
+    min_share: float = 0.05
+    birth_evidence: float = 0.5
+    birth_existence: float = 0.05
+    max_births: int = 2
+    max_sources: int = 4
+    merge: float = float(np.deg2rad(12.0))
+    pause: float = 0.25
+    relocation: float = 0.16
+    memory: float = 2.0
+    confirm: float = 0.26
+    min_bins: int = 4
+    floor_db: float = 8.0
+    floor_rise: float = 0.67
+    onset_db: float = 1.0
+    decay: float = 45.0
+
+    def __post_init__(self) -> None:
+        one_of("diffuse", self.diffuse, (False, True))
+        for name in (field.name for field in fields(self) if field.name != "diffuse"):
+            object.__setattr__(self, name, self._checked(name, getattr(self, name)))
+
+    @staticmethod
+    def _checked(name: str, value: Any) -> float:
+        if name in COUNTS:
+            return count(name, value, maximum=COUNTS[name])
+        if name in PROBABILITIES:
+            return probability(name, value)
+        return not_negative(name, value) if name in MAY_BE_ZERO else positive(name, value)

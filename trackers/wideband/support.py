@@ -1,0 +1,43 @@
+"""Existence of the sources of a mixture, and which of them are kept."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from arrivals.trackers.wideband.direction_grid import DirectionGrid
+from arrivals.trackers.wideband.mixture import Mixture, log_odds_gain
+from arrivals.trackers.wideband.settings import MixtureSettings
+from arrivals.trackers.wideband.tracked_sources import REPORTED, TrackedSources
+from arrivals.typing import Int
+
+UNSUPPORTED = 0.3  # highest existence of a source of too small a share
+
+
+def updated(
+    sources: TrackedSources, mixture: Mixture, grid: DirectionGrid, settings: MixtureSettings
+) -> tuple[TrackedSources, Int]:
+    """Return the sources after a step, and their indices in the mixture.
+
+    Existence gains the evidence of the step, an active or new source has the density of the
+    mixture, and of two sources that are near one is left.
+    """
+    odds = np.log(sources.existence) - np.log1p(-sources.existence)
+    odds = odds + log_odds_gain(mixture, sources.density, settings)
+    existence = np.clip(1 / (1 + np.exp(-np.clip(odds, -20, 20))), 1e-4, 1 - 1e-4)
+    share = mixture.share[1:]
+    existence = np.where(share < settings.min_share, np.minimum(existence, UNSUPPORTED), existence)
+    active = existence >= REPORTED
+    is_new = sources.label < 0
+    density = np.where((active | is_new)[:, None], mixture.density, sources.density)
+    peaks = density.argmax(axis=1) % len(grid.doa)
+    found = mixture.density.argmax(axis=1) % len(grid.doa)
+    kept: list[int] = []
+    for i in np.lexsort((-share, is_new)):  # those with a label first, then by share
+        is_near = bool((grid.distance[peaks[kept], found[i]] < settings.merge).any())
+        if not (is_near and (active[i] or is_new[i])):
+            kept.append(int(i))
+    kept = sorted(kept, key=lambda i: -existence[i])[: settings.max_sources]
+    index = np.array(kept, dtype=np.int64)
+    return replace(sources, density=density, existence=existence).select(index), index
