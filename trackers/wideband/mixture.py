@@ -137,7 +137,9 @@ def _birth_density(
     gain.reshape(-1, G)[:, near] = -np.inf
     if gain.max() < settings.birth_evidence * np.log(len(gain)):
         return None
-    density = np.exp(gain - gain.max())
+    peak = int(gain.argmax())  # of several new sources one at a time
+    around = np.tile(grid.distance[peak % G] < max(settings.merge, grid.step), len(gain) // G)
+    density = np.where(around, np.exp(gain - gain[peak]), 0.0)
     return np.asarray(density / density.sum())
 
 
