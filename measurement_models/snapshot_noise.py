@@ -94,15 +94,15 @@ class SnapshotNoise(SnapshotGate, SingleSourceSnapshot):
         L = np.eye(n) + 0j if self.coherence is None else self.coherence.whitening(sensors)
         return np.broadcast_to(L, (self.n_bins, n, n))
 
-    def whitened(self, Y: Complex, doa: Float) -> tuple[Complex, Complex]:
-        """Return snapshots with white noise, and the responses to plane waves in them.
+    def whitened(self, Y: Complex, A: Complex) -> tuple[Complex, Complex]:
+        """Return snapshots and responses after whitening, those without gaps and others.
 
         Parameters
         ----------
         Y : ndarray of complex, shape (n_bins, n_sensors, n_snapshots)
             As from `snapshots`; NaN where a sensor gave no number.
-        doa : ndarray, shape (n,)
-            Directions, rad.
+        A : ndarray of complex, shape (n_nuisance, n_bins, n_sensors, n)
+            Responses to plane waves, as from `waves.steering`.
 
         Returns
         -------
@@ -110,9 +110,18 @@ class SnapshotNoise(SnapshotGate, SingleSourceSnapshot):
             NaN where it was. Snapshots of unequal gaps are bins of their own, (n_bins n_snapshots,
             n_sensors, 1), as each gap has another whitening.
         A : ndarray of complex, shape (n_nuisance, n_bins, n_sensors, n)
-            Responses; of the same bins. Both are as they were if the noise is white.
+            Of the same bins, zero for missing sensors. Both are as they were if noise is white.
+
+        Examples
+        --------
+        >>> from arrivals.measurement_models import ArraySnapshot, SensorArray
+        >>> model = ArraySnapshot(SensorArray.uca(5, 0.2), 1.0, noise_coherence="diffuse")
+        >>> a = model.waves.steering([0.3])
+        >>> Y, A = model.whitened(2 * a[0], a)
+        >>> bool(np.allclose(Y, 2 * A[0]))
+        True
         """
-        A, W = self.waves.steering(doa), self.gap_whitening(Y)
+        W = self.gap_whitening(Y)
         if W is None:
             return Y, A
         if W.shape[1] > 1:

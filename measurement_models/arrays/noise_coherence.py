@@ -118,6 +118,8 @@ def gap_whitening(noise: NoiseCoherence, valid: Bool) -> Complex:
              [0., 0.]]]])
     """
     n_bins, n_snapshots, M = valid.shape
+    if valid.all():  # the usual case
+        return np.broadcast_to(noise.whitening(valid[0, 0])[:, None], (n_bins, 1, M, M))
     patterns, index = np.unique(valid.reshape(-1, M), axis=0, return_inverse=True)
     used = np.flatnonzero(patterns.any(axis=1))
     W = np.zeros((n_bins, n_snapshots if len(used) > 1 else 1, M, M), dtype=np.complex128)

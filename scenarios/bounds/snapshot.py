@@ -22,12 +22,13 @@ def snapshot_bound(
 
         C = σ²/2 {Re[(DᴴP⊥D) ∘ (w wᴴ)ᵀ]}⁻¹,  D = ∂A/∂β,  P⊥ = I - A A⁺
 
+    A and D are whitened where the noise is coherent.
     Number of sources and noise variance are known, amplitudes are not.
 
     Parameters
     ----------
     measurement : ArraySnapshot
-        Array and wavelength.
+        Array, wavelength and coherence of the noise.
     doa : array_like, shape (..., n_sources)
         Directions, rad.
     amplitude : array_like, shape (..., n_sources)
@@ -57,7 +58,7 @@ def snapshot_bound(
     """
     array = instance("measurement", measurement, ArraySnapshot).array
     w = numbers("amplitude", amplitude)
-    beta, wavelength = real("doa", doa), measurement.plain_wavelength("the bound")
+    beta, wavelength = real("doa", doa), measurement.plain_wavelength("the bound", white=False)
     noise = real("noise", noise)
     if beta.ndim == 0 or w.shape[-1:] != beta.shape[-1:] or not beta.size:
         shapes = f"{beta.shape} and {w.shape}"
@@ -71,6 +72,9 @@ def snapshot_bound(
     slope = rotated[..., 1:2] if array.dim == 1 else rotated
     # D = ∂A/∂β
     D = 2j * np.pi / wavelength * (array.positions @ np.swapaxes(slope, -1, -2)) * A
+    if measurement.coherence is not None:
+        L = measurement.whitening()[0]
+        A, D = L @ A, L @ D
     # P⊥D = D - A A⁺ D
     residual = D - A @ (np.linalg.pinv(A) @ D)
     # J = Re[(DᴴP⊥D) ∘ (w wᴴ)ᵀ],  C = σ²/2 J⁻¹   (2.11)

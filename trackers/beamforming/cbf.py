@@ -27,8 +27,8 @@ class CBF(DirectionTracker):
     Parameters
     ----------
     measurement : ArraySnapshot
-        Any array; its noise is not used. With several bins or snapshots per step the powers are
-        averaged, each direction at the slowness or elevation of largest power.
+        Any array; of its noise, only the coherence is used. With several bins or snapshots per
+        step the powers are averaged, each direction at the slowness or elevation of largest power.
     n_directions : int
         Scan directions: over ±90° for a line (361: every half degree), else over the circle.
     threshold_db : float
@@ -43,6 +43,9 @@ class CBF(DirectionTracker):
 
     Notes
     -----
+    Where the noise is coherent, the power is that of the whitened snapshots, |ãᴴz̃|² / ‖ã‖², which
+    noise alone leaves equal in all directions; ã = L a, z̃ = L z.
+
     Each step is processed on its own: labels are -1, `std` and `existence` NaN. A peak is refined
     by a parabola through three points of the spectrum in dB.
 
@@ -121,22 +124,27 @@ class CBF(DirectionTracker):
 
     def _scan(self, z: Complex) -> Float:
         model = self.measurement
-        if model.is_single and model.response is None:
+        if model.is_single and model.response is None and model.coherence is None:
             return self.spectrum(model.steering_vector(self.doa_grid), z)
-        return mean_beam_power(model.waves.steering(self.doa_grid), model.snapshots(z))
+        Y, A = model.whitened(model.snapshots(z), model.waves.steering(self.doa_grid))
+        return mean_beam_power(A, Y)
 
     def _amplitude(self, doa: Float, z: Complex) -> Complex:
         """Return amplitudes, or the root of the mean power over several bins and snapshots."""
         model = self.measurement
-        if model.is_single and model.response is None:
+        if model.is_single and model.response is None and model.coherence is None:
             return self.amplitudes(model.steering_vector(doa), z)
-        A, Y = model.waves.steering(doa), model.snapshots(z)
+        Y, A = model.whitened(model.snapshots(z), model.waves.steering(doa))
         valid = ~np.isnan(Y)
         n_valid, bins = valid.any(axis=1).sum(axis=1), valid.any(axis=(1, 2))
         share = valid[bins].sum(axis=2) / n_valid[bins, None]  # of the snapshots with data
         power = (A.real**2 + A.imag**2)[:, bins] * share[..., None]
-        norm = power.sum(axis=2).mean(axis=(0, 1))
-        return np.asarray(np.sqrt(mean_beam_power(A, Y) / norm) + 0j)
+        norm = power.sum(axis=2).mean(axis=1)  # (n_nuisance, n)
+        if model.is_single:
+            return np.asarray(A[0, 0].conj().T @ np.where(valid, Y, 0)[0, :, 0] / norm[0])
+        beam = np.array([mean_beam_power(a[None], Y) for a in A])
+        best = beam.argmax(axis=0), np.arange(len(doa))
+        return np.asarray(np.sqrt(beam[best] / norm[best]) + 0j)
 
     def spectrum(self, A: Complex, z: Complex) -> Float:
         """Return the power of one snapshot from directions with steering vectors A.

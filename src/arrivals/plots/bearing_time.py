@@ -134,14 +134,14 @@ def _draw_beam(
 
 def _beam(measurement: ArraySnapshot, doa: Float, block: Any) -> Float:
     """Return the highest power in each direction of the steps of a block."""
-    if measurement.is_single and measurement.response is None:
+    isotropic = measurement.response is None
+    if measurement.is_single and isotropic and measurement.coherence is None:
         A = measurement.steering_vector(doa)
         return np.asarray(bartlett_power(A, block).max(axis=0))
     steering = measurement.waves.steering(doa)
     frames = block.reshape(len(block), measurement.n_bins, measurement.n_snapshots, -1)
-    return np.asarray(
-        np.max([mean_beam_power(steering, np.swapaxes(Y, 1, 2)) for Y in frames], axis=0)
-    )
+    pairs = (measurement.whitened(np.swapaxes(Y, 1, 2), steering) for Y in frames)
+    return np.asarray(np.max([mean_beam_power(A, Y) for Y, A in pairs], axis=0))
 
 
 def _edges(centres: Float) -> Float:
