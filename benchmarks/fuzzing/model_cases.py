@@ -144,7 +144,9 @@ CLASSES: dict[str, tuple[Any, list[Arguments]]] = {
     "ArraySnapshot": (
         mm.ArraySnapshot,
         [{"array": LINE, "wavelength": 1.0, "noise": 0.1, "power": 1.0, "n_snapshots": 1},
-         {"array": LINE, "wavelength": [1.0, 1.5], "slowness": [0.9, 1.0], "angle": "auto"}],
+         {"array": LINE, "wavelength": [1.0, 1.5], "slowness": [0.9, 1.0], "angle": "auto"},
+         {"array": LINE, "wavelength": 1.0, "noise_coherence": "diffuse", "white": 0.2},
+         {"array": LINE, "wavelength": 1.0, "noise_coherence": np.eye(LINE.n_sensors)}],
     ),
     "ArrayManifold": (
         mm.ArrayManifold,

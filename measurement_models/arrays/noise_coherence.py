@@ -118,17 +118,23 @@ def gap_whitening(noise: NoiseCoherence, valid: Bool) -> Complex:
              [0., 0.]]]])
     """
     n_bins, n_snapshots, M = valid.shape
-    if valid.all():  # the usual case
-        return np.broadcast_to(noise.whitening(valid[0, 0])[:, None], (n_bins, 1, M, M))
+    if (valid == valid[0, 0]).all():  # the usual case
+        return _embedded(noise, valid[0, 0], n_bins)
     patterns, index = np.unique(valid.reshape(-1, M), axis=0, return_inverse=True)
     used = np.flatnonzero(patterns.any(axis=1))
-    W = np.zeros((n_bins, n_snapshots if len(used) > 1 else 1, M, M), dtype=np.complex128)
+    if len(used) == 1:
+        return _embedded(noise, patterns[used[0]], n_bins)
+    W = np.zeros((n_bins, n_snapshots, M, M), dtype=np.complex128)
     for i in used:
-        whole = np.zeros((n_bins, 1, M, M), dtype=np.complex128)
-        sensors = np.flatnonzero(patterns[i])
-        whole[:, 0, sensors[:, None], sensors] = noise.whitening(patterns[i])
         here = index.reshape(n_bins, n_snapshots, 1, 1) == i
-        W = np.where(here, whole, W) if len(used) > 1 else whole
+        W = np.where(here, _embedded(noise, patterns[i], n_bins), W)
+    return W
+
+
+def _embedded(noise: NoiseCoherence, sensors: Bool, n_bins: int) -> Complex:
+    """Return L of some sensors in matrices of all of them: (n_bins, 1, M, M)."""
+    W = np.zeros((n_bins, 1, len(sensors), len(sensors)), dtype=np.complex128)
+    W[:, 0, np.outer(sensors, sensors)] = noise.whitening(sensors).reshape(-1, sensors.sum() ** 2)
     return W
 
 

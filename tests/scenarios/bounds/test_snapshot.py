@@ -1,5 +1,7 @@
 """Cramér-Rao bound of snapshots: numerical Fisher information and published figures."""
 
+from typing import Literal
+
 import numpy as np
 import pytest
 
@@ -14,11 +16,14 @@ from arrivals.scenarios.bounds.snapshot import (
 from arrivals.scenarios.simulations.line_arrays import LineScenario
 
 
+@pytest.mark.parametrize("coherence", ["white", "diffuse"])
 @pytest.mark.parametrize(
     "array", [SensorArray.ula(9, spacing=0.5), SensorArray.uca(9, radius=0.5)], ids=["line", "uca"]
 )
-def test_snapshot_bound_is_the_inverse_of_the_joint_fisher_information(array: SensorArray) -> None:
-    model = ArraySnapshot(array, wavelength=1.0)
+def test_snapshot_bound_is_the_inverse_of_the_joint_fisher_information(
+    array: SensorArray, coherence: Literal["white", "diffuse"]
+) -> None:
+    model = ArraySnapshot(array, wavelength=0.9, noise_coherence=coherence)
     doa, w, noise = np.array([-0.4, 0.5]), np.array([1.0 + 0.2j, -0.6j]), 0.1
 
     def mean_snapshot(p: np.ndarray) -> np.ndarray:
@@ -28,7 +33,7 @@ def test_snapshot_bound_is_the_inverse_of_the_joint_fisher_information(array: Se
     p = np.concatenate([doa, w.real, w.imag])
     h = 1e-6 * np.eye(6)
     slope = np.stack([(mean_snapshot(p + d) - mean_snapshot(p - d)) / 2e-6 for d in h], axis=1)
-    information = slope.T @ slope * 2 / noise
+    information = slope.T @ np.linalg.solve(noise * model.R, slope)  # R of a variance of 1
     expected = np.sqrt(np.linalg.inv(information).diagonal()[:2])
     np.testing.assert_allclose(snapshot_bound(model, doa, w, noise), expected, rtol=1e-5)
     batch = snapshot_bound(model, np.tile(doa, (3, 1)), np.tile(w, (3, 1)), np.full(3, noise))
