@@ -26,6 +26,8 @@ SLOWNESS = WIDEBAND.replace(
 )
 MANY_BINS = CIRCLE.replace(wavelength=list(np.linspace(1.0, 3.0, 24)), n_snapshots=6)
 MANY_BINS_OF_A_LINE = LINE.replace(wavelength=list(np.linspace(1.0, 2.0, 16)), n_snapshots=4)
+DIFFUSE = WIDEBAND.replace(noise_coherence="diffuse")
+LINE_DIFFUSE = LINE.replace(noise_coherence="diffuse", white=0.3)
 GAPS = ArraySnapshot(SensorArray.ula(10, 0.4, missing=[2]), wavelength=1.0, noise=1e-3)
 
 
@@ -92,4 +94,8 @@ TRACKERS: list[tuple[str, MakeTracker, Measurements]] = [
         ),
         talkers(MANY_BINS_OF_A_LINE),
     ),
+    ("cbf", lambda: CBF(DIFFUSE, n_directions=90), two_sources(DIFFUSE)),
+    ("cbf", lambda: CBF(LINE_DIFFUSE, n_directions=91), two_sources(LINE_DIFFUSE)),
+    ("svalse", lambda: SVALSE(DIFFUSE, BernoulliVonMises(kappa=50.0)), two_sources(DIFFUSE)),
+    ("valse", lambda: VALSE(LINE_DIFFUSE), two_sources(LINE_DIFFUSE)),
 ]
