@@ -133,12 +133,12 @@ class ArraySnapshot(SnapshotNoise):
         """Number of frequency bins."""
         return len(self.wavelengths)
 
-    def plain_wavelength(self, method: str, *, white: bool = True) -> float:
+    def plain_wavelength(self, method: str, *, white_noise: bool = True) -> float:
         """Return the wavelength, m, for a method of one snapshot a step of isotropic sensors.
 
-        `white` is True for a method that takes the noise for white.
+        `white_noise` is True for a method that takes the noise for white.
         """
-        if white and self.coherence is not None:
+        if white_noise and self.coherence is not None:
             raise ValueError(f"{method} requires noise_coherence='white'; got coherent noise")
         if not (self.is_single and self.response is None):
             elements = "isotropic" if self.response is None else "directional"

@@ -265,6 +265,19 @@ def test_svalse_with_white_share_one_equals_white_noise() -> None:
     )
 
 
+def test_svalse_in_diffuse_noise_alone_finds_no_source() -> None:
+    small = SensorArray.uca(6, 0.05, speed=343.0)
+    bins = [small.wavelength(f) for f in range(400, 2000, 200)]
+    room = ArraySnapshot(small, bins, n_snapshots=8, noise_coherence="diffuse")
+    z = room.simulate(np.full((20, 1), np.nan), 0.0, np.random.default_rng(0))
+    found, found_in_white = (
+        np.isfinite(SVALSE(model).run(z).doa).sum()
+        for model in (room, room.replace(noise_coherence="white"))
+    )
+    assert found == 0  # in each of 5 seeds, where white noise left 60 to 74
+    assert found_in_white > 20
+
+
 # parameters
 
 
