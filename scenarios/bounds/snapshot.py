@@ -58,7 +58,8 @@ def snapshot_bound(
     """
     array = instance("measurement", measurement, ArraySnapshot).array
     w = numbers("amplitude", amplitude)
-    beta, wavelength = real("doa", doa), measurement.plain_wavelength("the bound", white_noise=False)
+    beta = real("doa", doa)
+    wavelength = measurement.plain_wavelength("the bound", white_noise=False)
     noise = real("noise", noise)
     if beta.ndim == 0 or w.shape[-1:] != beta.shape[-1:] or not beta.size:
         shapes = f"{beta.shape} and {w.shape}"
