@@ -15,7 +15,6 @@ from arrivals.typing import Float
 MIN_SHARE = 1e-4  # of the background and of each source while a mixture is fitted
 MIN_DENSITY = 1e-12
 MAX_LOG_RATIO = 30.0  # of one bin over the mixture, for a new source
-EVIDENCE_LIMITS = -3.0, 30.0  # of one step
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +142,7 @@ def _birth_density(
     return np.asarray(density / density.sum())
 
 
-def log_odds_gain(mixture: Mixture, prior: Float, settings: MixtureSettings) -> Float:
+def log_odds_gain(mixture: Mixture, prior: Float, tempering: float) -> Float:
     """Return by how much the step raises the log odds of each source's existence, (K,).
 
     The tempered evidence of the mixture over that of the mixture without the source, less the
@@ -157,5 +156,5 @@ def log_odds_gain(mixture: Mixture, prior: Float, settings: MixtureSettings) -> 
     rest = total[:, None] + others - np.log1p(-mixture.share[1:])
     q = mixture.density
     divergence = (q * np.log((q + MIN_DENSITY) / (prior + MIN_DENSITY))).sum(axis=1)
-    gain = (total[:, None] - rest).sum(axis=0) / settings.tempering - divergence
-    return np.asarray(np.clip(gain, *EVIDENCE_LIMITS))
+    gain = (total[:, None] - rest).sum(axis=0) / tempering - divergence
+    return np.asarray(gain)

@@ -10,7 +10,7 @@ import numpy as np
 from arrivals.parameters import FrozenModel
 from arrivals.validation import count, not_negative, one_of, positive, probability
 
-COUNTS = {"iterations": 100, "max_sources": 100, "max_births": 100, "min_bins": 1_000_000}
+COUNTS = {"iterations": 100, "max_sources": 100, "max_births": 100}
 PROBABILITIES = ("background", "birth_share", "min_share", "birth_existence")
 MAY_BE_ZERO = ("relocation", "merge", "birth_evidence")
 
@@ -45,15 +45,18 @@ class MixtureSettings(FrozenModel):
         New sources in one step, and reported sources.
     merge : float
         Least distance of two sources, rad.
-    pause : float
-        Time constant of the existence while no bin counts, s.
+    pause, unsupported : float
+        Time constants of the existence while no bin counts, and of a source of less than
+        `min_share` while others do, s.
+    max_loss : float
+        Most that the log odds of existence lose, 1/s.
     relocation : float
         Rate at which the density of an inactive source becomes uniform, 1/s.
     memory, confirm : float
         Time for which an inactive source keeps its label, and for which one that never had a
         label is kept, s.
-    min_bins : int
-        Counted bins of a step below which it is a pause.
+    min_rate : float
+        Counted bins per second below which a step is a pause, 1/s.
     floor_db, floor_rise : float
         Level over its noise floor from which a bin counts, dB; rise of the floor, dB/s.
     onset_db, decay : float
@@ -86,10 +89,12 @@ class MixtureSettings(FrozenModel):
     max_sources: int = 4
     merge: float = float(np.deg2rad(12.0))
     pause: float = 0.25
+    unsupported: float = 0.106
+    max_loss: float = 23.0
     relocation: float = 0.16
     memory: float = 2.0
     confirm: float = 0.26
-    min_bins: int = 4
+    min_rate: float = 31.0
     floor_db: float = 8.0
     floor_rise: float = 0.67
     onset_db: float = 1.0

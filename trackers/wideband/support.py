@@ -12,22 +12,30 @@ from arrivals.trackers.wideband.settings import MixtureSettings
 from arrivals.trackers.wideband.tracked_sources import REPORTED, TrackedSources
 from arrivals.typing import Int
 
-UNSUPPORTED = 0.3  # highest existence of a source of too small a share
+UNSUPPORTED = 0.3  # existence to which that of a source of too small a share decays
+MAX_GAIN = 30.0  # of the log odds in one step
 
 
 def updated(
-    sources: TrackedSources, mixture: Mixture, grid: DirectionGrid, settings: MixtureSettings
+    sources: TrackedSources,
+    mixture: Mixture,
+    grid: DirectionGrid,
+    settings: MixtureSettings,
+    seconds: float,
 ) -> tuple[TrackedSources, Int]:
-    """Return the sources after a step, and their indices in the mixture.
+    """Return the sources after a step of some seconds, and their indices in the mixture.
 
     Existence gains the evidence of the step, an active or new source has the density of the
     mixture, and of two sources that are near one is left.
     """
+    gain = log_odds_gain(mixture, sources.density, settings.tempering)
     odds = np.log(sources.existence) - np.log1p(-sources.existence)
-    odds = odds + log_odds_gain(mixture, sources.density, settings)
+    odds = odds + np.clip(gain, -settings.max_loss * seconds, MAX_GAIN)
     existence = np.clip(1 / (1 + np.exp(-np.clip(odds, -20, 20))), 1e-4, 1 - 1e-4)
     share = mixture.share[1:]
-    existence = np.where(share < settings.min_share, np.minimum(existence, UNSUPPORTED), existence)
+    decay = float(np.exp(-seconds / settings.unsupported))
+    lower = np.maximum(decay * existence, np.minimum(existence, UNSUPPORTED))
+    existence = np.where(share < settings.min_share, lower, existence)
     active = existence >= REPORTED
     is_new = sources.label < 0
     density = np.where((active | is_new)[:, None], mixture.density, sources.density)

@@ -164,14 +164,14 @@ class WidebandMixture(DirectionTracker):
         loud, onset = loud[observed.bins], onset[observed.bins]
         evidence = bin_evidence(response, unit, loud & onset)  # ℓ_i(θ)
         sources, power = self.sources, None
-        if len(evidence) < settings.min_bins:  # a pause
+        if len(evidence) < max(settings.min_rate * self.elapsed, 1):  # a pause
             decay = float(np.exp(-self.elapsed / settings.pause))
             sources = replace(sources, existence=sources.existence * decay)
         else:
             sources, mixture = fit_with_births(evidence, sources, self.scan.grid, settings)
             at_sources = response.at(mixture.density.argmax(axis=1))
             power = mean_powers(at_sources, unit, energy, loud, mixture.share)
-            sources, kept = updated(sources, mixture, self.scan.grid, settings)
+            sources, kept = updated(sources, mixture, self.scan.grid, settings, self.elapsed)
             power = power[kept]
         self.levels, self.gap, self.elapsed = levels, 0.0, 0.0
         sources = sources.labelled(self.n_labels)

@@ -51,7 +51,7 @@ def test_moments_are_those_of_a_sampled_density(
     assert np.sqrt(variance[0]) == pytest.approx(std, rel=0.06)
 
 
-def test_mean_of_a_circle_does_not_see_its_seam() -> None:
+def test_mean_of_a_circle_does_not_depend_on_its_seam() -> None:
     grid = GRIDS[0]
     density = np.exp(40 * np.cos(grid.doa - np.pi + 0.01))[None]
     mean, _ = grid.moments(density / density.sum())

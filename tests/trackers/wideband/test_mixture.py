@@ -89,14 +89,14 @@ def test_fit_is_the_three_updates_written_out() -> None:
 def test_gain_of_existence_is_the_loss_without_the_source() -> None:
     evidence, prior = random_evidence(1, K=3)
     mixture = fit(evidence, prior, prior, SETTINGS)  # type: ignore[arg-type]
-    gain = log_odds_gain(mixture, prior, SETTINGS)
+    gain = log_odds_gain(mixture, prior, SETTINGS.tempering)
     for k in range(3):
         others = np.delete(np.arange(4), k + 1)
         share = mixture.share[others] / mixture.share[others].sum()
         less = np.log(np.exp(mixture.level[:, others]) @ share)
         q = mixture.density[k]
         expected = (mixture.log_evidence - less).sum() / 3.0 - (q * np.log(q / prior[k])).sum()
-        assert gain[k] == pytest.approx(np.clip(expected, -3, 30), rel=1e-4)
+        assert gain[k] == pytest.approx(expected, rel=1e-4)
 
 
 def strong(direction: int, n: int) -> Float:
@@ -105,13 +105,13 @@ def strong(direction: int, n: int) -> Float:
     return np.tile(4.0 - distance**2, (n, 1)).astype(np.float32)
 
 
-def test_new_sources_are_found_where_bins_ask_for_them_and_no_others() -> None:
+def test_new_sources_are_found_where_bins_support_them_and_no_others() -> None:
     bins = np.concatenate([strong(5, 40), strong(25, 40), np.full((40, 36), -3.0)])
     none = TrackedSources.none(36)
     sources, mixture = fit_with_births(bins.astype(np.float32), none, GRID, SETTINGS)
     assert sorted(mixture.density.argmax(axis=1)) == [5, 25]
     np.testing.assert_allclose(mixture.share, 1 / 3, atol=0.03)
-    kept, index = updated(sources, mixture, GRID, SETTINGS)
+    kept, index = updated(sources, mixture, GRID, SETTINGS, 0.128)
     assert (kept.existence > 0.9).all()
     assert sorted(index) == [0, 1]
     quiet, _ = fit_with_births(np.full((40, 36), -3.0, np.float32), none, GRID, SETTINGS)
@@ -123,11 +123,11 @@ def test_of_two_sources_in_one_direction_the_one_with_a_label_is_kept() -> None:
     sources = TrackedSources(density, np.full(2, 0.9), np.array([-1, 4]), np.zeros(2))
     level = np.concatenate([np.zeros((30, 1)), np.full((30, 2), 3.0)], axis=1)
     mixture = Mixture(np.array([0.1, 0.6, 0.3]), density, level)
-    kept, _ = updated(sources, mixture, GRID, SETTINGS)
+    kept, _ = updated(sources, mixture, GRID, SETTINGS, 0.128)
     assert kept.label.tolist() == [4]
 
 
-def test_power_of_a_source_is_the_mean_over_its_bins_and_the_others() -> None:
+def test_power_of_a_source_is_the_mean_over_its_bins_those_of_others_included() -> None:
     w = np.array([[3.0, 0, 0, 0], [0, 2.0, 0, 1.0], [0, 0, 0, 0]])
     z = MODEL.wave([GRID.doa[7]], w[..., None])
     Y = MODEL.manifold().steering(GRID.doa[[7]])[0, :, :, 0][:, :, None] * w[:, None]

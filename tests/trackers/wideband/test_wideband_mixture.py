@@ -110,6 +110,19 @@ def test_step_duration_and_dt_are_one_time() -> None:
         np.testing.assert_allclose(getattr(one, name), getattr(other, name), rtol=1e-9)
 
 
+@pytest.mark.parametrize("n_snapshots", [2, 4, 16])
+def test_steps_of_other_lengths_find_the_same_sources(n_snapshots: int) -> None:
+    """The settings are per second, so that only `step_duration` differs."""
+    z = sparse(np.full((40, 2), [0.7, -1.5]), np.random.default_rng(11))
+    by_snapshot = np.swapaxes(z, 1, 2).reshape(-1, n_snapshots, *z.shape[1:2], z.shape[3])
+    model = CIRCLE.replace(n_snapshots=n_snapshots)
+    run = track(model, np.swapaxes(by_snapshot, 1, 2), step_duration=0.016 * n_snapshots)
+    found = np.sort(run.doa[len(run.doa) // 3 :, :2], axis=1)
+    assert np.isfinite(found).mean() > 0.97
+    assert np.nanmax(np.abs(found - [-1.5, 0.7])) < np.deg2rad(6.0)
+    assert len(set(run.label[run.label >= 0])) == 2
+
+
 def test_two_short_predictions_are_one_long_one() -> None:
     z = sparse(np.full((6, 1), 0.7), np.random.default_rng(7))
     one = WidebandMixture(CIRCLE, step_duration=1.0)
@@ -125,7 +138,7 @@ def test_two_short_predictions_are_one_long_one() -> None:
     np.testing.assert_allclose(one.sources.age, other.sources.age)
 
 
-def test_white_noise_of_a_model_is_replaced_unless_told_otherwise() -> None:
+def test_white_noise_of_a_model_is_replaced_unless_diffuse_is_false() -> None:
     white = CIRCLE.replace(noise_coherence="white")
     z = sparse(np.full((6, 1), 0.7), np.random.default_rng(8))
     as_it_is = track(white, z, settings=MixtureSettings(diffuse=False))
