@@ -27,6 +27,7 @@ from arrivals.scenarios.simulations.moving_emitters import (
 )
 from arrivals.scenarios.simulations.planar_arrays import Cardioids, Circle, Grating
 from arrivals.scenarios.simulations.random_walks import RandomWalks, SwitchingWalks
+from arrivals.scenarios.simulations.rooms import TalkersInRoom
 from arrivals.scenarios.simulations.sampled_source import (
     InterpolationBand,
     InterpolationCoupled,
@@ -67,6 +68,7 @@ __all__ = [
     "ThirdOrder",
     "ThreeOnThree",
     "ThreeStatic",
+    "TalkersInRoom",
     "TowPastLine",
     "WalkingSources",
     "ar_signals",

@@ -127,6 +127,35 @@ def voice(name: str) -> Float:
     return signal
 
 
+def shipped_speech(name: str, n_samples: int, rng: np.random.Generator) -> Float:
+    """Draw a part of a shipped recording, resampled from 8 to 16 kHz.
+
+    Parameters
+    ----------
+    name : str
+        File in `SHIPPED`.
+    n_samples : int
+        Number of samples, at 16 kHz; at most 3 s.
+    rng : numpy.random.Generator
+        Source of random numbers.
+
+    Returns
+    -------
+    ndarray, shape (n_samples,)
+        Signal of about power 1, without anything above 4 kHz.
+
+    Examples
+    --------
+    >>> shipped_speech("synth_count_up_8k.wav", 32000, np.random.default_rng(0)).shape
+    (32000,)
+    """
+    from scipy.signal import resample_poly
+
+    whole, n = voice(name), count("n_samples", n_samples, maximum=48_000) // 2 + 1
+    start = int(rng.integers(len(whole) - n))
+    return np.asarray(resample_poly(whole[start : start + n], 2, 1)[:n_samples])
+
+
 def read_normalised(path: str | Path) -> Float:
     """Read a sound file with one channel, of mean 0 and power 1, (n_steps,).
 
