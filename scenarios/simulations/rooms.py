@@ -244,7 +244,21 @@ class TalkersInRoom(Scenario):
 
     def sample(self, rng: np.random.Generator) -> Trial:
         """Draw one trial; the motion model has 3° a step."""
-        recording = self.record(rng)
+        return self.trial(self.record(rng))
+
+    def trial(self, recording: RoomRecording) -> Trial:
+        """Return the trial of a recording: its snapshots, the truth of the steps and the models.
+
+        Parameters
+        ----------
+        recording : RoomRecording
+            Samples and truth, of the same array.
+
+        Returns
+        -------
+        Trial
+            As `sample` draws it.
+        """
         z = self.frames(recording.samples)
         step = WINDOWS * HOP
         centre = step * np.arange(len(z)) + ((WINDOWS - 1) * HOP + WINDOW) // 2

@@ -1,0 +1,1 @@
+"""Reference rooms, peers and scores of the benchmark of talkers in rooms."""
