@@ -23,7 +23,6 @@ from arrivals.trackers import (
     DirectionTracker,
     NewtonSolver,
     PeaksGNN,
-    available,
     find_peaks,
     refine_peaks,
 )
@@ -197,5 +196,3 @@ METHODS: dict[str, Method] = {
     "SRP-PHAT + Kalman": srp_phat_kalman,
     "wideband_mixture": tracker("wideband_mixture", None),
 }
-if "wideband_mixture" not in available():
-    del METHODS["wideband_mixture"]
