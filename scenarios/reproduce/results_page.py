@@ -76,6 +76,14 @@ PAPERS = (
     ),
     Paper("any", "Any array", "no published results", "SVALSE on circles and sparse lines."),
     Paper(
+        "rooms",
+        "Talkers in rooms",
+        "no published results",
+        "Speech with pauses and reflections, received by small arrays: the mixture over bins "
+        "(`wideband_mixture`), SVALSE with white and with diffuse noise, and the beamformer "
+        "(`cbf`).",
+    ),
+    Paper(
         "calibration",
         "Uncertainties",
         "no published results",
