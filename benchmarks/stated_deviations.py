@@ -43,6 +43,11 @@ SCENES: dict[str, list[Row]] = {
     "sbl": LINE,
     "ssbl": LINE,
     "peaks_gnn": LINE,
+    "wideband_mixture": [
+        ("room", {"array": array, "n_talkers": 2, "rt60": rt60, "snr_db": snr_db}, {})
+        for array in ("circle", "line", "square")
+        for rt60, snr_db in ((0.0, 20.0), (0.25, 20.0), (0.5, 10.0))
+    ],
     "interpolation_ekf": [
         *(
             (f"interpolation_{source}", FROM_PRIOR, {"variant": variant})

@@ -11,6 +11,7 @@ from arrivals.motion_models.von_mises import wrap
 from arrivals.parameters import FrozenModel
 from arrivals.typing import Float
 
+SMALLEST = np.finfo(float).tiny
 UNIFORM_VARIANCE = (6 * np.pi) ** 2  # rad², after which every direction is as likely
 PEAK_HALF_WIDTH = np.deg2rad(18.0)  # of the part of a density whose moments are reported
 
@@ -68,14 +69,29 @@ class DirectionGrid(FrozenModel):
         return _walk(self, variance)
 
     def moments(self, density: Float) -> tuple[Float, Float]:
-        """Return mean and variance of densities (n, n_directions) about their peaks, (n,), (n,)."""
+        """Return mean and variance of densities (n, n_directions) about their peaks, (n,), (n,).
+
+        Those of a density narrower than the grid's step are vertex and curvature of the parabola
+        through three points of its logarithm.
+        """
         top = density.argmax(axis=-1)
         offset = self.offset[top]
         w = density * (np.abs(offset) <= PEAK_HALF_WIDTH)
-        w = w / np.maximum(w.sum(axis=-1, keepdims=True), np.finfo(float).tiny)
+        w = w / np.maximum(w.sum(axis=-1, keepdims=True), SMALLEST)
         mean = (w * offset).sum(axis=-1)
         variance = (w * (offset - mean[:, None]) ** 2).sum(axis=-1)
-        doa = self.doa[top] + mean
+        step = float(self.doa[1] - self.doa[0])
+        level = np.log(np.maximum(density, SMALLEST))
+        before, after = top - 1, (top + 1) % len(self.doa)
+        if self.is_line:  # even about the ends
+            before, after = np.abs(before), len(self.doa) - 1 - np.abs(len(self.doa) - 2 - top)
+        row = np.arange(len(top))
+        left, middle, right = level[row, before], level[row, top], level[row, after]
+        bend = np.maximum(2 * middle - left - right, SMALLEST)
+        is_narrow = variance < step**2
+        shift = step * np.clip((right - left) / (2 * bend), -0.5, 0.5)
+        doa = self.doa[top] + np.where(is_narrow, shift, mean)
+        variance = np.where(is_narrow, step**2 / bend, variance)
         return np.asarray(doa if self.is_line else wrap(doa)), np.asarray(variance)
 
 

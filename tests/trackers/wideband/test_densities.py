@@ -40,7 +40,7 @@ def test_very_long_walk_is_uniform() -> None:
 
 
 @pytest.mark.parametrize("grid", GRIDS, ids=["circle", "line"])
-@given(doa=st.floats(-1.2, 1.2), std=st.floats(0.03, 0.09))
+@given(doa=st.floats(-1.2, 1.2), std=st.floats(0.01, 0.09))
 @settings(max_examples=30, deadline=None)
 def test_moments_are_those_of_a_sampled_density(
     grid: DirectionGrid, doa: float, std: float
@@ -48,7 +48,7 @@ def test_moments_are_those_of_a_sampled_density(
     density = np.exp(-0.5 * (grid.difference(grid.doa, np.array(doa)) / std) ** 2)
     mean, variance = grid.moments(density[None] / density.sum())
     assert abs(mean[0] - doa) < 0.02 * std + 1e-3
-    assert np.sqrt(variance[0]) == pytest.approx(std, rel=0.06)
+    assert np.sqrt(variance[0]) == pytest.approx(std, rel=0.1)
 
 
 def test_mean_of_a_circle_does_not_depend_on_its_seam() -> None:
