@@ -22,8 +22,9 @@ from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.measurement_models.manifolds.uniform_line import UniformLineManifold
 from arrivals.scenarios import ar_signals, best_assignment_rmse
 from arrivals.trackers import MUSIC, PAST
-from arrivals.trackers.subspace.base import Subspaces, uniform_line
+from arrivals.trackers.subspace.base import Subspaces
 from arrivals.trackers.subspace.esprit import esprit_angles
+from arrivals.trackers.subspace.line_bins import uniform_line
 from arrivals.trackers.subspace.music import SpectrumSearch
 from arrivals.trackers.subspace.past_steps import past_step
 from arrivals.trackers.subspace.root_music import root_music_angles

@@ -126,15 +126,49 @@ class CBF(DirectionTracker):
         model = self.measurement
         if model.is_single and model.response is None and model.coherence is None:
             return self.spectrum(model.steering_vector(self.doa_grid), z)
-        Y, A = model.whitened(model.snapshots(z), model.waves.steering(self.doa_grid))
-        return mean_beam_power(A, Y)
+        return self.block_spectrum(model.snapshots(z))
 
     def _amplitude(self, doa: Float, z: Complex) -> Complex:
         """Return amplitudes, or the root of the mean power over several bins and snapshots."""
         model = self.measurement
         if model.is_single and model.response is None and model.coherence is None:
             return self.amplitudes(model.steering_vector(doa), z)
-        Y, A = model.whitened(model.snapshots(z), model.waves.steering(doa))
+        return self.block_amplitudes(doa, model.snapshots(z))
+
+    def block_spectrum(self, Y: Complex) -> Float:
+        """Return the mean power of several bins and snapshots over the scan.
+
+        Parameters
+        ----------
+        Y : ndarray, shape (n_bins, n_sensors, n_snapshots)
+            Snapshots; NaN where a sensor has no valid data.
+
+        Returns
+        -------
+        ndarray, shape (n_directions,)
+            The largest over slowness or elevation.
+        """
+        model = self.measurement
+        Y, A = model.whitened(Y, model.waves.steering(self.doa_grid))
+        return mean_beam_power(A, Y)
+
+    def block_amplitudes(self, doa: Float, Y: Complex) -> Complex:
+        """Return the root of the mean power of plane waves over bins and snapshots.
+
+        Parameters
+        ----------
+        doa : ndarray, shape (n_sources,)
+            Directions, rad.
+        Y : ndarray, shape (n_bins, n_sensors, n_snapshots)
+            Snapshots; NaN where a sensor has no valid data.
+
+        Returns
+        -------
+        ndarray, shape (n_sources,)
+            Amplitudes, real.
+        """
+        model = self.measurement
+        Y, A = model.whitened(Y, model.waves.steering(doa))
         valid = ~np.isnan(Y)
         n_valid, bins = valid.any(axis=1).sum(axis=1), valid.any(axis=(1, 2))
         share = valid[bins].sum(axis=2) / n_valid[bins, None]  # of the snapshots with data

@@ -115,28 +115,50 @@ class RunningCovariance:
 
     @property
     def covariance(self) -> Complex:
-        """Weighted sum of the snapshots' outer products, (n_sensors, n_sensors)."""
+        """Weighted sum of the snapshots' outer products, ([n_bins,] n_sensors, n_sensors)."""
         return np.asarray(self.sums.products.sum(axis=0))
 
-    def reset_covariance(self, n_sensors: int) -> None:
+    def reset_covariance(self, n_sensors: int, n_bins: int = 1) -> None:
         """Set sums and weights to zero."""
-        self.sums = PatternSums.empty(n_sensors)
+        self.sums = PatternSums.empty(n_sensors, n_bins)
+
+    def fit_covariance(self, n_sensors: int, n_bins: int) -> None:
+        """Set sums to zero if they are those of another number of sensors or bins."""
+        bins = (n_bins,) if n_bins > 1 else ()
+        if self.sums.products.shape[1:] != (*bins, n_sensors, n_sensors):
+            self.reset_covariance(n_sensors, n_bins)
 
     def apply_forgetting(self, dt: float) -> None:
         """Multiply sums and weights by forgetting^dt."""
         self.sums = self.sums.forget(self.forgetting**dt)
 
     def add_snapshot(self, z: Complex) -> None:
-        """Add the outer product of a snapshot, NaN where a sensor has no valid data."""
+        """Add the outer products of a step, of any shape of `ArraySnapshot`; NaN is missing."""
         self.sums = self.sums.add(z)
+
+    def add_block(self, Y: Complex) -> None:
+        """Add the snapshots of a step, (n_bins, n_sensors, n_snapshots)."""
+        rows = np.swapaxes(Y, 1, 2)
+        self.sums = self.sums.add(rows if len(rows) > 1 else rows[0])
+
+    def data_weights(self) -> Float:
+        """Return the sum of weights of the data of each sensor, ([n_bins,] n_sensors).
+
+        With several bins, that of a sensor of zeros alone in a bin is zero.
+        """
+        weights = self.sums.sensor_weights
+        if weights.ndim == 1:
+            return weights
+        power = np.diagonal(self.sums.products, axis1=-2, axis2=-1).real.sum(axis=0)
+        return np.asarray(np.where(power > 0, weights, 0.0))
 
     def sensors_with_data(self) -> Bool:
         """Return the sensors with enough data, relative to the others, (n_sensors,)."""
-        return has_enough_data(self.sums.sensor_weights)
+        return used_data(self.data_weights())[0]
 
-    def mean_covariance(self, sensors: Bool) -> Complex:
-        """Return the mean covariance of some sensors with data, positive semidefinite: (n, n)."""
-        return self.sums.mean_covariance(sensors)
+    def mean_covariance(self, sensors: Bool, bins: Bool | None = None) -> Complex:
+        """Return the mean covariance of some sensors and bins, positive semidefinite."""
+        return self.sums.mean_covariance(sensors, bins)
 
 
 def has_enough_data(weights: Float) -> Bool:
@@ -147,4 +169,40 @@ def has_enough_data(weights: Float) -> Bool:
     >>> has_enough_data(np.array([20.0, 5.0, 7.0, 0.0]))
     array([ True, False,  True, False])
     """
-    return np.asarray((weights > 0) & (weights >= MIN_RELATIVE_WEIGHT * weights.max()))
+    largest = weights.max()
+    return np.asarray(weights >= (MIN_RELATIVE_WEIGHT * largest if largest > 0 else np.inf))
+
+
+def used_data(weights: Float) -> tuple[Bool, Bool | None]:
+    """Return the sensors and the bins with enough data.
+
+    Parameters
+    ----------
+    weights : ndarray, shape (n_sensors,) or (n_bins, n_sensors)
+        Sums of the weights of the data.
+
+    Returns
+    -------
+    sensors : ndarray of bool, shape (n_sensors,)
+        Sensors with enough data, relative to the others.
+    bins : ndarray of bool, shape (n_bins,), or None
+        Bins in which each of these sensors has enough; None if bins have no axis. Where bins lack
+        different sensors, the larger part of the data is used.
+
+    Examples
+    --------
+    >>> used_data(np.array([[9.0, 9.0], [9.0, 8.0], [9.0, 0.0]]))
+    (array([ True,  True]), array([ True,  True, False]))
+    """
+    if weights.ndim == 1:
+        return has_enough_data(weights), None
+    has_enough = has_enough_data(weights)
+    # the sensors that are there in most bins, in the bins that have all of them
+    sensors = has_enough_data(weights.sum(axis=0))
+    bins = np.asarray(sensors.any() & has_enough[:, sensors].all(axis=1))
+    # the bins with any data, by the sensors that all of them have
+    all_bins = np.asarray(has_enough.any(axis=1))
+    common = np.asarray(all_bins.any() & has_enough[all_bins].all(axis=0))
+    if bins.sum() * sensors.sum() >= all_bins.sum() * common.sum():
+        return sensors, bins
+    return common, all_bins

@@ -30,11 +30,11 @@ class PatternSums:
     ----------
     valid : ndarray of bool, shape (n_patterns, n_sensors)
         Sensors with data.
-    products : ndarray of complex, shape (n_patterns, n_sensors, n_sensors)
+    products : ndarray of complex, shape (n_patterns, [n_bins,] n_sensors, n_sensors)
         Sums of the outer products, 0 for sensors without data.
-    weights : ndarray, shape (n_patterns,)
+    weights : ndarray, shape (n_patterns, [n_bins])
         Sums of the weights.
-    squared_weight : float
+    squared_weight : float or ndarray, shape (n_bins,)
         Sum of the squared weights of all snapshots.
 
     Examples
@@ -48,26 +48,30 @@ class PatternSums:
     valid: Bool
     products: Complex
     weights: Float
-    squared_weight: float = 0.0
+    squared_weight: float | Float = 0.0
 
     @classmethod
-    def empty(cls, n_sensors: int) -> PatternSums:
-        """Return sums of no snapshot."""
-        products = np.zeros((0, n_sensors, n_sensors), dtype=np.complex128)
-        return cls(np.zeros((0, n_sensors), dtype=np.bool_), products, np.zeros(0))
+    def empty(cls, n_sensors: int, n_bins: int = 1) -> PatternSums:
+        """Return sums of no snapshot; several bins have an axis of their own."""
+        bins = (n_bins,) if n_bins > 1 else ()
+        products = np.zeros((0, *bins, n_sensors, n_sensors), dtype=np.complex128)
+        valid = np.zeros((0, n_sensors), dtype=np.bool_)
+        return cls(valid, products, np.zeros((0, *bins)), np.zeros(bins) if bins else 0.0)
 
     @property
     def sensor_weights(self) -> Float:
-        """Sum of the weights of the data of each sensor, (n_sensors,)."""
-        return np.asarray(self.weights @ self.valid)
+        """Sum of the weights of the data of each sensor, ([n_bins,] n_sensors)."""
+        return np.asarray(self.weights.T @ self.valid)
 
     @property
     def n_effective(self) -> float:
-        """Number of complete snapshots of equal weight with as much information."""
-        if self.squared_weight == 0:
+        """Number of complete snapshots of equal weight with as much information, of a bin."""
+        squared_weight = float(np.mean(self.squared_weight))
+        if squared_weight == 0:
             return 0.0
-        numbers = float(self.weights @ self.valid.mean(axis=1))
-        return float(self.weights.sum()) * numbers / self.squared_weight
+        n_bins = np.size(self.squared_weight)
+        numbers = float((self.weights.T @ self.valid.mean(axis=1)).sum() / n_bins)
+        return float(self.weights.sum() / n_bins) * numbers / squared_weight
 
     def forget(self, factor: float) -> PatternSums:
         """Return the sums with all weights multiplied by a factor."""
@@ -77,7 +81,20 @@ class PatternSums:
         )
 
     def add(self, z: Complex) -> PatternSums:
-        """Return the sums with one more snapshot, (n_sensors,), NaN where a sensor is missing."""
+        """Return the sums with one more snapshot, or several of equal weight.
+
+        Parameters
+        ----------
+        z : ndarray, shape ([n_bins,] [n_snapshots,] n_sensors)
+            Snapshots, NaN where a sensor is missing.
+
+        Returns
+        -------
+        PatternSums
+            The sums; sets of sensors without new data come first.
+        """
+        if z.ndim > 1:
+            return self._add_block(z)
         valid = ~np.isnan(z)
         y = np.where(valid, z, 0)
         product, squared_weight = np.multiply.outer(y, y.conj()), self.squared_weight + 1
@@ -86,46 +103,92 @@ class PatternSums:
             return PatternSums(
                 self.valid, self.products + product, self.weights + 1, squared_weight
             )
-        # the set of this snapshot comes last
-        old = np.flatnonzero(~same)[-(MAX_PATTERNS - 1) :]
+        return self._joined(valid[None], product[None], np.ones(1), squared_weight)
+
+    def _add_block(self, z: Complex) -> PatternSums:
+        """Return the sums with the snapshots of a step: one product for each set and bin."""
+        bins, M = self.weights.shape[1:], z.shape[-1]
+        Y = z.reshape(*bins, -1, M)
+        is_valid = ~np.isnan(Y)
+        has_data = is_valid.any(axis=-1)
+        squared_weight = self.squared_weight + has_data.sum(axis=-1)
+        if is_valid.all():
+            sets, member = np.ones((1, M), dtype=np.bool_), np.ones((1, *Y.shape[:-1]))
+        else:
+            Y = np.where(is_valid, Y, 0)
+            sets, index, numbers = np.unique(
+                is_valid.reshape(-1, M), axis=0, return_inverse=True, return_counts=True
+            )
+            numbers = np.where(sets.any(axis=1), numbers, 0)
+            kept = np.argsort(-numbers, kind="stable")[:MAX_PATTERNS]
+            kept = kept[numbers[kept] > 0]
+            member = (index.reshape(has_data.shape) == kept.reshape(-1, *[1] * has_data.ndim)) + 0.0
+            sets = sets[kept]
+        # axes: sets, bins, sensors, snapshots
+        products = np.swapaxes(Y, -1, -2) @ (member[..., None] * Y.conj())
+        return self._joined(sets, products, member.sum(axis=-1), squared_weight)
+
+    def _joined(
+        self, valid: Bool, products: Complex, weights: Float, squared_weight: float | Float
+    ) -> PatternSums:
+        """Return the sums plus those of other sets of sensors, which come last."""
+        same = (self.valid[:, None] == valid).all(axis=-1)  # (old, new)
+        if same.shape == (1, 1) and same[0, 0]:
+            return PatternSums(
+                self.valid, self.products + products, self.weights + weights, squared_weight
+            )
+        old = np.flatnonzero(~same.any(axis=1))
+        old = old[max(len(old) + len(valid) - MAX_PATTERNS, 0) :]
+        before = same.T.astype(np.float64)
+        kept_products = np.tensordot(before, self.products, axes=1)
         return PatternSums(
-            np.concatenate([self.valid[old], valid[None]]),
-            np.concatenate([self.products[old], (self.products[same].sum(axis=0) + product)[None]]),
-            np.append(self.weights[old], self.weights[same].sum() + 1),
+            np.concatenate([self.valid[old], valid]),
+            np.concatenate([self.products[old], kept_products + products]),
+            np.concatenate([self.weights[old], np.tensordot(before, self.weights, 1) + weights]),
             squared_weight,
         )
 
-    def select(self, sensors: Bool) -> PatternSums:
-        """Return the sums of some of the sensors."""
+    def select(self, sensors: Bool, bins: Bool | None = None) -> PatternSums:
+        """Return the sums of some of the sensors, and of some of the bins."""
+        if bins is not None and not bins.all():
+            squared_weight = np.asarray(self.squared_weight)[bins]
+            some = PatternSums(
+                self.valid, self.products[:, bins], self.weights[:, bins], squared_weight
+            )
+            return some.select(sensors)
         if sensors.all() and len(self.weights) == 1:
             return self
         valid, index = np.unique(self.valid[:, sensors], axis=0, return_inverse=True)
-        products = np.zeros((len(valid), *2 * valid.shape[1:]), dtype=np.complex128)
-        weights = np.zeros(len(valid))
-        np.add.at(products, index.ravel(), self.products[:, sensors][:, :, sensors])
+        shape = (len(valid), *self.products.shape[1:-2], *2 * valid.shape[1:])
+        products = np.zeros(shape, dtype=np.complex128)
+        weights = np.zeros((len(valid), *self.weights.shape[1:]))
+        np.add.at(products, index.ravel(), self.products[..., sensors, :][..., sensors])
         np.add.at(weights, index.ravel(), self.weights)
         has_data = valid.any(axis=1)
         return PatternSums(
             valid[has_data], products[has_data], weights[has_data], self.squared_weight
         )
 
-    def mean_covariance(self, sensors: Bool) -> Complex:
+    def mean_covariance(self, sensors: Bool, bins: Bool | None = None) -> Complex:
         """Return the covariance of some of the sensors, positive semidefinite.
 
         Parameters
         ----------
         sensors : ndarray of bool, shape (n_sensors,)
-            Sensors, each with data.
+            Sensors, each with data in every one of the bins.
+        bins : ndarray of bool, shape (n_bins,), optional
+            Bins with data; all if None.
 
         Returns
         -------
-        ndarray, shape (n, n)
+        ndarray, shape ([n_bins,] n, n)
             The weighted mean of the outer products, if all snapshots are complete.
         """
-        sums = self.select(sensors)
-        if sums.valid.all():
-            return np.asarray(sums.products.sum(axis=0) / sums.weights.sum())
-        return expected_covariance(sums)
+        sums = self.select(sensors, bins)
+        if not sums.valid.all():
+            return expected_covariance(sums)
+        weight = sums.weights.sum(axis=0)
+        return np.asarray(sums.products.sum(axis=0) / weight[..., None, None])
 
 
 def expected_covariance(sums: PatternSums) -> Complex:
@@ -134,11 +197,11 @@ def expected_covariance(sums: PatternSums) -> Complex:
     Parameters
     ----------
     sums : PatternSums
-        Sums of the snapshots; every sensor has data in some.
+        Sums of the snapshots; every sensor has data in some, in each bin.
 
     Returns
     -------
-    ndarray, shape (n_sensors, n_sensors)
+    ndarray, shape ([n_bins,] n_sensors, n_sensors)
         Positive semidefinite.
 
     References
@@ -146,30 +209,38 @@ def expected_covariance(sums: PatternSums) -> Complex:
     Little and Rubin, *Statistical Analysis with Missing Data*, 2nd ed., 2002, sec. 11.2.2;
     the structure of plane waves in white noise: Tipping and Bishop, J. R. Stat. Soc. B 61(3), 1999.
     """
-    is_complete = sums.valid.all(axis=1)
-    complete = sums.products[is_complete].sum(axis=0)
-    o, S, w = sums.valid[~is_complete], sums.products[~is_complete], sums.weights[~is_complete]
-    n, diagonal = o.shape[1], np.arange(o.shape[1])
-    pairs = np.einsum("p,pi,pj->ij", sums.weights, sums.valid, sums.valid, optimize=True)
-    R = sums.products.sum(axis=0) / np.where(pairs > 0, pairs, 1.0)
+    n = sums.valid.shape[1]
+    # axes: sets, bins, sensors, sensors
+    products, weights = sums.products.reshape(len(sums.valid), -1, n, n), sums.weights
+    weights = weights.reshape(len(weights), -1)
+    is_complete, total = sums.valid.all(axis=1), weights.sum(axis=0)[:, None, None]
+    complete = products[is_complete].sum(axis=0)
+    o, S = sums.valid[~is_complete][:, None], products[~is_complete]
+    w, diagonal = weights[~is_complete][..., None, None], np.arange(n)
+    pairs = np.einsum("pf,pi,pj->fij", weights, sums.valid, sums.valid, optimize=True)
+    R = products.sum(axis=0) / np.where(pairs > 0, pairs, 1.0)
     values, vectors = np.linalg.eigh(R)
-    values = np.maximum(values, max(float(np.median(values)), 1e-3 * float(values[-1])))
+    middle = np.median(values, axis=-1, keepdims=True)
+    values = np.maximum(values, np.maximum(middle, 1e-3 * values[:, -1:]))
     for _ in range(MAX_ITERATIONS):
-        R_white = (vectors * values) @ vectors.conj().T
-        R_o = o[:, :, None] * R_white  # rows of the valid sensors
-        R_oo = R_o * o[:, None, :]
-        R_oo[:, diagonal, diagonal] += ~o
+        R_white = (vectors * values[:, None]) @ vectors.conj().swapaxes(1, 2)
+        R_o = o[..., None] * R_white  # rows of the valid sensors
+        R_oo = R_o * o[..., None, :]
+        R_oo[..., diagonal, diagonal] += ~o
         # Kᴴ = R_oo⁻¹ R_o: the conditional mean is K y, the conditional covariance R - K R_o
         KH = np.linalg.solve(R_oo, R_o)
-        K = KH.conj().swapaxes(1, 2)
-        expected = K @ S @ KH + w[:, None, None] * (R_white - K @ R_o)
-        last, R = R, (complete + expected.sum(axis=0)) / sums.weights.sum()
-        R = (R + R.conj().T) / 2
-        if np.abs(R - last).max() <= TOLERANCE * np.abs(R).max():
+        K = KH.conj().swapaxes(-1, -2)
+        expected = K @ S @ KH + w * (R_white - K @ R_o)
+        last, R = R, (complete + expected.sum(axis=0)) / total
+        R = (R + R.conj().swapaxes(1, 2)) / 2
+        change, largest = np.abs(R - last).max(axis=(1, 2)), np.abs(R).max(axis=(1, 2))
+        if (change <= TOLERANCE * largest).all():
             break
         values, vectors = np.linalg.eigh(R)
-        n_sources = int(number_of_sources(values[::-1], max(sums.n_effective, 1.0)))
+        n_sources = number_of_sources(values[:, ::-1], max(sums.n_effective, 1.0))
         # plane waves in white noise: the smallest eigenvalues are equal
-        noise = float(values[: n - n_sources].mean())
-        values[: n - n_sources] = max(noise, MIN_RELATIVE_NOISE * float(values[-1]))
-    return np.asarray(R)
+        is_noise = np.arange(n) < n - n_sources[:, None]
+        noise = np.where(is_noise, values, 0).sum(axis=1) / is_noise.sum(axis=1)
+        noise = np.maximum(noise, MIN_RELATIVE_NOISE * values[:, -1])
+        values = np.where(is_noise, noise[:, None], values)
+    return np.asarray(R.reshape(sums.products.shape[1:]))

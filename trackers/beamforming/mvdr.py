@@ -6,11 +6,25 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
+from arrivals.trackers.beamforming.block_scan import (
+    part_in_use,
+    root_mean_amplitudes,
+    scan_responses,
+    strongest,
+    whitened_covariance,
+    whitened_responses,
+)
 from arrivals.trackers.beamforming.cbf import CBF
-from arrivals.trackers.beamforming.covariance import RunningCovariance, diagonal_loading
+from arrivals.trackers.beamforming.covariance import (
+    RunningCovariance,
+    diagonal_loading,
+    used_data,
+)
 from arrivals.trackers.registry import register
 from arrivals.typing import Bool, Complex, Float
-from arrivals.validation import instance, positive, probability
+from arrivals.validation import positive, probability
+
+MIN_INVERSE = 1e-300  # of a power: an element response may vanish
 
 
 def capon_power(A: Complex, R: Complex) -> Float:
@@ -41,6 +55,31 @@ def capon_power(A: Complex, R: Complex) -> Float:
     return np.asarray(1 / (A.conj() * solved.T).sum(axis=-1).real)
 
 
+def mean_capon_power(A: Complex, R: Complex) -> Float:
+    """Return the mean of 1 / aᴴR⁻¹a over the bins, the largest over a nuisance.
+
+    Parameters
+    ----------
+    A : ndarray, shape (n_nuisance, n_bins, n_sensors, n_directions)
+        Responses.
+    R : ndarray, shape (n_bins, n_sensors, n_sensors)
+        Covariances, not singular.
+
+    Returns
+    -------
+    ndarray, shape (n_directions,)
+        A plane wave of root mean amplitude w has nearly w² in its direction.
+
+    Examples
+    --------
+    >>> mean_capon_power(np.ones((1, 2, 4, 1)), np.stack([np.eye(4), 3 * np.eye(4)]))
+    array([0.5])
+    """
+    solved = np.linalg.inv(R) @ A
+    inverse = (A.real * solved.real + A.imag * solved.imag).sum(axis=2)
+    return np.asarray((1 / np.maximum(inverse, MIN_INVERSE)).mean(axis=1).max(axis=0))
+
+
 @register("mvdr")
 class MVDR(RunningCovariance, CBF):
     """Peaks of Capon's spectrum of a covariance with exponential forgetting.
@@ -48,7 +87,8 @@ class MVDR(RunningCovariance, CBF):
     Parameters
     ----------
     measurement : ArraySnapshot
-        Any array of isotropic sensors, one bin and one snapshot per step; its noise is not used.
+        Any array; of its noise, only the coherence is used. With several bins the spectrum is the
+        mean of theirs, each direction at the slowness or elevation of the largest mean.
     loading : float
         Added to the diagonal of the covariance, relative to the mean power of a sensor.
     forgetting : float
@@ -63,8 +103,8 @@ class MVDR(RunningCovariance, CBF):
 
     Attributes
     ----------
-    covariance : ndarray, shape (n_sensors, n_sensors)
-        Weighted sum of the snapshots' outer products.
+    covariance : ndarray, shape ([n_bins,] n_sensors, n_sensors)
+        Weighted sum of the snapshots' outer products, of each bin if there are several.
     doa_grid, power : ndarray, shape (n_directions,)
         Scan directions, rad, and Capon's spectrum of the last step, NaN before the first; a wave
         of amplitude w has nearly |w|².
@@ -78,7 +118,9 @@ class MVDR(RunningCovariance, CBF):
 
     References
     ----------
-    Capon, "High-resolution frequency-wavenumber spectrum analysis", Proc. IEEE 57(8), 1969.
+    Capon, "High-resolution frequency-wavenumber spectrum analysis", Proc. IEEE 57(8), 1969. Several
+    bins: Salvati, Drioli and Foresti, "Incoherent frequency fusion for broadband steered response
+    power algorithms in noisy environments", IEEE Signal Process. Lett. 21(5), 2014.
 
     Examples
     --------
@@ -101,7 +143,6 @@ class MVDR(RunningCovariance, CBF):
     ) -> None:
         self.loading = positive("loading", loading)
         self.forgetting = probability("forgetting", forgetting)
-        instance("measurement", measurement, ArraySnapshot).plain_wavelength("mvdr")
         super().__init__(
             measurement,
             n_directions=n_directions,
@@ -111,7 +152,7 @@ class MVDR(RunningCovariance, CBF):
 
     def reset(self) -> None:
         """Return to the state after construction: no snapshot, no direction."""
-        self.reset_covariance(self.measurement.array.n_sensors)
+        self.reset_covariance(self.measurement.array.n_sensors, self.measurement.n_bins)
         super().reset()
 
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
@@ -121,10 +162,43 @@ class MVDR(RunningCovariance, CBF):
 
     def spectrum(self, A: Complex, z: Complex) -> Float:
         """Add a snapshot to the covariance, and return Capon's spectrum."""
+        self.fit_covariance(len(z), 1)
         self.add_snapshot(z)
         sensors = self.sensors_with_data()
         A = A if sensors.all() else A[:, sensors]
         return capon_power(A, self._loaded_covariance(sensors))
+
+    def block_spectrum(self, Y: Complex) -> Float:
+        """Add the snapshots of a step, and return the mean of Capon's spectra of the bins."""
+        self.fit_covariance(Y.shape[1], len(Y))
+        self.add_block(Y)
+        sensors, bins = used_data(self.data_weights())
+        if not sensors.any():
+            return np.zeros(self.n_directions)
+        model = part_in_use(self.measurement, sensors, bins)
+        A = scan_responses(model, self.n_directions).A
+        return mean_capon_power(A, self._loaded_covariance(sensors, bins))
+
+    def block_amplitudes(self, doa: Float, Y: Complex) -> Complex:
+        """Return the root of the mean of |wᴴy|², w = R⁻¹a / aᴴR⁻¹a, over bins and snapshots.
+
+        Snapshots with missing sensors are left out; if no other is there, the least-squares fit.
+        """
+        sensors, bins = used_data(self.data_weights())
+        Y = Y[:, sensors] if bins is None else Y[np.ix_(bins, sensors)]
+        is_complete: Bool = np.asarray(~np.isnan(Y).any(axis=1))
+        model = part_in_use(self.measurement, sensors, bins)
+        if not len(doa) or not is_complete.any():
+            return root_mean_amplitudes(model, doa, Y)
+        y = model.whitening() @ np.where(is_complete[:, None], Y, 0)
+        A = strongest(whitened_responses(model, doa), y)
+        solved = np.linalg.solve(self._loaded_covariance(sensors, bins), A)
+        inverse = (A.real * solved.real + A.imag * solved.imag).sum(axis=1)
+        output = np.swapaxes(solved.conj(), 1, 2) @ y / np.maximum(inverse, MIN_INVERSE)[..., None]
+        if self.measurement.is_single:
+            return np.asarray(output[0, :, 0])
+        power = (output.real**2 + output.imag**2).sum(axis=(0, 2)) / is_complete.sum()
+        return np.asarray(np.sqrt(power) + 0j)
 
     def scanned_sensors(self, z: Complex) -> Bool:
         """Return the sensors of the spectrum: those with enough data."""
@@ -140,6 +214,8 @@ class MVDR(RunningCovariance, CBF):
         R, A = self._loaded_covariance(sensors)[np.ix_(kept, kept)], A[:, valid]
         return np.asarray(A.conj() @ np.linalg.solve(R, z[valid]) * capon_power(A, R))
 
-    def _loaded_covariance(self, sensors: Bool) -> Complex:
-        R = diagonal_loading(self.mean_covariance(sensors), self.loading)
-        return np.asarray(R, dtype=np.complex128)
+    def _loaded_covariance(self, sensors: Bool, bins: Bool | None = None) -> Complex:
+        R = self.mean_covariance(sensors, bins)
+        if self.measurement.coherence is not None:
+            R = whitened_covariance(part_in_use(self.measurement, sensors, bins), R)
+        return np.asarray(diagonal_loading(R, self.loading), dtype=np.complex128)

@@ -86,7 +86,11 @@ def mdl(eigenvalues: ArrayLike, n_snapshots: float) -> Float:
 
 
 def number_of_sources(
-    eigenvalues: ArrayLike, n_snapshots: float, criterion: Criterion = "mdl"
+    eigenvalues: ArrayLike,
+    n_snapshots: float,
+    criterion: Criterion = "mdl",
+    *,
+    joint: bool = False,
 ) -> Int:
     """Return the number of sources that minimizes a criterion.
 
@@ -98,6 +102,9 @@ def number_of_sources(
         As in `aic`.
     criterion : {"mdl", "aic"}
         The criterion.
+    joint : bool
+        Minimize the sum of the criterion over the axis before the last: one number for
+        independent covariances, those of frequency bins.
 
     Returns
     -------
@@ -111,6 +118,7 @@ def number_of_sources(
     """
     one_of("criterion", criterion, ("aic", "mdl"))
     values = {"aic": aic, "mdl": mdl}[criterion](eigenvalues, n_snapshots)
+    values = values.sum(axis=-2) if joint else values
     return np.asarray(values.argmin(axis=-1))
 
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
-from arrivals.measurement_models.manifolds.uniform_line import UniformLineManifold
-from arrivals.trackers.beamforming.covariance import has_enough_data
+from arrivals.trackers.beamforming.block_scan import part_in_use, root_mean_amplitudes
+from arrivals.trackers.beamforming.covariance import used_data
 from arrivals.trackers.beamforming.source_number import number_of_sources
 from arrivals.trackers.direction_tracker import DirectionTracker, warn_of_ambiguity
 from arrivals.typing import Bool, Complex, Float
@@ -20,7 +20,10 @@ NumberOfSources: TypeAlias = int | Literal["aic", "mdl"] | None
 
 
 class Subspaces(NamedTuple):
-    """Orthonormal bases of the signal subspace, (..., n, K), and the noise, (..., n, n - K)."""
+    """Orthonormal bases of the signal subspace, (..., n, K), and the noise, (..., n, n - K).
+
+    The leading axis of a step of several bins is that of the bins.
+    """
 
     signal: Complex
     noise: Complex
@@ -38,28 +41,6 @@ class DirectionFinder(Protocol):
 
 
 F = TypeVar("F", bound=DirectionFinder)
-
-
-def uniform_line(model: ArraySnapshot) -> UniformLineManifold:
-    """Return the array of a measurement model as a line on a uniform grid.
-
-    Raises
-    ------
-    ValueError
-        If it is not such a line, or its grid is wider than half the wavelength.
-    """
-    line, limit = model.manifold(), model.array.alias_limit
-    if limit is not None and model.wavelengths[0] < limit * (1 - 1e-6):
-        raise ValueError(
-            f"wavelength must be at least {limit:.6g} m, two grid spacings, for unambiguous "
-            f"directions; got {model.wavelengths[0]:.6g} m"
-        )
-    if not isinstance(line, UniformLineManifold):
-        raise ValueError(
-            "this method requires a line of sensors on a uniform grid (gaps are allowed); "
-            f"got {model.array.n_sensors} sensors in {model.array.dim} dimension(s)"
-        )
-    return line
 
 
 def least_squares_amplitudes(A: Complex, z: Complex) -> Complex:
@@ -101,7 +82,7 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
     Parameters
     ----------
     measurement : ArraySnapshot
-        Any array of isotropic sensors, one bin and one snapshot per step.
+        Any array, bins and snapshots.
     n_sources : int, "mdl" or "aic"
         Number of sources, or the criterion that estimates it.
     max_sources : int, optional
@@ -133,7 +114,6 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
         interval: int = 1,
     ) -> None:
         self.measurement = instance("measurement", measurement, ArraySnapshot)
-        measurement.plain_wavelength("a subspace method")
         self.n_sources: NumberOfSources = n_sources
         self.max_sources = max_sources
         self.forgetting = probability("forgetting", forgetting)
@@ -184,36 +164,56 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
         self.report_none()
 
     def update(self, z: ArrayLike | None) -> None:
-        """Add one snapshot, (n_sensors,); compute directions at every `interval`-th one."""
+        """Add the snapshots of a step; compute directions at every `interval`-th snapshot."""
         z = self.measurement.snapshot(z)
-        if np.isnan(z).all():
+        missing = np.isnan(z)
+        if missing.all():
             return
         self.update_subspace(z)
-        self.total_weight = self.total_weight + 1
-        self.total_squared_weight = self.total_squared_weight + 1
-        self.n_snapshots = self.n_snapshots + 1
+        n_new = 1 if z.ndim == 1 else self._count(~missing)
+        self.total_weight = self.total_weight + n_new
+        self.total_squared_weight = self.total_squared_weight + n_new
+        is_due = (self.n_snapshots + n_new) // self.interval > self.n_snapshots // self.interval
+        self.n_snapshots = self.n_snapshots + n_new
         follows_gap, self.n_missing = self.n_missing > 1, 0
-        if self.n_snapshots % self.interval == 0:
+        if is_due:
             doa = self._directions()
-            A = self.measurement.steering_vector(doa)
-            self.report(doa, amplitude=least_squares_amplitudes(A, z))
+            self.report(doa, amplitude=self._amplitudes(doa, z))
             self.last_report = self.estimate
         elif follows_gap:
             self.last_report = self.estimate  # none
         else:
             self.report(self.last_report.doa, amplitude=self.last_report.amplitude)
 
+    def _count(self, valid: Bool) -> int:
+        """Return the number of snapshots of a step with data in some bin."""
+        model = self.measurement
+        has_data = valid.reshape(model.n_bins, model.n_snapshots, -1).any(axis=(0, 2))
+        return int(has_data.sum())
+
+    def _amplitudes(self, doa: Float, z: Complex) -> Complex:
+        """Return amplitudes, or the root of the mean power over several bins and snapshots."""
+        model = self.measurement
+        if model.is_single:
+            return least_squares_amplitudes(model.steering_vector(doa), z)
+        return root_mean_amplitudes(model, doa, model.snapshots(z))
+
     @abstractmethod
     def update_subspace(self, z: Complex) -> None:
-        """Add one snapshot, NaN where a sensor has no valid data."""
+        """Add the snapshots of a step, NaN where a sensor has no valid data."""
 
     @abstractmethod
     def sensor_weights(self) -> Float:
-        """Return the sum of weights of the valid data of each sensor, (n_sensors,)."""
+        """Return the sum of weights of the valid data of each sensor, ([n_bins,] n_sensors)."""
 
     @abstractmethod
-    def eigendecomposition(self, valid_sensors: Bool) -> tuple[Float, Complex]:
-        """Return eigenvalues, falling, and eigenvectors of the covariance of valid sensors."""
+    def eigendecomposition(
+        self, valid_sensors: Bool, bins: Bool | None = None
+    ) -> tuple[Float, Complex]:
+        """Return eigenvalues, falling, and eigenvectors of the covariance of valid sensors.
+
+        Those of some of the bins, with a leading axis, if the model has several.
+        """
 
     @abstractmethod
     def direction_finder(self, model: ArraySnapshot) -> F:
@@ -234,19 +234,23 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
         if self.total_squared_weight == 0:
             return None
         weights = self.sensor_weights()
-        valid_sensors = has_enough_data(weights)
-        model = self.measurement
-        if not valid_sensors.all():
-            model = model.replace(array=model.array.without(np.flatnonzero(~valid_sensors)))
+        valid_sensors, bins = used_data(weights)
+        if bins is not None and not bins.any():
+            return None
+        model = part_in_use(self.measurement, valid_sensors, bins)
         try:
             finder = self.direction_finder(self.subarray_model(model))
         except ValueError:  # too few sensors are left for the method
             return None
-        values, vectors = self.eigendecomposition(valid_sensors)
+        values, vectors = self.eigendecomposition(valid_sensors, bins)
+        if bins is not None:
+            weights = weights[bins].mean(axis=0)
+            if model.n_bins == 1:  # one of several is left
+                values, vectors = values[0], vectors[0]
         share = float((weights[valid_sensors] / self.total_weight).mean())  # of complete data
-        n_sources = self._number_of_sources(values, share) if values[:1].any() else 0
+        n_sources = self._number_of_sources(values, share) if values[..., :1].any() else 0
         K = min(n_sources, finder.max_sources)
-        return (finder, Subspaces(vectors[:, :K], vectors[:, K:])) if K > 0 else None
+        return (finder, Subspaces(vectors[..., :K], vectors[..., K:])) if K > 0 else None
 
     def _directions(self) -> Float:
         """Return the directions, rad, in rising order."""
@@ -262,5 +266,7 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
             return self.n_sources
         # the number of snapshots of equal weight with the same variance of the mean
         n_effective = self.total_weight**2 / self.total_squared_weight
-        estimate = number_of_sources(eigenvalues, share * n_effective, self.n_sources or "mdl")
+        estimate = number_of_sources(
+            eigenvalues, share * n_effective, self.n_sources or "mdl", joint=eigenvalues.ndim > 1
+        )
         return min(int(estimate), self.n_slots)

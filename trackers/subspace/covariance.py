@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.arrays.sensor_array import SensorArray
+from arrivals.trackers.beamforming.block_scan import part_in_use, whitened_covariance
 from arrivals.trackers.beamforming.covariance import RunningCovariance, spatial_smoothing
 from arrivals.trackers.subspace.base import F, NumberOfSources, SubspaceTracker
 from arrivals.typing import Bool, Complex, Float
@@ -48,7 +49,7 @@ class CovarianceSubspace(RunningCovariance, SubspaceTracker[F]):
 
     def reset(self) -> None:
         """Return to the state after construction: no snapshot, no direction."""
-        self.reset_covariance(self.measurement.array.n_sensors)
+        self.reset_covariance(self.measurement.array.n_sensors, self.measurement.n_bins)
         super().reset()
 
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
@@ -57,12 +58,14 @@ class CovarianceSubspace(RunningCovariance, SubspaceTracker[F]):
         self.apply_forgetting(dt)
 
     def update_subspace(self, z: Complex) -> None:
-        """Add one snapshot to the covariance."""
+        """Add the snapshots of a step to the covariances of their bins."""
+        model = self.measurement
+        self.fit_covariance(model.array.n_sensors, model.n_bins)
         self.add_snapshot(z)
 
     def sensor_weights(self) -> Float:
-        """Return the sum of weights of the valid data of each sensor, (n_sensors,)."""
-        return self.sums.sensor_weights
+        """Return the sum of weights of the valid data of each sensor, ([n_bins,] n_sensors)."""
+        return self.data_weights()
 
     @property
     def _is_smoothed(self) -> bool:
@@ -71,20 +74,29 @@ class CovarianceSubspace(RunningCovariance, SubspaceTracker[F]):
     def _subarray_length(self, n_sensors: int) -> int:
         return n_sensors if self.smoothing is None else self.smoothing
 
-    def eigendecomposition(self, valid_sensors: Bool) -> tuple[Float, Complex]:
+    def eigendecomposition(
+        self, valid_sensors: Bool, bins: Bool | None = None
+    ) -> tuple[Float, Complex]:
         """Return eigenvalues, falling, and eigenvectors of the (smoothed) mean covariance."""
-        R = self.mean_covariance(valid_sensors)
+        R = self.mean_covariance(valid_sensors, bins)
+        if self.measurement.coherence is not None:
+            R = whitened_covariance(part_in_use(self.measurement, valid_sensors, bins), R)
         if self._is_smoothed:
             order = np.argsort(self.measurement.array.positions[valid_sensors, 0])
-            length = self._subarray_length(len(R))
-            R = spatial_smoothing(R[np.ix_(order, order)], length, backward=self.backward)
+            length = self._subarray_length(len(order))
+            R = spatial_smoothing(R[..., order, :][..., order], length, backward=self.backward)
         values, vectors = np.linalg.eigh(R)
-        return values[::-1], vectors[:, ::-1]
+        return values[..., ::-1], vectors[..., ::-1]
 
     def subarray_model(self, model: ArraySnapshot) -> ArraySnapshot:
         """Return the model of the first subarray, or of all sensors without smoothing."""
         if not self._is_smoothed:
             return model
+        if model.coherence is not None:
+            raise ValueError(
+                "noise_coherence must be 'white' with smoothing; got coherent noise, whose "
+                "whitening removes the shifts"
+            )
         positions, n = np.sort(model.array.positions[:, 0]), model.array.n_sensors
         length = count("smoothing", self._subarray_length(n))
         spacing = model.array.spacing

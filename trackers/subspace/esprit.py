@@ -9,9 +9,9 @@ import numpy as np
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.manifolds.uniform_line import UniformLineManifold
 from arrivals.trackers.registry import register
-from arrivals.trackers.subspace.base import Subspaces, uniform_line
+from arrivals.trackers.subspace.base import DirectionFinder, Subspaces
 from arrivals.trackers.subspace.covariance import CovarianceSubspace
-from arrivals.trackers.subspace.root_music import ENDFIRE_TOLERANCE
+from arrivals.trackers.subspace.line_bins import ENDFIRE_TOLERANCE, LineOfBins, uniform_line
 from arrivals.typing import Complex, Float, Int
 
 
@@ -100,15 +100,41 @@ class ShiftInvariance:
         return doa[~np.isnan(doa)]
 
 
+@dataclass(frozen=True, eq=False)
+class ShiftInvarianceOfBins:
+    """Direction finder by ESPRIT in each of several bins, with one shift for all."""
+
+    line: LineOfBins
+
+    @property
+    def max_sources(self) -> int:
+        """Number of pairs of sensors."""
+        return ShiftInvariance(self.line.shortest).max_sources
+
+    def directions(self, subspaces: Subspaces) -> Float:
+        """Return directions, rad."""
+        shift = ShiftInvariance(self.line.shortest).shift
+        phase = esprit_angles(subspaces.signal, *shifted_pairs(self.line.grid_index, shift))
+        return self.line.directions(phase, shift, subspaces)
+
+
+def shift_invariance(model: ArraySnapshot) -> ShiftInvariance | ShiftInvarianceOfBins:
+    """Return ESPRIT on the line of a model, for one bin or several."""
+    if model.n_bins > 1:
+        return ShiftInvarianceOfBins(LineOfBins.of_model(model))
+    return ShiftInvariance(uniform_line(model))
+
+
 @register("esprit")
-class ESPRIT(CovarianceSubspace[ShiftInvariance]):
+class ESPRIT(CovarianceSubspace[DirectionFinder]):
     """Eigenvalues of the rotation between two shifted subarrays, without a search.
 
     Parameters
     ----------
     measurement : ArraySnapshot
         A line on a uniform grid of at most half the wavelength. Sensors may be missing, but as
-        many pairs as there are sources must lie equally far apart, half a wavelength at most.
+        many pairs as there are sources must lie equally far apart, half a wavelength at most. Of
+        several bins one must be within this limit; directions are those at which the bins agree.
     n_sources : int, "mdl" or "aic"
         As in `MUSIC`.
     max_sources : int, optional
@@ -124,8 +150,8 @@ class ESPRIT(CovarianceSubspace[ShiftInvariance]):
 
     Attributes
     ----------
-    covariance : ndarray, shape (n_sensors, n_sensors)
-        Weighted sum of the snapshots' outer products.
+    covariance : ndarray, shape ([n_bins,] n_sensors, n_sensors)
+        Weighted sum of the snapshots' outer products, of each bin if there are several.
 
     Raises
     ------
@@ -139,7 +165,8 @@ class ESPRIT(CovarianceSubspace[ShiftInvariance]):
     References
     ----------
     Roy and Kailath, "ESPRIT: estimation of signal parameters via rotational invariance
-    techniques", IEEE Trans. ASSP 37(7), 1989.
+    techniques", IEEE Trans. ASSP 37(7), 1989. Several bins: Pavlidi, Griffin, Puigt and
+    Mouchtaris, IEEE Trans. Audio Speech Lang. Process. 21(10), 2013, sec. III.
 
     Examples
     --------
@@ -150,6 +177,6 @@ class ESPRIT(CovarianceSubspace[ShiftInvariance]):
     array([0.5])
     """
 
-    def direction_finder(self, model: ArraySnapshot) -> ShiftInvariance:
+    def direction_finder(self, model: ArraySnapshot) -> DirectionFinder:
         """Return ESPRIT on the line of the model."""
-        return ShiftInvariance(uniform_line(model))
+        return shift_invariance(model)

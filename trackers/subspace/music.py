@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.arrays.sensor_array import SensorArray
+from arrivals.trackers.beamforming.block_scan import has_plain_response, scan_responses
 from arrivals.trackers.beamforming.scan_ends import scan_is_joined
 from arrivals.trackers.beamforming.spectrum import (
     find_peaks,
@@ -23,6 +24,7 @@ from arrivals.typing import Complex, Float
 from arrivals.validation import count
 
 MAX_SPECTRUM = 1e10  # without noise the spectrum is infinite at the sources
+TINY = np.finfo(float).tiny
 
 
 def music_spectrum(A: ArrayLike, noise_subspace: Complex) -> Float:
@@ -106,23 +108,76 @@ class SpectrumSearch:
         """Return the highest peaks, rad, each refined by a parabola through the null spectrum."""
         doa_grid, power = self.spectrum(subspaces)
         joined = scan_is_joined(self.array, (self.wavelength,))
-        peaks = find_peaks(power, circular=self.array.dim > 1, joined=joined)
-        peaks = peaks[: subspaces.signal.shape[-1]]
-        return parabolic_peak(doa_grid, -1 / power, peaks)
+        return highest_peaks(doa_grid, power, subspaces, self.array.dim > 1, joined)
+
+
+def highest_peaks(
+    doa_grid: Float, power: Float, subspaces: Subspaces, circular: bool, joined: bool
+) -> Float:
+    """Return as many directions, rad, of the highest peaks as there are sources."""
+    peaks = find_peaks(power, circular=circular, joined=joined)
+    return parabolic_peak(doa_grid, -1 / power, peaks[: subspaces.signal.shape[-1]])
+
+
+@dataclass(frozen=True, eq=False)
+class NormalizedSearch:
+    """Direction finder by the mean of the bins' MUSIC spectra, each relative to its maximum.
+
+    A second unknown, slowness or elevation, is that of the largest mean at each direction. The
+    spectrum of one bin is not normalized.
+    """
+
+    model: ArraySnapshot
+    n_directions: int
+
+    @property
+    def max_sources(self) -> int:
+        """Number of sensors minus one."""
+        return self.model.array.n_sensors - 1
+
+    def spectrum(self, subspaces: Subspaces) -> tuple[Float, Float]:
+        """Return scan directions and the mean spectrum there."""
+        doa_grid, A, norm = scan_responses(self.model, self.n_directions)
+        rows = np.swapaxes(A, 2, 3)  # (n_nuisance, n_bins, n_directions, n_sensors)
+        n, K = subspaces.signal.shape[-2:]
+        if n < 2 * K:
+            null = projected_power(rows, subspaces.noise)
+        else:
+            null = norm - projected_power(rows, subspaces.signal)
+        power = norm / np.maximum(null, np.maximum(norm / MAX_SPECTRUM, TINY))
+        if power.shape[1] > 1:
+            power = power / np.maximum(power.max(axis=(0, 2), keepdims=True), TINY)
+        return doa_grid, np.maximum(power.mean(axis=1).max(axis=0), TINY)
+
+    def directions(self, subspaces: Subspaces) -> Float:
+        """Return the highest peaks, rad, refined as those of `SpectrumSearch`."""
+        doa_grid, power = self.spectrum(subspaces)
+        array = self.model.array
+        joined = scan_is_joined(array, self.model.wavelengths)
+        return highest_peaks(doa_grid, power, subspaces, array.dim > 1, joined)
+
+
+def spectrum_search(model: ArraySnapshot, n_directions: int) -> SpectrumSearch | NormalizedSearch:
+    """Return the peak search for the bins, elements and second unknown of a model."""
+    if has_plain_response(model):
+        return SpectrumSearch(model.array, model.wavelengths[0], n_directions)
+    return NormalizedSearch(model, n_directions)
 
 
 @register("music")
-class MUSIC(CovarianceSubspace[SpectrumSearch]):
+class MUSIC(CovarianceSubspace[SpectrumSearch | NormalizedSearch]):
     """Peaks of MUSIC's spectrum, for any array.
 
     Parameters
     ----------
     measurement : ArraySnapshot
         Any array: a line, or sensors in a plane, where directions are azimuths on the full
-        circle. Its noise is not used.
+        circle. Of its noise, only the coherence is used. With several bins the spectrum is the
+        mean of theirs, each relative to its maximum (NormMUSIC), each direction at the slowness or
+        elevation of the largest mean.
     n_sources : int, "mdl" or "aic"
         Number of sources, below the number of sensors; or the criterion that estimates it at each
-        step. None is "mdl".
+        step, summed over the bins. None is "mdl".
     max_sources : int, optional
         Maximum number that a criterion may find; the maximum of the method if None.
     forgetting : float
@@ -140,8 +195,8 @@ class MUSIC(CovarianceSubspace[SpectrumSearch]):
 
     Attributes
     ----------
-    covariance : ndarray, shape (n_sensors, n_sensors)
-        Weighted sum of the snapshots' outer products.
+    covariance : ndarray, shape ([n_bins,] n_sensors, n_sensors)
+        Weighted sum of the snapshots' outer products, of each bin if there are several.
     doa_grid, power : ndarray, shape (n_directions,)
         Scan directions, rad, and the spectrum; NaN while there is no source.
 
@@ -154,13 +209,16 @@ class MUSIC(CovarianceSubspace[SpectrumSearch]):
     Notes
     -----
     Labels are -1, `std` and `existence` NaN. Directions are in ascending order; `amplitude` is the
-    least-squares fit to the last snapshot. Sensors without valid data for a long time are left
-    out; with smoothing, no source is detected then.
+    least-squares fit to the last snapshot, or the root of its mean power over the bins and
+    snapshots of the step. Sensors without valid data for a long time are left out, and bins; with
+    smoothing, no source is detected without all sensors.
 
     References
     ----------
     Schmidt, "Multiple emitter location and signal parameter estimation", IEEE Trans. Antennas
-    Propag. 34(3), 1986.
+    Propag. 34(3), 1986. Several bins: Salvati, Drioli and Foresti, "Incoherent frequency fusion
+    for broadband steered response power algorithms in noisy environments", IEEE Signal Process.
+    Lett. 21(5), 2014.
 
     Examples
     --------
@@ -194,9 +252,9 @@ class MUSIC(CovarianceSubspace[SpectrumSearch]):
             interval=interval,
         )
 
-    def direction_finder(self, model: ArraySnapshot) -> SpectrumSearch:
+    def direction_finder(self, model: ArraySnapshot) -> SpectrumSearch | NormalizedSearch:
         """Return the peak search on the scan grid."""
-        return SpectrumSearch(model.array, model.plain_wavelength("music"), self.n_directions)
+        return spectrum_search(model, self.n_directions)
 
     @property
     def doa_grid(self) -> Float:

@@ -6,26 +6,25 @@ Signal Process. 43(1), 1995.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
+from arrivals.trackers.beamforming.covariance import used_data
 from arrivals.trackers.registry import register
-from arrivals.trackers.subspace.base import (
-    DirectionFinder,
-    NumberOfSources,
-    SubspaceTracker,
-    uniform_line,
-)
-from arrivals.trackers.subspace.esprit import ShiftInvariance
-from arrivals.trackers.subspace.music import SpectrumSearch
+from arrivals.trackers.subspace.base import DirectionFinder, NumberOfSources, SubspaceTracker
+from arrivals.trackers.subspace.bin_values import column, is_zero, larger, power_of, where_bins
+from arrivals.trackers.subspace.esprit import shift_invariance
+from arrivals.trackers.subspace.music import spectrum_search
 from arrivals.trackers.subspace.past_steps import (
     SensorInverses,
     incomplete_step,
     limited_trace,
     past_step,
 )
-from arrivals.trackers.subspace.root_music import PolynomialRooting
+from arrivals.trackers.subspace.root_music import polynomial_rooting
 from arrivals.typing import Bool, Complex, Float
 from arrivals.validation import count, one_of
 
@@ -41,7 +40,9 @@ class PAST(SubspaceTracker[DirectionFinder]):
     Parameters
     ----------
     measurement : ArraySnapshot
-        A line on a uniform grid, or any array with the method "music".
+        A line on a uniform grid, or any array with the method "music"; several bins as in
+        `RootMUSIC`, `ESPRIT` or `MUSIC`. Sensors that are missing in some of the bins of a
+        snapshot are left out of it, or these bins.
     n_sources : int, "mdl" or "aic"
         As in `MUSIC`. If a criterion estimates the number, a subspace of `max_sources` dimensions
         is tracked, and the power outside it is noise.
@@ -60,7 +61,8 @@ class PAST(SubspaceTracker[DirectionFinder]):
     Attributes
     ----------
     W : ndarray, shape (n_sensors, n_tracked)
-        Basis of the subspace, nearly orthonormal.
+        Basis of the subspace, nearly orthonormal. With several bins this and the other arrays have
+        a leading axis of bins, and `energy`, `prior` and `age` are arrays.
     inverse : ndarray, shape (n_tracked, n_tracked)
         P of the paper: the inverse of the weighted sum of z zᴴ, z = Wᴴy.
     energy : float
@@ -131,10 +133,15 @@ class PAST(SubspaceTracker[DirectionFinder]):
 
     def _reset_subspace(self) -> None:
         n = self.measurement.array.n_sensors
-        self.age, self.weight, self.n_tracked = 0.0, np.zeros(n), 0
-        self.energy, self.prior, self.rows = 0.0, 0.0, None
-        self.W = np.zeros((n, self.n_slots), dtype=np.complex128)
+        bins = (self.measurement.n_bins,) if self.measurement.n_bins > 1 else ()
+        self.n_tracked, self.rows, self.weight = 0, None, np.zeros((*bins, n))
+        self.age: Any = np.zeros(bins) if bins else 0.0
+        self.energy: Any = np.zeros(bins) if bins else 0.0
+        self.prior: Any = np.zeros(bins) if bins else 0.0
+        self.W = np.zeros((*bins, n, self.n_slots), dtype=np.complex128)
         self.inverse = np.eye(self.n_slots, dtype=np.complex128)
+        if bins:
+            self.inverse = np.tile(self.inverse, (*bins, 1, 1))
 
     @property
     def n_slots(self) -> int:
@@ -151,88 +158,142 @@ class PAST(SubspaceTracker[DirectionFinder]):
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
         """Apply forgetting to the weights; report no direction until the next measurement."""
         super().predict(u, dt=dt)
+        dt = float(dt)
         self.weight = self.forgetting**dt * self.weight
         self.age = self.age + dt
 
     def update_subspace(self, z: Complex) -> None:
-        """Make one step of PAST, or of PETRELS once a sensor was missing."""
-        if self.W.shape[1] != self.n_slots:  # the number of sources was changed
+        """Make one step of PAST, or of PETRELS once a sensor was missing, for each snapshot."""
+        model = self.measurement
+        bins = (model.n_bins,) if model.n_bins > 1 else ()
+        if self.W.shape != (*bins, model.array.n_sensors, self.n_slots):  # a parameter was changed
             self._reset_subspace()
-        valid = ~np.isnan(z)
-        y = np.where(valid, z, 0)
-        power = float(np.vdot(y, y).real)
-        known = self.weight > 0
+        if not bins:
+            for y in z[None] if z.ndim == 1 else z:
+                valid = ~np.isnan(y)
+                if valid.any():
+                    self._add(np.where(valid, y, 0), valid, None)
+            return
+        for y in np.swapaxes(z.reshape(*bins, -1, z.shape[-1]), 0, 1):
+            is_number = ~np.isnan(y)
+            y = np.where(is_number, y, 0)
+            valid, has_data = used_data(is_number * y.any(axis=1, keepdims=True))
+            if has_data is not None and has_data.any():
+                y = np.where(valid & has_data[:, None], y, 0)
+                self._add(y, valid, None if has_data.all() else has_data)
+
+    def _add(self, y: Complex, valid: Bool, has_data: Bool | None) -> None:
+        """Add a snapshot, ([n_bins,] n_sensors), to the bins with data, all if None."""
+        power = power_of(y)
+        known = self._known_sensors()
         new = valid & ~known
-        self._track_new_sensors(new, power / np.count_nonzero(valid))
-        self.weight = self.weight + valid
-        beta, L = max(self.forgetting**self.age, MIN_FORGETTING), self.n_tracked
-        W, P = self.W[:, :L], self.inverse[:L, :L]
+        per_sensor = (
+            power if has_data is None else np.where(has_data, power, 1.0)
+        ) / np.count_nonzero(valid)
+        self._track_new_sensors(new, known, per_sensor)
+        if y.ndim > 1:
+            self._start_bins((power > 0) & (self.energy == 0), per_sensor)
+        self.weight = self.weight + (valid if has_data is None else valid & has_data[:, None])
+        beta, L = larger(self.forgetting**self.age, MIN_FORGETTING), self.n_tracked
+        before = W, P = self.W[..., :L], self.inverse[..., :L, :L]
         if self.rows is None and (not known.any() or (valid == known).all()):
             W, P = past_step(W, P, y, beta)
         else:
-            rows = SensorInverses(np.stack([P] * len(y))) if self.rows is None else self.rows
-            rows = rows.restarted(new, np.count_nonzero(valid) / power)
-            noise = max(self._noise_outside(), self.prior)
-            W, P, self.rows, z = incomplete_step(W, P, rows, y, valid, beta, noise)
-            expected = (W @ z)[known & ~valid]
-            power += float(np.vdot(expected, expected).real)
+            old = rows = self.rows or SensorInverses(np.stack([P] * y.shape[-1], axis=-3))
+            rows = rows.restarted(new, 1 / per_sensor)
+            noise = larger(self._noise_outside(), self.prior)
+            W, P, rows, z = incomplete_step(W, P, rows, y, valid, beta, noise)
+            power = power + power_of((W @ z[..., None])[..., known & ~valid, 0])
             if self.total_weight > 0:  # 0 after a gap in which all was forgotten
-                power += len(expected) * noise / self.total_weight
-        self.energy, self.age = beta * self.energy + power, 0.0
-        self.prior = beta * self.prior
-        P = limited_trace(P, MAX_RELATIVE_TRACE / max(self.energy, TINY))
+                power = power + np.count_nonzero(known & ~valid) * noise / self.total_weight
+            self.rows = SensorInverses(where_bins(has_data, rows.P, old.P))
+        energy = beta * self.energy + power
+        P = limited_trace(P, MAX_RELATIVE_TRACE / larger(energy, TINY))
+        W, P = where_bins(has_data, W, before[0]), where_bins(has_data, P, before[1])
+        self.energy = where_bins(has_data, energy, self.energy)
+        self.prior = where_bins(has_data, beta * self.prior, self.prior)
+        self.age = where_bins(has_data, 0.0 * beta, self.age)
         if self.n_slots > L:  # some sensors have had no data
             rest = self.n_slots - L
-            W, P = np.pad(W, ((0, 0), (0, rest))), np.pad(P, (0, rest))
+            axes = [(0, 0)] * (y.ndim - 1)
+            W, P = np.pad(W, [*axes, (0, 0), (0, rest)]), np.pad(P, [*axes, *[(0, rest)] * 2])
         self.W, self.inverse = W, P
 
-    def _noise_outside(self) -> float:
-        """Return the weighted sum of a sensor's noise power, by the power outside the subspace."""
-        known = self.weight > 0
-        if self.energy == 0 or known.sum() <= self.n_tracked:
-            return 0.0
-        return float(self.eigendecomposition(known)[0][-1])
+    def _known_sensors(self) -> Bool:
+        known: Bool = self.weight > 0
+        return known if known.ndim == 1 else np.asarray(known.any(axis=0))
 
-    def _track_new_sensors(self, new: Bool, power: float) -> None:
+    def _noise_outside(self) -> Any:
+        """Return the weighted sum of a sensor's noise power, by the power outside the subspace."""
+        known = self._known_sensors()
+        if is_zero(self.energy) or known.sum() <= self.n_tracked:
+            return 0.0 * self.energy
+        return self.eigendecomposition(known)[0][..., -1]
+
+    def _track_new_sensors(self, new: Bool, known: Bool, power: Any) -> None:
         """Add dimensions for sensors with their first data, of the power of a sensor."""
-        old, L = self.n_tracked, self._dimension(int(np.count_nonzero(new | (self.weight > 0))))
+        old, L = self.n_tracked, self._dimension(int(np.count_nonzero(new | known)))
         if old < L:
             added = np.arange(old, L)
             self.W, self.inverse, self.n_tracked = self.W.copy(), self.inverse.copy(), L
-            self.W[np.flatnonzero(new)[: L - old], added] = 1.0
-            self.prior = max(self.prior, power)
-            self.inverse[added, added] = 1 / power
+            self.W[..., np.flatnonzero(new)[: L - old], added] = 1.0
+            self.prior = larger(self.prior, power)
+            self.inverse[..., added, added] = column(1 / power)
             if self.rows is not None:
                 self.rows = self.rows.extended(L, 1 / power)
 
+    def _start_bins(self, bins: Bool, power: Float) -> None:
+        """Set P of bins with their first data to the inverse power of a sensor."""
+        if bins.any():
+            initial = np.eye(self.n_slots) / power[:, None, None]
+            self.inverse = where_bins(bins, initial + 0j, self.inverse)
+            self.prior = np.where(bins, power, self.prior)
+
     def sensor_weights(self) -> Float:
-        """Return the sum of weights of the valid data of each sensor, (n_sensors,)."""
+        """Return the sum of weights of the valid data of each sensor, ([n_bins,] n_sensors)."""
         return self.weight
 
-    def eigendecomposition(self, valid_sensors: Bool) -> tuple[Float, Complex]:
+    def eigendecomposition(
+        self, valid_sensors: Bool, bins: Bool | None = None
+    ) -> tuple[Float, Complex]:
         """Return eigenvalues, falling, and eigenvectors of W P⁻¹Wᴴ plus white noise."""
         n = int(valid_sensors.sum())
         L = min(n, self.n_tracked)
-        if self.energy == 0:
-            return np.zeros(n), np.eye(n, dtype=np.complex128)
-        W, inverse = self.W[valid_sensors], self.inverse
+        W, inverse, energy, prior = (
+            self.W[..., valid_sensors, :],
+            self.inverse,
+            self.energy,
+            self.prior,
+        )
+        if bins is not None and not bins.all():
+            W, inverse, energy, prior = W[bins], inverse[bins], energy[bins], prior[bins]
+        if is_zero(energy):
+            values = np.zeros((*np.shape(energy), n))
+            return values, np.broadcast_to(np.eye(n, dtype=np.complex128), (*values.shape, n))
         if self.n_tracked < self.n_slots:
-            W, inverse = W[:, : self.n_tracked], inverse[: self.n_tracked, : self.n_tracked]
+            W, inverse = W[..., : self.n_tracked], inverse[..., : self.n_tracked, : self.n_tracked]
         Q, R = np.linalg.qr(W, mode="complete")
+        R = R[..., :L, :]
+        RH = R.conj().swapaxes(-1, -2)
         try:
-            S = R[:L] @ np.linalg.solve(inverse, R[:L].conj().T)
+            S = R @ np.linalg.solve(inverse, RH)
         except np.linalg.LinAlgError:  # a leap of the level by many orders: P has lost its rank
-            S = R[:L] @ np.linalg.pinv(inverse, hermitian=True) @ R[:L].conj().T
-        values, rotation = np.linalg.eigh((S + S.conj().T) / 2)
-        noise = (self.energy - values.sum()) / max(n - L, 1)  # the power outside, spread evenly
-        values = np.concatenate([values[::-1], np.full(n - L, noise)])
-        values = np.maximum(values, max(self.prior, noise))  # no dimension has less than noise
-        return values, np.concatenate([Q[:, :L] @ rotation[:, ::-1], Q[:, L:]], axis=1)
+            S = R @ np.linalg.pinv(inverse, hermitian=True) @ RH
+        values, rotation = np.linalg.eigh((S + S.conj().swapaxes(-1, -2)) / 2)
+        # the power outside, spread evenly
+        noise = (energy - values.sum(axis=-1)) / max(n - L, 1)
+        outside = np.full((*values.shape[:-1], n - L), column(noise))
+        values = np.concatenate([values[..., ::-1], outside], axis=-1)
+        values = np.maximum(values, column(larger(prior, noise)))  # no dimension has less
+        vectors = np.concatenate([Q[..., :L] @ rotation[..., ::-1], Q[..., L:]], axis=-1)
+        return values, vectors
 
     def direction_finder(self, model: ArraySnapshot) -> DirectionFinder:
         """Return the direction finder of `method`."""
+        if model.coherence is not None:
+            raise ValueError(
+                "noise_coherence must be 'white' for past; got coherent noise: music whitens it"
+            )
         if self.method == "music":
-            wavelength = model.plain_wavelength("past")
-            return SpectrumSearch(model.array, wavelength, self.n_directions)
-        line = uniform_line(model)
-        return PolynomialRooting(line) if self.method == "root_music" else ShiftInvariance(line)
+            return spectrum_search(model, self.n_directions)
+        return polynomial_rooting(model) if self.method == "root_music" else shift_invariance(model)

@@ -69,22 +69,22 @@ def past_step(W: Complex, P: Complex, y: Complex, beta: ArrayLike) -> tuple[Comp
 
 @dataclass(frozen=True, eq=False)
 class SensorInverses:
-    """The matrix P of each sensor, (n_sensors, n_sources, n_sources): of z zᴴ while it had data."""
+    """The matrix P of each sensor, (..., n_sensors, K, K): of z zᴴ while it had data."""
 
     P: Complex
 
-    def restarted(self, sensors: Bool, variance: float) -> SensorInverses:
+    def restarted(self, sensors: Bool, variance: ArrayLike) -> SensorInverses:
         """Return matrices of which those of some sensors are multiples of the identity."""
-        initial = variance * np.eye(self.P.shape[1])
+        initial = np.asarray(variance)[..., None, None, None] * np.eye(self.P.shape[-1])
         return SensorInverses(np.where(sensors[:, None, None], initial, self.P))
 
-    def extended(self, n_sources: int, variance: float) -> SensorInverses:
+    def extended(self, n_sources: int, variance: ArrayLike) -> SensorInverses:
         """Return matrices of more dimensions, those added with a variance and uncorrelated."""
-        old = self.P.shape[1]
-        P = np.zeros((len(self.P), n_sources, n_sources), dtype=np.complex128)
-        P[:, :old, :old] = self.P
+        old = self.P.shape[-1]
+        P = np.zeros((*self.P.shape[:-2], n_sources, n_sources), dtype=np.complex128)
+        P[..., :old, :old] = self.P
         added = np.arange(old, n_sources)
-        P[:, added, added] = variance
+        P[..., added, added] = np.asarray(variance)[..., None, None]
         return SensorInverses(P)
 
 
@@ -94,26 +94,26 @@ def incomplete_step(
     rows: SensorInverses,
     y: Complex,
     valid: Bool,
-    beta: float,
-    noise: float,
+    beta: ArrayLike,
+    noise: ArrayLike,
 ) -> tuple[Complex, Complex, SensorInverses, Complex]:
     """Return W, P and the sensors' P after a snapshot with missing sensors, and z.
 
     Parameters
     ----------
-    W : ndarray, shape (n_sensors, n_sources)
+    W : ndarray, shape (..., n_sensors, n_sources)
         Basis of the signal subspace.
-    P : ndarray, shape (n_sources, n_sources)
+    P : ndarray, shape (..., n_sources, n_sources)
         Inverse of the weighted sum of z zᴴ.
     rows : SensorInverses
         The same for each sensor, over the snapshots in which it had data.
-    y : ndarray, shape (n_sensors,)
+    y : ndarray, shape (..., n_sensors)
         Snapshot.
     valid : ndarray of bool, shape (n_sensors,)
         Sensors with data.
-    beta : float
+    beta : float or array_like, shape (...)
         Weight of the past.
-    noise : float
+    noise : float or array_like, shape (...)
         Weighted sum of the noise power of a sensor.
 
     Returns
@@ -130,24 +130,29 @@ def incomplete_step(
     >>> (W[1] / W[0]).real.round(1)
     array([1.3])
     """
-    W_o = W[valid]
+    beta, noise = np.asarray(beta)[..., None, None], np.asarray(noise)[..., None, None]
+    W_o = W[..., valid, :]
+    W_oH = W_o.conj().swapaxes(-1, -2)
     # z = (W_oᴴ W_o)⁻¹ W_oᴴ y_o   (6), the least squares weighed against the power of z
-    z = np.linalg.solve(W_o.conj().T @ W_o + noise * P, W_o.conj().T @ y[valid])
+    z = np.linalg.solve(W_oH @ W_o + noise * P, W_oH @ y[..., valid, None])
     h = P @ z
-    new_P = (P - np.outer(h, h.conj()) / (beta + np.vdot(h, z).real)) / beta
+    hH = h.conj().swapaxes(-1, -2)
+    new_P = (P - h * hH / (beta + (hH @ z).real)) / beta
     # the same for the row of each sensor with data   (10)-(12)
     R = rows.P
-    H = R @ z
-    gain = H.conj() / (beta + (H.conj() @ z).real)[:, None]
-    updated = np.where(valid[:, None, None], R - H[:, :, None] * gain[:, None, :], R) / beta
-    W = W + np.where(valid, y - W @ z, 0)[:, None] * gain
-    limit = MAX_TRACE_RATIO * float(new_P.trace().real)
-    of_sensors = np.asarray(updated + updated.conj().swapaxes(1, 2), dtype=np.complex128) / 2
-    new_P = np.asarray((new_P + new_P.conj().T) / 2, dtype=np.complex128)
-    return W, new_P, SensorInverses(limited_trace(of_sensors, limit)), np.asarray(z, np.complex128)
+    H = (R @ z[..., None, :, :])[..., 0]  # (..., n_sensors, n_sources)
+    gain = H.conj() / (beta + (H.conj() @ z).real)
+    updated = R - H[..., None] * gain[..., None, :]
+    updated = np.where(valid[:, None, None], updated, R) / beta[..., None]
+    W = W + np.where(valid[:, None], y[..., None] - W @ z, 0) * gain
+    limit = MAX_TRACE_RATIO * np.trace(new_P, axis1=-2, axis2=-1).real
+    of_sensors = np.asarray(updated + updated.conj().swapaxes(-1, -2), dtype=np.complex128) / 2
+    new_P = np.asarray((new_P + new_P.conj().swapaxes(-1, -2)) / 2, dtype=np.complex128)
+    rows = SensorInverses(limited_trace(of_sensors, limit[..., None]))
+    return W, new_P, rows, np.asarray(z[..., 0], np.complex128)
 
 
-def limited_trace(P: Complex, limit: float) -> Complex:
+def limited_trace(P: Complex, limit: ArrayLike) -> Complex:
     """Return matrices (..., n, n), scaled down where their trace is above a limit.
 
     Examples

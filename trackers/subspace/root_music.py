@@ -10,11 +10,10 @@ from numpy.typing import ArrayLike
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.manifolds.uniform_line import UniformLineManifold
 from arrivals.trackers.registry import register
-from arrivals.trackers.subspace.base import Subspaces, uniform_line
+from arrivals.trackers.subspace.base import DirectionFinder, Subspaces
 from arrivals.trackers.subspace.covariance import CovarianceSubspace
+from arrivals.trackers.subspace.line_bins import ENDFIRE_TOLERANCE, LineOfBins, uniform_line
 from arrivals.typing import Complex, Float
-
-ENDFIRE_TOLERANCE = 0.1  # electrical angles up to this fraction beyond endfire count as endfire
 
 
 def null_polynomial(noise_subspace: Complex, grid_index: ArrayLike) -> Complex:
@@ -54,7 +53,7 @@ def null_polynomial(noise_subspace: Complex, grid_index: ArrayLike) -> Complex:
 
 
 def root_music_angles(
-    noise_subspace: Complex, grid_index: ArrayLike, n_sources: int, max_angle: float = np.pi
+    noise_subspace: Complex, grid_index: ArrayLike, n_sources: int, max_angle: ArrayLike = np.pi
 ) -> Float:
     """Return the electrical angles θ of the zeros nearest to the unit circle.
 
@@ -69,7 +68,7 @@ def root_music_angles(
         Grid points of the sensors.
     n_sources : int
         Number of angles.
-    max_angle : float
+    max_angle : float or array_like, shape (...)
         Zeros of larger angle, rad, do not belong to plane waves and are left out.
 
     Returns
@@ -92,7 +91,8 @@ def root_music_angles(
     z = polynomial_roots(null_polynomial(noise_subspace, grid_index))
     theta = np.full((*z.shape[:-1], n_sources), np.nan)
     distance = np.abs(np.log(np.maximum(np.abs(z), np.finfo(float).tiny)))
-    distance = np.where(np.abs(np.angle(z)) <= max_angle, distance, np.inf)
+    is_wave = np.abs(np.angle(z)) <= np.asarray(max_angle)[..., None]
+    distance = np.where(is_wave, distance, np.inf)
     for k in range(n_sources):
         best = distance.argmin(axis=-1, keepdims=True)
         one = np.take_along_axis(z, best, axis=-1)
@@ -158,14 +158,41 @@ class PolynomialRooting:
         return doa[~np.isnan(doa)]
 
 
+@dataclass(frozen=True, eq=False)
+class RootingOfBins:
+    """Direction finder by root-MUSIC in each of several bins."""
+
+    line: LineOfBins
+
+    @property
+    def max_sources(self) -> int:
+        """Number of sensors minus one."""
+        return len(self.line.grid_index) - 1
+
+    def directions(self, subspaces: Subspaces) -> Float:
+        """Return directions, rad."""
+        line, n_sources = self.line, subspaces.signal.shape[-1]
+        max_angle = (1 + ENDFIRE_TOLERANCE) * line.steps
+        theta = root_music_angles(subspaces.noise, line.grid_index, n_sources, max_angle)
+        return line.directions(theta, 1, subspaces)
+
+
+def polynomial_rooting(model: ArraySnapshot) -> PolynomialRooting | RootingOfBins:
+    """Return root-MUSIC on the line of a model, for one bin or several."""
+    if model.n_bins > 1:
+        return RootingOfBins(LineOfBins.of_model(model))
+    return PolynomialRooting(uniform_line(model))
+
+
 @register("root_music")
-class RootMUSIC(CovarianceSubspace[PolynomialRooting]):
+class RootMUSIC(CovarianceSubspace[DirectionFinder]):
     """Zeros of MUSIC's null spectrum, without a scan grid, for lines only.
 
     Parameters
     ----------
     measurement : ArraySnapshot
-        A line on a uniform grid of at most half the wavelength, gaps allowed.
+        A line on a uniform grid of at most half the wavelength, gaps allowed. Of several bins one
+        must be within this limit; directions are those at which the bins agree.
     n_sources : int, "mdl" or "aic"
         As in `MUSIC`.
     max_sources : int, optional
@@ -181,8 +208,8 @@ class RootMUSIC(CovarianceSubspace[PolynomialRooting]):
 
     Attributes
     ----------
-    covariance : ndarray, shape (n_sensors, n_sensors)
-        Weighted sum of the snapshots' outer products.
+    covariance : ndarray, shape ([n_bins,] n_sensors, n_sensors)
+        Weighted sum of the snapshots' outer products, of each bin if there are several.
 
     Raises
     ------
@@ -196,7 +223,8 @@ class RootMUSIC(CovarianceSubspace[PolynomialRooting]):
     References
     ----------
     Barabell, "Improving the resolution performance of eigenstructure-based direction-finding
-    algorithms", ICASSP 1983.
+    algorithms", ICASSP 1983. Several bins: Pavlidi, Griffin, Puigt and Mouchtaris, IEEE Trans.
+    Audio Speech Lang. Process. 21(10), 2013, sec. III.
 
     Examples
     --------
@@ -208,6 +236,6 @@ class RootMUSIC(CovarianceSubspace[PolynomialRooting]):
     array([-0.2,  0.5])
     """
 
-    def direction_finder(self, model: ArraySnapshot) -> PolynomialRooting:
+    def direction_finder(self, model: ArraySnapshot) -> DirectionFinder:
         """Return root-MUSIC on the line of the model."""
-        return PolynomialRooting(uniform_line(model))
+        return polynomial_rooting(model)

@@ -1,0 +1,220 @@
+"""Scans of several bins and snapshots: responses on the grid, the part in use, amplitudes."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from arrivals.measurement_models.array_snapshot import ArraySnapshot
+from arrivals.measurement_models.arrays.noise_coherence import NoiseCoherence
+from arrivals.trackers.beamforming.spectrum import scan_directions
+from arrivals.typing import Bool, Complex, Float
+
+TINY = np.finfo(float).tiny
+
+
+class ScanResponses(NamedTuple):
+    """Responses A, (n_nuisance, n_bins, n_sensors, n_directions), on a grid, and their ‖a‖².
+
+    They are whitened where the noise is coherent.
+    """
+
+    doa_grid: Float
+    A: Complex
+    norm: Float
+
+
+def has_plain_response(model: ArraySnapshot) -> bool:
+    """Return True if the scan has one bin of isotropic sensors in white noise, no second unknown.
+
+    Examples
+    --------
+    >>> from arrivals.measurement_models import SensorArray
+    >>> model = ArraySnapshot(SensorArray.uca(5, 0.4), wavelength=1.0, n_snapshots=8)
+    >>> has_plain_response(model), has_plain_response(model.replace(slowness=[0.9, 1.1]))
+    (True, False)
+    """
+    return (
+        model.n_bins == 1
+        and model.response is None
+        and model.slowness is None
+        and model.elevation is None
+        and model.coherence is None
+    )
+
+
+def whitened_responses(model: ArraySnapshot, doa: Float) -> Complex:
+    """Return responses (n_nuisance, n_bins, n_sensors, n), whitened where noise is coherent.
+
+    Examples
+    --------
+    >>> from arrivals.measurement_models import SensorArray
+    >>> model = ArraySnapshot(SensorArray.uca(5, 0.4), 1.0, noise_coherence="diffuse")
+    >>> whitened_responses(model, np.zeros(3)).shape
+    (1, 1, 5, 3)
+    """
+    A = model.waves.steering(doa)
+    return A if model.coherence is None else np.asarray(model.whitening() @ A)
+
+
+def whitened_covariance(model: ArraySnapshot, R: Complex) -> Complex:
+    """Return L R Lᴴ of covariances ([n_bins,] n_sensors, n_sensors); R if the noise is white.
+
+    Examples
+    --------
+    >>> from arrivals.measurement_models import SensorArray
+    >>> model = ArraySnapshot(SensorArray.uca(5, 0.4), 1.0, noise_coherence="diffuse")
+    >>> whitened_covariance(model, model.coherence.matrix[0]).real.diagonal().round(6)
+    array([1., 1., 1., 1., 1.])
+    """
+    if model.coherence is None:
+        return R
+    L = model.whitening()
+    return np.asarray(L @ R @ np.swapaxes(L.conj(), 1, 2)).reshape(R.shape)
+
+
+@lru_cache(maxsize=2)  # models are immutable; the responses of a grid can be large
+def scan_responses(model: ArraySnapshot, n: int) -> ScanResponses:
+    """Return the responses of a model on n scan directions, cached and read-only.
+
+    Parameters
+    ----------
+    model : ArraySnapshot
+        Any array, bins and second unknown.
+    n : int
+        Number of directions, as in `scan_directions`.
+
+    Returns
+    -------
+    ScanResponses
+        Grid, rad, responses and norms (n_nuisance, n_bins, n_directions).
+
+    Examples
+    --------
+    >>> from arrivals.measurement_models import SensorArray
+    >>> scan = scan_responses(ArraySnapshot(SensorArray.uca(5, 0.4), [1.0, 1.2]), 90)
+    >>> scan.A.shape, scan.norm.shape
+    ((1, 2, 5, 90), (1, 2, 90))
+    """
+    doa_grid = scan_directions(model.array, n)
+    A = whitened_responses(model, doa_grid)
+    scan = ScanResponses(doa_grid, A, (A.real**2 + A.imag**2).sum(axis=2))
+    for shared in scan:
+        shared.setflags(write=False)
+    return scan
+
+
+def part_in_use(model: ArraySnapshot, sensors: Bool, bins: Bool | None) -> ArraySnapshot:
+    """Return the model of some sensors, (n_sensors,), and of some bins, (n_bins,); all if None.
+
+    Examples
+    --------
+    >>> from arrivals.measurement_models import SensorArray
+    >>> model = ArraySnapshot(SensorArray.uca(5, 0.4), [1.0, 1.2])
+    >>> part_in_use(model, np.arange(5) > 0, np.array([False, True])).shape
+    (4,)
+    """
+    if sensors.all() and (bins is None or bins.all()):
+        return model
+    return _part(model, sensors.tobytes(), b"" if bins is None else bins.tobytes())
+
+
+@lru_cache(maxsize=64)
+def _part(model: ArraySnapshot, sensors: bytes, bins: bytes) -> ArraySnapshot:
+    kept = np.flatnonzero(np.frombuffer(sensors, dtype=np.bool_))
+    waves = model.waves.without(np.setdiff1d(np.arange(model.array.n_sensors), kept))
+    noise = model.coherence if isinstance(model.noise_coherence, NoiseCoherence) else None
+    used = np.flatnonzero(np.frombuffer(bins, dtype=np.bool_))
+    if bins:
+        waves = waves.only(used)
+    if noise is not None:
+        matrix = noise.matrix[used] if bins and noise.matrix.ndim > 2 else noise.matrix
+        noise = NoiseCoherence(matrix[..., kept, :][..., kept])
+    return model.replace(
+        array=waves.array,
+        response=waves.response,
+        wavelength=list(waves.wavelengths),
+        noise_coherence=model.noise_coherence if noise is None else noise,
+    )
+
+
+def root_mean_amplitudes(model: ArraySnapshot, doa: Float, Y: Complex) -> Complex:
+    """Return amplitudes of plane waves: the root of the mean power over bins and snapshots.
+
+    The least-squares fit of all waves to each snapshot, each wave at the slowness or elevation of
+    its largest beam power.
+
+    Parameters
+    ----------
+    model : ArraySnapshot
+        Model of the snapshots.
+    doa : ndarray, shape (n_sources,)
+        Directions, rad.
+    Y : ndarray, shape (n_bins, n_sensors, n_snapshots)
+        Snapshots, NaN where a sensor is missing.
+
+    Returns
+    -------
+    ndarray, shape (n_sources,)
+        Amplitudes, real.
+
+    Examples
+    --------
+    >>> from arrivals.measurement_models import SensorArray
+    >>> model = ArraySnapshot(SensorArray.uca(5, 0.4), [1.0, 1.2])
+    >>> Y = 3j * model.waves.steering([0.3])[0]
+    >>> root_mean_amplitudes(model, np.array([0.3]), Y).real.round(6)
+    array([3.])
+    """
+    if len(doa) == 0:
+        return np.zeros(0, dtype=np.complex128)
+    valid = ~np.isnan(Y)
+    y = np.where(valid, Y, 0)
+    A = strongest(model.waves.steering(doa), y)
+    AH = np.swapaxes(A.conj(), 1, 2)
+    if valid.all():  # normal equations of a bin, (n_bins, K, K)
+        w = np.linalg.solve(_loaded(AH @ A), AH @ y)
+    else:  # of each snapshot, (n_bins, n_snapshots, K, K)
+        products = np.einsum("fkm,fmn,fml->fnkl", AH, valid, A, optimize=True)
+        right = np.swapaxes(AH @ y, 1, 2)[..., None]
+        w = np.swapaxes(np.linalg.solve(_loaded(products), right)[..., 0], 1, 2)
+    n_valid = max(int(valid.any(axis=1).sum()), 1)
+    return np.asarray(np.sqrt((w.real**2 + w.imag**2).sum(axis=(0, 2)) / n_valid) + 0j)
+
+
+def strongest(A: Complex, y: Complex) -> Complex:
+    """Return responses (n_bins, n_sensors, n), each at the nuisance of its largest beam power.
+
+    Parameters
+    ----------
+    A : ndarray, shape (n_nuisance, n_bins, n_sensors, n)
+        Responses.
+    y : ndarray, shape (n_bins, n_sensors, n_snapshots)
+        Snapshots, 0 where a sensor is missing.
+
+    Returns
+    -------
+    ndarray, shape (n_bins, n_sensors, n)
+
+    Examples
+    --------
+    >>> A = np.array([[1.0, 1.0], [1.0, -1.0]]).reshape(2, 1, 2, 1)
+    >>> strongest(A, np.array([[[1.0], [-1.0]]])).ravel()
+    array([ 1., -1.])
+    """
+    if len(A) == 1:
+        return np.asarray(A[0])
+    beam = np.swapaxes(A.conj(), 2, 3) @ y
+    norm = np.maximum((A.real**2 + A.imag**2).sum(axis=2), TINY)
+    power = ((beam.real**2 + beam.imag**2).sum(axis=-1) / norm).sum(axis=1)
+    best = power.argmax(axis=0)
+    return np.asarray(np.moveaxis(A[best, :, :, np.arange(len(best))], 0, -1))
+
+
+def _loaded(G: Complex) -> Complex:
+    """Return Gram matrices with 1e-12 of their mean diagonal added: equal waves share."""
+    K = G.shape[-1]
+    mean = np.trace(G, axis1=-2, axis2=-1).real / K
+    return np.asarray(G + np.maximum(1e-12 * mean, TINY)[..., None, None] * np.eye(K))
