@@ -1,6 +1,8 @@
 """Fixed-point iteration of sparse Bayesian learning: powers of plane waves on a scan grid.
 
 The kernels have a leading batch axis: B problems with one array and one number of snapshots.
+Frequency bins share the powers γ; each has responses and a noise variance of its own, with an axis
+after that of the batch.
 """
 
 from __future__ import annotations
@@ -26,7 +28,7 @@ class PowerEstimate:
     ----------
     gamma : ndarray, shape (B, n_directions)
         Powers of unit-norm waves.
-    noise : ndarray, shape (B,)
+    noise : ndarray, shape (B, [n_bins])
         Noise variance of one sensor.
     iterations : ndarray of int, shape (B,)
         Number of iterations.
@@ -81,9 +83,9 @@ class FixedPointSolver(FrozenModel):
 
         Parameters
         ----------
-        A : ndarray, shape (n_directions, n_sensors)
+        A : ndarray, shape ([n_bins,] n_directions, n_sensors)
             Rows a(β) of unit norm.
-        Y : ndarray, shape (B, n_sensors, n_snapshots)
+        Y : ndarray, shape (B, [n_bins,] n_sensors, n_snapshots)
             Snapshots.
         gamma : ndarray, shape (B, n_directions)
             Initial γ.
@@ -99,10 +101,10 @@ class FixedPointSolver(FrozenModel):
         """
         B = len(Y)
         smallest, at = np.full(B, np.inf), np.zeros(B, dtype=np.int64)
-        best = PowerEstimate(gamma.copy(), np.full(B, noise), *np.zeros((2, B), dtype=np.int64))
-        joined = not circular and ends_coincide(A[0], A[-1])
+        sigma2 = np.full(Y.shape[:-2], noise)
+        best = PowerEstimate(gamma.copy(), sigma2.copy(), *np.zeros((2, B), dtype=np.int64))
+        joined = not circular and ends_coincide(A[..., 0, :], A[..., -1, :])
         converged, active = np.zeros(B, dtype=np.bool_), np.arange(B)
-        sigma2 = best.noise.copy()
         for iteration in range(1, self.max_iterations + 1):
             old, y = gamma, Y[active]
             gamma = update_powers(A, y, old, sigma2)
@@ -125,15 +127,17 @@ class FixedPointSolver(FrozenModel):
 def update_powers(A: Complex, Y: Complex, gamma: Float, noise: Float) -> Float:
     """Return the next powers γᵢ |aᵢᴴΣ⁻¹y|² / aᵢᴴΣ⁻¹aᵢ, the mean over snapshots.
 
+    Numerator and denominator are sums over the bins.
+
     Parameters
     ----------
-    A : ndarray, shape (n_directions, n_sensors)
+    A : ndarray, shape ([n_bins,] n_directions, n_sensors)
         Rows a(β) of unit norm.
-    Y : ndarray, shape (B, n_sensors, n_snapshots)
+    Y : ndarray, shape (B, [n_bins,] n_sensors, n_snapshots)
         Snapshots.
     gamma : ndarray, shape (B, n_directions)
         Powers.
-    noise : ndarray, shape (B,)
+    noise : ndarray, shape (B, [n_bins])
         Noise variance σ².
 
     Returns
@@ -147,13 +151,18 @@ def update_powers(A: Complex, Y: Complex, gamma: Float, noise: Float) -> Float:
     >>> update_powers(A, np.array([[[2.0], [0.0]]]), np.ones((1, 2)), np.array([1.0]))
     array([[2., 0.]])
     """
-    n_sensors = A.shape[1]
+    n_sensors, has_bins = A.shape[-1], A.ndim > 2
+    shared = gamma[:, None, None] if has_bins else gamma[:, None]
     # Σ = σ²I + A diag(γ) Aᴴ
-    sigma = (A.T * gamma[:, None]) @ A.conj() + noise[:, None, None] * np.eye(n_sensors)
+    sigma = (np.swapaxes(A, -1, -2) * shared) @ A.conj()
+    sigma = sigma + noise[..., None, None] * np.eye(n_sensors)
     filters = A.conj() @ np.linalg.inv(sigma)  # rows aᵢᴴΣ⁻¹
     output = filters @ Y
     numerator = (output.real**2 + output.imag**2).mean(axis=-1)
-    return np.asarray(gamma * numerator / np.einsum("bim,im->bi", filters, A).real)
+    denominator = np.einsum("b...im,...im->b...i", filters, A).real
+    if has_bins:
+        numerator, denominator = numerator.sum(axis=1), denominator.sum(axis=1)
+    return np.asarray(gamma * numerator / denominator)
 
 
 def residual_noise(
@@ -163,9 +172,9 @@ def residual_noise(
 
     Parameters
     ----------
-    A : ndarray, shape (n_directions, n_sensors)
+    A : ndarray, shape ([n_bins,] n_directions, n_sensors)
         Rows a(β) of unit norm.
-    Y : ndarray, shape (B, n_sensors, n_snapshots)
+    Y : ndarray, shape (B, [n_bins,] n_sensors, n_snapshots)
         Snapshots of covariance S.
     gamma : ndarray, shape (B, n_directions)
         Powers.
@@ -174,13 +183,16 @@ def residual_noise(
 
     Returns
     -------
-    ndarray, shape (B,)
+    ndarray, shape (B, [n_bins])
         Noise variance of one sensor.
     """
     n_sensors, n_snapshots = Y.shape[-2:]
     K = min(-(-n_sensors // 2), n_sensors - 1)
     peaks, exists = highest_peaks(gamma, K, circular, joined)
-    columns = np.swapaxes(np.where(exists[..., None], A[peaks], 0), -1, -2)  # missing peaks last
+    waves = A[..., peaks, :]
+    if A.ndim > 2:
+        waves, exists = np.moveaxis(waves, 0, 1), exists[:, None]
+    columns = np.swapaxes(np.where(exists[..., None], waves, 0), -1, -2)  # missing peaks last
     Q = np.linalg.qr(columns)[0]
     projection = np.swapaxes(Q.conj(), -1, -2) @ Y
     explained = np.where(exists, (np.abs(projection) ** 2).sum(axis=-1), 0).sum(axis=-1)
