@@ -53,7 +53,7 @@ CIRCLE = ArraySnapshot(
     SensorArray.uca(5, radius=0.5), wavelength=[1.0, 1.3], noise=0.01, n_snapshots=2
 )
 BANDS = CIRCLE.replace(wavelength=list(np.linspace(1.0, 3.0, 12)), n_snapshots=4)
-RING = ArraySnapshot(SensorArray.uca(5, radius=0.5), wavelength=1.0, noise=0.01)
+BLOCK = LINE.replace(wavelength=[1.0, 1.3], n_snapshots=2)
 PAIRS = ArraySnapshot(SensorArray.symmetric([0.25, 0.5]), wavelength=1.0, noise=0.1)
 SOUND = ArraySamples(SensorArray.ula(4, spacing=0.5, speed=1.0), 4.0, Tones(0.2), snr_db=20.0)
 RNG = np.random.default_rng(3)
@@ -91,9 +91,8 @@ def imm() -> IMM:
 
 
 def direction(name: str, **params: Any) -> list[Case]:
-    """Return a tracker of directions on a line, and on a circle where it works there."""
-    wideband = CIRCLE if name in ("cbf", "valse", "svalse", "peaks_gnn") else RING
-    models = (LINE,) if name in ("root_music", "esprit", "ssbl") else (LINE, wideband)
+    """Return a tracker of directions on a line, and on bins of a circle where it works there."""
+    models = (LINE, BLOCK if name in ("root_music", "esprit", "ssbl") else CIRCLE)
     return [
         (lambda model=model: create(name, measurement=model, **params), snapshots(model))  # type: ignore[misc]
         for model in models

@@ -72,6 +72,8 @@ TRACKERS: list[tuple[str, MakeTracker, Measurements]] = [
         ),
         two_sources(LINE, n_steps=3),
     ),
+    ("sbl", lambda: SBL(WIDEBAND, n_directions=90, max_sources=3), two_sources(WIDEBAND)),
+    ("ssbl", lambda: SSBL(WIDEBAND, n_directions=90, n_neighbours=1), two_sources(WIDEBAND)),
     ("cbf", lambda: CBF(SLOWNESS, n_directions=90), two_sources(SLOWNESS)),
     (
         "valse",
