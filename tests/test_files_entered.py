@@ -19,7 +19,7 @@ from arrivals.measurement_models import (
     Tones,
 )
 from arrivals.motion_models import ConstantVelocity, RandomWalk
-from arrivals.trackers import RSSVB, SVALSE, InterpolationEKF, Kalman, Tracker
+from arrivals.trackers import RSSVB, SVALSE, InterpolationEKF, Kalman, Tracker, WidebandMixture
 
 PACKAGE = Path(arrivals.__file__).parent
 
@@ -52,9 +52,16 @@ def kalman() -> tuple[Tracker, Any]:
 
 
 def svalse() -> tuple[Tracker, Any]:
-    """24: four models of the array and its data, four of the motion, ten of the solver."""
+    """25: five of the array, its noise and data, four of the motion, ten of the solver."""
     model = ArraySnapshot(SensorArray.ula(15, spacing=0.5), wavelength=1.0, noise=0.05)
     return SVALSE(model), model.simulate([-0.3, 0.4], [1.0, 1.0j], np.random.default_rng(0))
+
+
+def wideband_mixture() -> tuple[Tracker, Any]:
+    wavelengths = list(np.linspace(1.0, 3.0, 24))
+    model = ArraySnapshot(SensorArray.uca(7, radius=0.5), wavelengths, noise=1e-3, n_snapshots=6)
+    rng = np.random.default_rng(0)
+    return WidebandMixture(model), model.simulate([0.5], rng.exponential(size=(24, 6, 1)) ** 3, rng)
 
 
 def rss_vb() -> tuple[Tracker, Any]:
@@ -73,7 +80,8 @@ def interpolation_ekf() -> tuple[Tracker, Any]:
 
 STEPS: list[tuple[Callable[[], tuple[Tracker, Any]], int]] = [
     (kalman, 7),
-    (svalse, 24),
+    (svalse, 25),
+    (wideband_mixture, 21),
     (rss_vb, 15),
     (interpolation_ekf, 18),
 ]
