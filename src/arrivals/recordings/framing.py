@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
-from arrivals.recordings.narrowband import check_frequency, default_window
+from arrivals.recordings.narrowband import default_window
 from arrivals.recordings.recording import Recording
 from arrivals.recordings.stream import live_snapshots
 from arrivals.typing import Complex, Float
 from arrivals.validation import count
-
-MAX_BINS = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,21 +76,16 @@ def frame_recording(
     >>> frames.values.shape, abs(frames.values[0, :, 0, 0]).round(2), frames.time
     ((2, 2, 4, 3), array([1., 0.]), array([1., 3.]))
     """
-    if recording.is_narrowband and len(frequencies) > 1:
-        raise ValueError("frequencies must be one for a recording of complex snapshots")
-    if recording.rate is not None and not recording.is_narrowband and window is None:
-        for frequency in frequencies:
-            check_frequency(frequency, recording.rate)
-        window = default_window(recording.rate, min(frequencies))
-    bins = [recording.snapshots(f, window=window, hop=hop) for f in frequencies]
-    values = np.stack([each.values for each in bins], axis=1)
+    snapshots = recording.snapshots(list(frequencies), window=window, hop=hop)
+    values, time = snapshots.values, snapshots.time
+    values = values[:, None] if recording.is_narrowband else values
     n, every = count("n_snapshots", n_snapshots), n_snapshots if stride is None else stride
     n_steps = (len(values) - n) // count("stride", every) + 1
     if n_steps < 1:
         raise ValueError(f"the recording has {len(values)} snapshots; one step requires {n}")
     rows = every * np.arange(n_steps)[:, None] + np.arange(n)
     steps = np.swapaxes(values[rows], 1, 2)  # (n_steps, n_bins, n_snapshots, n_channels)
-    return FramedSnapshots(_squeeze(steps), np.asarray(bins[0].time[rows].mean(axis=1)))
+    return FramedSnapshots(_squeeze(steps), np.asarray(time[rows].mean(axis=1)))
 
 
 def _squeeze(steps: Complex) -> Complex:
@@ -102,7 +95,7 @@ def _squeeze(steps: Complex) -> Complex:
 
 
 def frequencies_in(band: Sequence[float], rate: float, window: int | None = None) -> list[float]:
-    """Return frequencies that fill a band: two bins of a Hann window apart, at most 16.
+    """Return the bins of a window that lie in a band.
 
     Parameters
     ----------
@@ -116,7 +109,7 @@ def frequencies_in(band: Sequence[float], rate: float, window: int | None = None
     Returns
     -------
     list of float
-        Frequencies, Hz.
+        Frequencies, Hz: multiples of rate / window; the middle of a band without one.
 
     Raises
     ------
@@ -125,19 +118,17 @@ def frequencies_in(band: Sequence[float], rate: float, window: int | None = None
 
     Examples
     --------
-    >>> frequencies_in((600.0, 700.0), rate=4000.0)
-    [600.0, 633.3333333333334, 666.6666666666666, 700.0]
+    >>> frequencies_in((600.0, 650.0), rate=4000.0, window=256)
+    [609.375, 625.0, 640.625]
     """
     low, high = (float(edge) for edge in band)
     if not 0 < low < high < rate / 2:
         raise ValueError(
             f"band must lie between 0 and half the rate, {rate / 2:g} Hz; got {low:g} and {high:g}"
         )
-    spacing = (
-        2 * rate / (default_window(rate, low) if window is None else count("window", window, 2))
-    )
-    n = min(int((high - low) / spacing) + 1, MAX_BINS)
-    return [(low + high) / 2] if n == 1 else np.linspace(low, high, n).tolist()
+    n = default_window(rate, low) if window is None else count("window", window, 2)
+    first, last = math.ceil(low * n / rate * (1 - 1e-12)), int(high * n / rate * (1 + 1e-12))
+    return [k * rate / n for k in range(first, last + 1)] or [(low + high) / 2]
 
 
 def frame_stream(
@@ -172,15 +163,5 @@ def frame_stream(
     """
     if len(frequencies) > 1 and np.dtype(live.get("dtype", "int16")).kind == "c":
         raise ValueError("frequencies must be one for a stream of complex frames")
-    steps: list[tuple[float, Complex]] = []
-    complete = False
-    for time, z in live_snapshots(source, n_channels, frequency=list(frequencies), **live):
-        steps.append((time, z.reshape(len(frequencies), n_channels)))
-        if len(steps) == count("n_snapshots", n_snapshots):
-            values: NDArray[Any] = np.stack([each for _, each in steps], axis=1)
-            yield float(np.mean([at for at, _ in steps])), _squeeze(values[None])[0]
-            steps, complete = [], True
-    if not complete:
-        raise ValueError(
-            f"the stream ended after {len(steps)} windows; one step requires {n_snapshots}"
-        )
+    at = list(frequencies) if len(frequencies) > 1 else frequencies[0]
+    yield from live_snapshots(source, n_channels, frequency=at, n_snapshots=n_snapshots, **live)

@@ -1,17 +1,22 @@
-"""Complex amplitudes of channels at one frequency, window by window."""
+"""Complex amplitudes of channels at one frequency or several, window by window."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import ArrayLike, NDArray
 
-from arrivals.typing import Complex
+from arrivals.typing import Bool, Complex, Float, Int
 from arrivals.validation import count, positive
 
 MAX_WINDOW = 2**30  # samples
-MAX_BLOCK = 2**21  # complex numbers of one result of the STFT: 32 MB
+MAX_BLOCK = 2**21  # numbers of the windows, or of the tones, that are processed together: 16 MB
 
 
 def default_window(rate: float, frequency: float) -> int:
@@ -95,31 +100,129 @@ def narrowband(
     >>> np.abs(y[:, 0]).round(3), np.angle(y[:, 0]).round(3)
     (array([3., 3., 3.]), array([0.5, 0.5, 0.5]))
     """
-    from scipy.signal import ShortTimeFFT
-    from scipy.signal.windows import hann
+    kernel = WindowedSpectrum(rate, (frequency,), window)
+    return kernel.amplitudes(samples, hop, first_sample)[:, 0]
 
-    samples = np.asarray(samples)
-    if samples.ndim != 2 or samples.dtype.kind not in "iuf":
-        got = f"{samples.dtype} of shape {samples.shape}"
-        kind = ValueError if samples.ndim != 2 else TypeError
-        raise kind(f"samples must be real numbers of shape (n_samples, n_channels); got {got}")
-    frequency = check_frequency(frequency, positive("rate", rate))
-    window, hop = count("window", window, 2), count("hop", hop)
-    n_steps = max(0, (len(samples) - window) // hop + 1)
-    cycles = (count("first_sample", first_sample, 0) + hop * np.arange(n_steps)) * frequency / rate
 
-    taper = hann(window, sym=False)
-    tone = taper * np.exp(2j * np.pi * frequency / rate * np.arange(window))
-    stft = ShortTimeFFT(tone, hop, rate, fft_mode="twosided", phase_shift=None)
-    y = np.empty((n_steps, samples.shape[1]), complex)
-    n_block = max(1, MAX_BLOCK // (max(window, hop) * max(1, samples.shape[1])))
-    for i in range(0, n_steps, n_block):
-        n = min(n_block, n_steps - i)
-        with np.errstate(invalid="ignore"):  # signalling NaN
-            block = samples[i * hop : (i + n - 1) * hop + window].astype(np.float64)
-        block[np.isinf(block)] = np.nan
-        y[i : i + n] = stft.stft(block, 0, n, k_offset=stft.m_num_mid, axis=0)[0].T
-    return np.asarray(y * (2 / taper.sum() * np.exp(-2j * np.pi * (cycles % 1)))[:, None])
+@dataclass(frozen=True)
+class WindowedSpectrum:
+    """Amplitudes at several frequencies in Hann windows of one length, as `narrowband` has them.
+
+    Bins of the window come from one real FFT a window, other frequencies from one product of
+    windows and tones. Windows are processed in blocks of bounded memory.
+
+    Parameters
+    ----------
+    rate : float
+        Samples per second, Hz.
+    frequencies : sequence of float
+        Each between 0 and rate / 2, Hz.
+    window : int
+        Length of a window, samples.
+
+    Examples
+    --------
+    >>> x = 3 * np.cos(2 * np.pi * 125 * np.arange(32) / 1000)[:, None]
+    >>> np.abs(WindowedSpectrum(1000, (125.0, 250.0), 16).amplitudes(x, hop=16)[:, :, 0]).round(6)
+    array([[3., 0.],
+           [3., 0.]])
+    """
+
+    rate: float
+    frequencies: Sequence[float]
+    window: int
+
+    def __post_init__(self) -> None:
+        rate = positive("rate", self.rate)
+        checked = tuple(check_frequency(each, rate) for each in self.frequencies)
+        object.__setattr__(self, "frequencies", checked)
+        count("window", self.window, 2)
+
+    def amplitudes(self, samples: ArrayLike, hop: int, first_sample: int = 0) -> Complex:
+        """Return the amplitudes of the windows that lie fully inside.
+
+        Parameters
+        ----------
+        samples : array_like, shape (n_samples, n_channels)
+            As in `narrowband`.
+        hop : int
+            Distance between windows, samples.
+        first_sample : int
+            As in `narrowband`.
+
+        Returns
+        -------
+        ndarray, shape (n_windows, n_frequencies, n_channels)
+        """
+        samples = np.asarray(samples)
+        if samples.ndim != 2 or samples.dtype.kind not in "iuf":
+            got = f"{samples.dtype} of shape {samples.shape}"
+            kind = ValueError if samples.ndim != 2 else TypeError
+            raise kind(f"samples must be real numbers of shape (n_samples, n_channels); got {got}")
+        hop, first_sample = count("hop", hop), count("first_sample", first_sample, 0)
+        n_windows = max(0, (len(samples) - self.window) // hop + 1)
+        y = np.empty((n_windows, len(self.frequencies), samples.shape[1]), complex)
+        n_block = max(1, MAX_BLOCK // (max(self.window, hop) * max(1, samples.shape[1])))
+        for i in range(0, n_windows, n_block):
+            n = min(n_block, n_windows - i)
+            block = _finite(samples[i * hop : (i + n - 1) * hop + self.window])
+            frames = self._taper * sliding_window_view(block, self.window, axis=1)[:, ::hop]
+            self._transform(frames, y[i : i + n].transpose(2, 0, 1))
+        start = (first_sample + hop * np.arange(n_windows))[:, None]
+        cycles = start * self._f / self.rate
+        y *= np.exp(-2j * np.pi * (cycles % 1))[:, :, None]
+        return y
+
+    def _transform(self, frames: Float, out: Complex) -> None:
+        """Write Σ x(k) exp(-j 2π f k / rate) of windows (..., window) to `out` (..., F)."""
+        if self._is_bin.any():
+            out[..., self._is_bin] = np.fft.rfft(frames)[..., self._bins]
+        for i, group in enumerate(self._groups):
+            tones = self._tones_at(group) if i else self._first_tones
+            out[..., group] = (frames @ tones).view(complex)
+
+    @cached_property
+    def _f(self) -> Float:
+        return np.array(self.frequencies)
+
+    @cached_property
+    def _taper(self) -> Float:
+        """Hann window, 2 / Σ w(k) times."""
+        w = 0.5 - 0.5 * np.cos(2 * np.pi / self.window * np.arange(self.window))
+        return np.asarray(2 / w.sum() * w)
+
+    @cached_property
+    def _is_bin(self) -> Bool:
+        """Where f window / rate is whole, but for rounding."""
+        k = self._f * self.window / self.rate
+        return np.asarray(np.abs(k - np.round(k)) <= 2 * np.finfo(float).eps * k)
+
+    @cached_property
+    def _bins(self) -> Int:
+        return np.round(self._f[self._is_bin] * self.window / self.rate).astype(np.int64)
+
+    @cached_property
+    def _groups(self) -> list[Int]:
+        """Indices of the frequencies between the bins, in groups whose tones fit into a block."""
+        between, n = np.flatnonzero(~self._is_bin), max(1, MAX_BLOCK // (2 * self.window))
+        return [between[i : i + n] for i in range(0, len(between), n)]
+
+    @cached_property
+    def _first_tones(self) -> Float:
+        return self._tones_at(self._groups[0])
+
+    def _tones_at(self, where: Int) -> Float:
+        """Return cosine and sine tones, side by side: (window, 2 F)."""
+        cycles = np.arange(self.window)[:, None] * self._f[where] / self.rate
+        return np.asarray(np.exp(-2j * np.pi * (cycles % 1)).view(np.float64))
+
+
+def _finite(samples: NDArray[Any]) -> Float:
+    """Return samples as (n_channels, n_samples), NaN where infinite."""
+    with np.errstate(invalid="ignore"):  # signalling NaN
+        block = samples.T.astype(np.float64, order="C")
+    block[np.isinf(block)] = np.nan
+    return block
 
 
 def check_frequency(frequency: float, rate: float) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from arrivals.measurement_models import SensorArray
 from arrivals.measurements import LARGEST, numbers
-from arrivals.recordings.narrowband import check_frequency, default_window, narrowband
+from arrivals.recordings.narrowband import WindowedSpectrum, check_frequency, default_window
 from arrivals.typing import Complex, Float
 from arrivals.validation import count, positive, shaped
 
@@ -23,17 +24,17 @@ class Snapshots:
 
     Parameters
     ----------
-    values : ndarray, shape (n_steps, n_channels)
+    values : ndarray, shape (n_steps, n_channels) or (n_steps, n_frequencies, n_channels)
         Complex amplitudes; NaN where a channel is missing.
     time : ndarray, shape (n_steps,)
         Centres of the windows, s from the first sample; NaN if unknown.
-    frequency : float or None
-        Frequency, Hz; None if unknown.
+    frequency : float, tuple of float or None
+        Frequency, Hz, or several; None if unknown.
     """
 
     values: Complex
     time: Float
-    frequency: float | None
+    frequency: float | tuple[float, ...] | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,21 +113,21 @@ class Recording:
 
     def snapshots(
         self,
-        frequency: float | None = None,
+        frequency: float | Sequence[float] | None = None,
         *,
         window: int | None = None,
         hop: int | None = None,
         start: int = 0,
     ) -> Snapshots:
-        """Return narrowband snapshots at one frequency.
+        """Return narrowband snapshots at one frequency, or at several.
 
         Parameters
         ----------
-        frequency : float
-            Frequency, Hz, below rate / 2; None for a recording of complex snapshots, which are
-            returned unchanged.
+        frequency : float or sequence of float
+            Frequency, Hz, below rate / 2, or several; None for a recording of complex snapshots,
+            which are returned unchanged.
         window : int, optional
-            Length of the Hann window in samples; `default_window` if None.
+            Length of the Hann window in samples; `default_window` of the lowest frequency if None.
         hop : int, optional
             Samples between windows. By default windows do not overlap, so that the noise of two
             snapshots is independent.
@@ -137,7 +138,7 @@ class Recording:
         Returns
         -------
         Snapshots
-            Values (n_steps, n_channels) as `narrowband` defines them, and times (n_steps,).
+            Values as `narrowband` defines them, and times (n_steps,).
 
         Raises
         ------
@@ -147,23 +148,31 @@ class Recording:
         """
         start = count("start", start, 0)
         if self.is_narrowband:
+            given: Any = frequency
+            if np.size(given) > 1:
+                raise ValueError("frequencies must be one for a recording of complex snapshots")
             if window is not None or hop is not None:
                 raise ValueError("window and hop must be None for a recording of complex snapshots")
             if start >= len(self.samples):
                 raise ValueError(f"start must be below {len(self.samples)}; got {start}")
             values = np.asarray(self.samples[start:], complex)
-            return Snapshots(values, self._snapshot_times()[start:], frequency)
+            known = given[0] if np.ndim(given) else given
+            return Snapshots(values, self._snapshot_times()[start:], known)
         if self.rate is None:
             raise ValueError("a frequency requires the rate of the recording: pass rate= in Hz")
         if frequency is None:
             raise ValueError("frequency must be a number for a recording of real samples; got None")
-        frequency = check_frequency(frequency, self.rate)
-        window = window if window is not None else default_window(self.rate, frequency)
+        bins = [check_frequency(each, self.rate) for each in np.atleast_1d(frequency)]
+        window = window if window is not None else default_window(self.rate, min(bins))
         hop = hop if hop is not None else window
         self._check_length(count("window", window, 2), start)
-        values = narrowband(self.samples[start:], self.rate, frequency, window, hop, start)
+        spectrum = WindowedSpectrum(self.rate, bins, window)
+        values = spectrum.amplitudes(self.samples[start:], hop, start)
         centres = start + hop * np.arange(len(values)) + window / 2
-        return Snapshots(values, np.asarray(centres / self.rate, np.float64), frequency)
+        time = np.asarray(centres / self.rate, np.float64)
+        if isinstance(frequency, Sequence | np.ndarray):
+            return Snapshots(values, time, tuple(bins))
+        return Snapshots(values[:, 0], time, bins[0])
 
     def _snapshot_times(self) -> Float:
         if self.time is not None:

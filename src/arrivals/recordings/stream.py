@@ -9,7 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arrivals.measurements import is_missing
-from arrivals.recordings.narrowband import MAX_WINDOW, default_window, narrowband
+from arrivals.recordings.narrowband import (
+    MAX_WINDOW,
+    WindowedSpectrum,
+    check_frequency,
+    default_window,
+)
 from arrivals.trackers import Tracker
 from arrivals.trackers.run import header, text
 from arrivals.typing import Complex
@@ -34,6 +39,7 @@ def live_snapshots(
     rate: float | None = None,
     window: int | None = None,
     hop: int | None = None,
+    n_snapshots: int = 1,
 ) -> Iterator[tuple[float, Complex]]:
     """Yield the snapshots of a stream of interleaved samples as soon as they are complete.
 
@@ -54,20 +60,23 @@ def live_snapshots(
         As in `Recording.snapshots`, at the lowest frequency; not for complex frames.
     hop : int, optional
         As in `Recording.snapshots`; not for complex frames.
+    n_snapshots : int
+        Number of successive windows, or complex frames, that are yielded together.
 
     Yields
     ------
     float
-        Centre of the window, s from the first sample; the number of the step for complex frames
+        Centre of the windows, s from the first sample; numbers of frames for complex frames
         without a rate.
-    ndarray, shape (n_channels,) or (n_bins, n_channels)
-        Snapshot, at each of several frequencies; NaN where a channel has no finite number.
+    ndarray, shape ([n_bins,] [n_snapshots,] n_channels)
+        Snapshots; NaN where a channel has no finite number. The first axis is there if `frequency`
+        is a sequence, the second if `n_snapshots` is above 1.
 
     Raises
     ------
     ValueError
-        If the stream ends before one window is complete, or contains no finite number; or if an
-        argument is out of range. An incomplete frame or window at the end is dropped.
+        If the stream ends before its first windows are complete, or contains no finite number; or
+        if an argument is out of range. Incomplete frames and windows at the end are dropped.
 
     Examples
     --------
@@ -81,30 +90,42 @@ def live_snapshots(
     if kind.kind == "c":
         if window is not None or hop is not None:
             raise ValueError("window and hop must be None for complex frames")
-        window, hop, half, rate = 1, 1, 0.0, 1.0 if rate is None else positive("rate", rate)
+        bins, window, hop, half, rate = (
+            [],
+            1,
+            1,
+            0.0,
+            1.0 if rate is None else positive("rate", rate),
+        )
     else:
         if rate is None or frequency is None:
             raise ValueError("real samples require a rate and a frequency, Hz")
-        lowest = frequency if isinstance(frequency, float | int) else min(frequency)
-        for each in [frequency] if isinstance(frequency, float | int) else frequency:
-            narrowband(np.empty((0, 1)), rate, each, 2, 1)  # checks both before the first read
-        window = default_window(rate, lowest) if window is None else count("window", window, 2)
+        rate = positive("rate", rate)
+        bins = [check_frequency(each, rate) for each in np.atleast_1d(frequency)]
+        window = default_window(rate, min(bins)) if window is None else count("window", window, 2)
         hop, half = window if hop is None else count("hop", hop), window / 2
     if max(window, hop) > MAX_WINDOW:
         raise ValueError(f"window and hop must be at most {MAX_WINDOW}; got {window} and {hop}")
-    any_finite = False
-    for step, block in enumerate(_windows(source, frame, window, hop)):
-        samples = np.frombuffer(block, kind).reshape(window, n_channels)
-        z = _snapshot(samples, rate, frequency, step * hop)
+    n = count("n_snapshots", n_snapshots, maximum=MAX_WINDOW // hop)
+    spectrum = WindowedSpectrum(rate, bins, window) if bins else None
+    any_finite, centre = False, ((n - 1) * hop / 2 + half) / rate
+    for step, block in enumerate(_steps(source, frame, window, hop, n)):
+        samples = np.frombuffer(block, kind).reshape(-1, n_channels)
+        first = step * n * hop
+        if spectrum is None:
+            z = _complex_frames(samples)
+        else:
+            z = spectrum.amplitudes(_scaled(samples), hop, first).swapaxes(0, 1)
+            z = z if isinstance(frequency, Sequence | np.ndarray) else z[0]
         any_finite = any_finite or bool(np.isfinite(z).any())
-        yield (step * hop + half) / rate, z
+        yield first / rate + centre, z if n > 1 else z[..., 0, :]
     if not any_finite:
         raise ValueError("no sample of the stream is finite")
 
 
-def _windows(source: BinaryIO, frame: int, window: int, hop: int) -> Iterator[bytes]:
-    """Yield the bytes of each complete window; windows are `hop` frames apart."""
-    size, step, complete = window * frame, hop * frame, False
+def _steps(source: BinaryIO, frame: int, window: int, hop: int, n: int) -> Iterator[bytes]:
+    """Yield the bytes of n successive windows, `hop` frames apart, as soon as they are complete."""
+    size, step, complete = (window + (n - 1) * hop) * frame, n * hop * frame, False
     buffer = source.read(size)
     while len(buffer) == size:
         complete = True
@@ -112,31 +133,27 @@ def _windows(source: BinaryIO, frame: int, window: int, hop: int) -> Iterator[by
         source.read(max(0, step - size))
         buffer = buffer[step:]
         buffer += source.read(size - len(buffer))
-    if not complete:
-        raise ValueError(
-            f"the stream ended after {len(buffer) // frame} frames of {frame} bytes; "
-            f"one window requires {window}"
-        )
+    if complete:
+        return
+    frames = len(buffer) // frame
+    windows = max(0, (frames - window) // hop + 1)
+    if n > 1 and windows:
+        raise ValueError(f"the stream ended after {windows} windows; one step requires {n}")
+    raise ValueError(
+        f"the stream ended after {frames} frames of {frame} bytes; one window requires {window}"
+    )
 
 
-def _snapshot(
-    samples: NDArray[Any],
-    rate: float,
-    frequency: float | Sequence[float] | None,
-    first_sample: int,
-) -> Complex:
-    """Return the snapshot of one window of raw samples."""
-    if samples.dtype.kind == "c":
-        with np.errstate(invalid="ignore"):  # signalling NaN
-            z = samples[0].astype(np.complex128)
-        return np.where(np.isfinite(z), z, complex(np.nan, np.nan))
-    if samples.dtype.kind == "i":
-        samples = samples * 2.0 ** (1 - 8 * samples.itemsize)
-    assert frequency is not None
-    if not isinstance(frequency, float | int):
-        return np.stack([_snapshot(samples, rate, each, first_sample) for each in frequency])
-    window = len(samples)
-    return np.asarray(narrowband(samples, rate, frequency, window, window, first_sample)[0])
+def _complex_frames(frames: NDArray[Any]) -> Complex:
+    """Return frames of complex numbers, NaN where one is not finite."""
+    with np.errstate(invalid="ignore"):  # signalling NaN
+        z = frames.astype(np.complex128)
+    return np.where(np.isfinite(z), z, complex(np.nan, np.nan))
+
+
+def _scaled(samples: NDArray[Any]) -> NDArray[Any]:
+    """Return integers as numbers in [-1, 1), others unchanged."""
+    return samples * 2.0 ** (1 - 8 * samples.itemsize) if samples.dtype.kind == "i" else samples
 
 
 def track_live(
