@@ -20,11 +20,13 @@ from fuzzing.judging import Call
 
 TRACK = ["track", "tow.wav", "--array", "array.toml", "--frequency", "1000", "--window", "64",
          "--tracker", "cbf", "--quiet"]  # fmt: skip
+CHOSEN = ["track", "tow.wav", "--array", "array.toml", "--quiet"]
 SOUND = ["track", "tow.wav", "--array", "array.toml", "--tracker", "interpolation_ekf",
          "--band", "100", "900", "--set", "doa=0.1", "--quiet"]  # fmt: skip
 LOCATE = ["locate", "levels.csv", "--sensors", "places.csv", "--quiet"]
 COMMANDS: dict[str, list[str]] = {
     "track": TRACK,
+    "track chosen": CHOSEN,
     "track samples": SOUND,
     "locate": LOCATE,
     "list": ["list"],
@@ -32,9 +34,10 @@ COMMANDS: dict[str, list[str]] = {
     "reproduce": ["reproduce", "nothing", "--quiet"],
 }
 OPTIONS: dict[str, tuple[str, ...]] = {
-    "track": ("--frequency", "--frequencies", "--band", "--snapshots", "--snr", "--tracker",
-              "--set", "--out", "--signals", "--rate", "--window", "--hop", "--variable",
-              "--transpose", "--dtype", "--channels", "--quiet", "--array", "--nothing"),
+    "track": ("--frequency", "--frequencies", "--band", "--snapshots", "--stride", "--snr",
+              "--tracker", "--set", "--out", "--signals", "--rate", "--window", "--hop",
+              "--variable", "--transpose", "--dtype", "--channels", "--quiet", "--array",
+              "--nothing"),
     "locate": ("--sensors", "--alpha", "--sigma-db", "--floor-db", "--power-db", "--sources",
                "--tracker", "--out", "--speed", "--q", "--power-std-db", "--r-min", "--nothing"),
 }  # fmt: skip
@@ -83,7 +86,7 @@ def calls(kind: str, rng: np.random.Generator) -> Iterator[Call]:
         value = str(rng.choice(VALUES))
         if chance < 0.4:
             name = kind.partition(" ")[0]
-            option = str(rng.choice(OPTIONS.get(name, ("--quiet", "--nothing"))))
+            option = str(rng.choice(OPTIONS.get(name.partition(" ")[0], ("--quiet", "--nothing"))))
             arguments += [option, value]
         elif chance < 0.75 and at < len(arguments):
             arguments[at] = value

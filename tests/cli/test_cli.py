@@ -201,13 +201,6 @@ def test_track_of_a_band_with_invalid_arguments_is_refused(
     assert not Path("t.csv").exists()
 
 
-def test_track_without_frequency_and_band_is_refused(
-    band: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["track", "band.wav", "--array", "line.toml"]) == 2
-    assert "pass --frequency, or --band" in capsys.readouterr().err
-
-
 def test_reproduce_writes_table_page_and_pictures(
     here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

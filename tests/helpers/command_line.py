@@ -36,7 +36,7 @@ def pressure(doa: Any, n_sensors: int = 8) -> Any:
 
 def track(scene: Path, *more: str, file: str = "tow.wav", array: str = "array.toml") -> list[str]:
     return ["track", str(scene / file) if file != "-" else "-", "--array", str(scene / array),
-            "--frequency", "1000", *more]  # fmt: skip
+            "--frequency", "1000", "--tracker", "svalse", *more]  # fmt: skip
 
 
 def table(text: str) -> list[dict[str, str]]:

@@ -77,15 +77,17 @@ def _add_track(commands: Any) -> None:
         "track",
         help="track directions through a recording or a stream",
         description="Track directions of arrival through a recording (WAV, npy, npz, MATLAB, "
-        "CSV), or through raw interleaved samples from standard input.",
+        "CSV), or through raw interleaved samples from standard input. Frequencies, windows and "
+        "tracker are chosen from array and recording (of a stream, its first 2 s) unless they are "
+        "given; a line on standard error says how to give what was chosen.",
         epilog="live: arecord -t raw -f S16_LE -r 48000 -c 8 | "
-        "arrivals track - --array ARRAY.toml --frequency 3000 --rate 48000",
+        "arrivals track - --array ARRAY.toml --rate 48000",
         allow_abbrev=False,
     )
     option = add.add_argument
     option("file", metavar="FILE", help="recording; - for raw samples from standard input")
     option("--array", required=True, metavar="TOML", help="array file")
-    option("--frequency", type=float, metavar="HZ", help="frequency of the snapshots")
+    option("--frequency", type=float, metavar="HZ", help="frequency of narrowband sources")
     option(
         "--frequencies",
         nargs="+",
@@ -94,9 +96,12 @@ def _add_track(commands: Any) -> None:
         help="frequencies of the bins of each step",
     )
     option("--band", nargs=2, type=float, metavar=("F1", "F2"),
-           help="Hz: bins that fill a band, or the band of a tracker of real samples")  # fmt: skip
-    option("--snapshots", type=int, default=1, metavar="N",
-           help="number of successive windows in one step (1)")  # fmt: skip
+           help="Hz: all bins of the window in a band, or the band of a tracker of real "
+                "samples")  # fmt: skip
+    option("--snapshots", type=int, metavar="N",
+           help="number of successive windows in one step (1 with --frequency)")  # fmt: skip
+    option("--stride", type=int, metavar="N",
+           help="windows between steps (those of a step: no overlap)")  # fmt: skip
     option(
         "--snr",
         type=float,
@@ -104,7 +109,9 @@ def _add_track(commands: Any) -> None:
         metavar="DB",
         help="expected signal-to-noise ratio in the band (0)",
     )
-    option("--tracker", default="svalse", metavar="NAME", help="name in `arrivals list` (svalse)")
+    option("--tracker", metavar="NAME",
+           help="name in `arrivals list` (wideband_mixture for speech and other wideband sources; "
+                "svalse for narrowband ones, as with --frequency)")  # fmt: skip
     option("--set", action="append", default=[], type=_setting, metavar="NAME=VALUE",
            help="parameter of the tracker, such as motion__p_activate=0.2; repeatable")  # fmt: skip
     option("--out", metavar="CSV", help="write the tracks file (standard output)")

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import argparse
 
-from arrivals.cli.models import takes_samples
 from arrivals.cli.outputs import Bar, check_outputs
 from arrivals.cli.track_band import track_band
 from arrivals.cli.track_snapshots import track_snapshots
 from arrivals.cli.track_sources import separates, track_sources
 from arrivals.measurement_models import SensorArray
+from arrivals.recordings.choice.assembly import takes_samples
 
 
 def track(arguments: argparse.Namespace, bar: Bar) -> None:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import argparse
 import sys
 
-from arrivals.cli.models import make_tracker, n_stream_channels
+from arrivals.cli.models import n_stream_channels, printed_warnings
 from arrivals.cli.outputs import Bar, draw, live_output, refuse, write_table
 from arrivals.measurement_models import SensorArray
+from arrivals.recordings.choice.assembly import make_tracker
 from arrivals.recordings.readers import read
 from arrivals.recordings.sample_stream import band_samples, live_samples, track_samples
 from arrivals.recordings.stream import track_live
@@ -18,10 +19,10 @@ def track_band(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -> N
     """Track by a tracker of single real samples, from a recording or a stream."""
     refuse(
         arguments,
-        ("frequency", "frequencies", "window"),
+        ("frequency", "frequencies", "window", "stride"),
         "requires snapshots, not a tracker of real samples",
     )
-    if arguments.snapshots != 1:
+    if arguments.snapshots not in (None, 1):
         raise ValueError("--snapshots requires snapshots, not a tracker of real samples")
     if arguments.file == "-":
         _track_band_stream(arguments, array, bar)
@@ -57,4 +58,5 @@ def _band_tracker(
     if rate is None:
         raise ValueError("--band requires the samples per second: pass --rate")
     measurement = band_samples(array, rate, arguments.band, arguments.snr)
-    return make_tracker(arguments.tracker, measurement, dict(arguments.set)), rate
+    with printed_warnings():
+        return make_tracker(arguments.tracker, measurement, dict(arguments.set)), rate

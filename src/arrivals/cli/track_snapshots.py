@@ -4,70 +4,108 @@ from __future__ import annotations
 
 import argparse
 import sys
+import warnings
+from collections.abc import Iterator
+from typing import BinaryIO
 
 import numpy as np
 
-from arrivals.cli.models import make_tracker, model_at, n_stream_channels, selected_frequencies
+from arrivals.cli.models import n_stream_channels, printed_warnings, require_speed
 from arrivals.cli.outputs import Bar, draw, live_output, refuse, write_table
 from arrivals.measurement_models import SensorArray
-from arrivals.recordings.framing import FramedSnapshots, frame_recording, frame_stream
+from arrivals.recordings.choice import Choice, MeanSpectrum, TrackOptions, choose
+from arrivals.recordings.choice.assembly import assembled
+from arrivals.recordings.framing import frame_stream
 from arrivals.recordings.readers import read
-from arrivals.recordings.recording import Recording
-from arrivals.recordings.stream import track_live
-from arrivals.typing import Float
-from arrivals.validation import count
+from arrivals.recordings.stream import read_ahead, track_live
+from arrivals.recordings.tracking import RecordedSteps, choice_for
+from arrivals.typing import Complex
+
+AHEAD_S = 2.0  # of a stream, on which the choice is based
 
 
 def track_snapshots(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -> None:
     """Track the snapshots of a recording or a stream."""
-    count("snapshots", arguments.snapshots)
+    require_speed(array, arguments)
+    given = arguments.frequency, arguments.frequencies, arguments.band
+    if sum(each is not None for each in given) > 1:
+        raise ValueError("pass only one of --frequency, --frequencies and --band")
+    frequencies = arguments.frequency if arguments.frequencies is None else arguments.frequencies
+    options = TrackOptions(
+        arguments.tracker, frequencies, arguments.band, arguments.window, arguments.hop,
+        arguments.snapshots, arguments.stride, dict(arguments.set),
+    )  # fmt: skip
     track = _track_stream if arguments.file == "-" else _track_file
-    track(arguments, array, bar)
+    track(arguments, array, options, bar)
 
 
-def _track_file(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -> None:
-    if arguments.band is None:  # refuse invalid arguments before the file is read
-        measurement = model_at(array, arguments, selected_frequencies(arguments, None))
-        tracker = make_tracker(arguments.tracker, measurement, dict(arguments.set))
+def _track_file(
+    arguments: argparse.Namespace, array: SensorArray, options: TrackOptions, bar: Bar
+) -> None:
+    if options.frequencies:  # refuse invalid arguments before the file is read
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            assembled(array, choose(array, np.inf, MeanSpectrum.empty(), options), None)
     refuse(arguments, ("dtype", "channels"), "requires samples from standard input")
     recording = read(arguments.file, rate=arguments.rate, variable=arguments.variable,
                      transpose=arguments.transpose, array=array, rate_required=True)  # fmt: skip
-    frequencies = selected_frequencies(arguments, recording.rate)
-    if arguments.band:
-        measurement = model_at(array, arguments, frequencies)
-        tracker = make_tracker(arguments.tracker, measurement, dict(arguments.set))
-    frames = _frames(arguments, recording, frequencies)
-    time = _finite_times(frames)
-    result = tracker.run(bar(frames.values, desc=arguments.tracker))
+    choice = choice_for(recording, options)
+    with printed_warnings():
+        measurement, tracker = assembled(array, choice, recording.rate)
+    steps = RecordedSteps(recording, choice)
+    time = steps.time if np.isfinite(steps.time).all() else None
+    _print_choice(choice, options)
+    result = tracker.run(bar(steps, desc=choice.tracker))
     result = result if time is None else result.at(time)
     write_table(result, arguments.out)
-    draw(arguments.plot, result, snapshots=frames.values, measurement=measurement, time=time)
+    if arguments.plot:
+        snapshots = steps.framed().values
+        draw(arguments.plot, result, snapshots=snapshots, measurement=measurement, time=time)
 
 
-def _frames(
-    arguments: argparse.Namespace, recording: Recording, frequencies: list[float]
-) -> FramedSnapshots:
-    frames = frame_recording(recording, frequencies, window=arguments.window, hop=arguments.hop,
-                             n_snapshots=arguments.snapshots)  # fmt: skip
-    if not np.isfinite(frames.values).any():
-        raise ValueError(f"{arguments.file}: no sample of the array's channels is finite")
-    return frames
+def _print_choice(choice: Choice, options: TrackOptions) -> None:
+    """Print what was chosen, if anything was, on standard error."""
+    complete = options.tracker and options.has_frequencies and options.snapshots
+    if choice.reason and not complete:
+        print(f"arrivals: {choice}", file=sys.stderr)
 
 
-def _finite_times(frames: FramedSnapshots) -> Float | None:
-    return frames.time if np.isfinite(frames.time).all() else None
-
-
-def _track_stream(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -> None:
-    frequencies = selected_frequencies(arguments, arguments.rate)
-    measurement = model_at(array, arguments, frequencies)
-    tracker = make_tracker(arguments.tracker, measurement, dict(arguments.set))
+def _track_stream(
+    arguments: argparse.Namespace, array: SensorArray, options: TrackOptions, bar: Bar
+) -> None:
     refuse(arguments, ("plot", "variable", "transpose"), "requires a file, not a stream")
+    n_channels = n_stream_channels(arguments.channels, array)
+    choice, source = _stream_choice(arguments, array, options, n_channels)
+    with printed_warnings():
+        _, tracker = assembled(array, choice, arguments.rate)
     snapshots = frame_stream(
-        sys.stdin.buffer, n_stream_channels(arguments.channels, array), frequencies,
-        n_snapshots=arguments.snapshots, dtype=arguments.dtype or "int16", rate=arguments.rate,
-        window=arguments.window, hop=arguments.hop,
+        source, n_channels, choice.frequencies, n_snapshots=choice.n_snapshots,
+        stride=choice.stride, dtype=arguments.dtype or "int16", rate=arguments.rate,
+        window=choice.window, hop=choice.hop,
     )  # fmt: skip
-    steps = ((time, array.select(z)) for time, z in snapshots)
+
+    def steps() -> Iterator[tuple[float, Complex]]:
+        for i, (time, z) in enumerate(snapshots):
+            if i == 0:  # the arguments are valid
+                _print_choice(choice, options)
+            yield time, array.select(z)
+
     with live_output(arguments.out) as write:
-        track_live(tracker, bar(steps, desc=arguments.tracker), write)
+        track_live(tracker, bar(steps(), desc=choice.tracker), write)
+
+
+def _stream_choice(
+    arguments: argparse.Namespace, array: SensorArray, options: TrackOptions, n_channels: int
+) -> tuple[Choice, BinaryIO]:
+    """Return the choice for a stream, from its first samples if necessary, and the stream."""
+    source, rate, dtype = sys.stdin.buffer, arguments.rate, arguments.dtype or "int16"
+    if dtype.startswith("complex"):
+        return choose(array, rate, None, options), source
+    spectrum = MeanSpectrum.empty()
+    choice = choose(array, rate, spectrum, options)  # refuses before the first read
+    if options.has_frequencies:
+        return choice, source
+    samples, source = read_ahead(source, n_channels, AHEAD_S, dtype=dtype, rate=rate)
+    if len(samples):
+        spectrum = MeanSpectrum.of(array.select(samples), rate)
+    return choose(array, rate, spectrum, options), source

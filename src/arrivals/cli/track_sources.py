@@ -30,11 +30,12 @@ def separates(arguments: argparse.Namespace) -> bool:
     ValueError
         If signals are requested of another tracker, or of a stream.
     """
-    estimates_signals = issubclass(find(arguments.tracker), ARKalmanQRDRLS)
+    name = arguments.tracker
+    estimates_signals = name is not None and issubclass(find(name), ARKalmanQRDRLS)
     if arguments.signals and arguments.file == "-":
         raise ValueError("--signals requires a file, not a stream")
     if arguments.signals and not estimates_signals:
-        raise ValueError(f"--signals: the tracker {arguments.tracker!r} estimates no signals")
+        raise ValueError(f"--signals: the tracker {name or 'svalse'!r} estimates no signals")
     return estimates_signals and arguments.file != "-"
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, BinaryIO
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from arrivals.recordings.narrowband import default_window
 from arrivals.recordings.recording import Recording
@@ -23,7 +24,8 @@ class FramedSnapshots:
     Parameters
     ----------
     values : ndarray, shape (n_steps, n_bins, n_snapshots, n_channels)
-        Without the axes of length one in the middle, as in `ArraySnapshot.shape`.
+        Without the axes of length one in the middle, as in `ArraySnapshot.shape`; a view that is
+        not writeable where steps overlap.
     time : ndarray, shape (n_steps,)
         Centre of each step, s; NaN if unknown.
     """
@@ -40,6 +42,8 @@ def frame_recording(
     hop: int | None = None,
     n_snapshots: int = 1,
     stride: int | None = None,
+    start: int = 0,
+    stop: int | None = None,
 ) -> FramedSnapshots:
     """Return snapshots of a recording at several frequencies, several windows per step.
 
@@ -57,6 +61,8 @@ def frame_recording(
         Number of successive windows in one step.
     stride : int, optional
         Windows between steps; by default steps do not overlap.
+    start, stop : int
+        As in `Recording.snapshots`.
 
     Returns
     -------
@@ -76,16 +82,20 @@ def frame_recording(
     >>> frames.values.shape, abs(frames.values[0, :, 0, 0]).round(2), frames.time
     ((2, 2, 4, 3), array([1., 0.]), array([1., 3.]))
     """
-    snapshots = recording.snapshots(list(frequencies), window=window, hop=hop)
+    snapshots = recording.snapshots(
+        list(frequencies), window=window, hop=hop, start=start, stop=stop
+    )
     values, time = snapshots.values, snapshots.time
     values = values[:, None] if recording.is_narrowband else values
     n, every = count("n_snapshots", n_snapshots), n_snapshots if stride is None else stride
     n_steps = (len(values) - n) // count("stride", every) + 1
     if n_steps < 1:
         raise ValueError(f"the recording has {len(values)} snapshots; one step requires {n}")
-    rows = every * np.arange(n_steps)[:, None] + np.arange(n)
-    steps = np.swapaxes(values[rows], 1, 2)  # (n_steps, n_bins, n_snapshots, n_channels)
-    return FramedSnapshots(_squeeze(steps), np.asarray(time[rows].mean(axis=1)))
+    overlap = every < n
+    rows = sliding_window_view(values, n, axis=0, writeable=not overlap)[::every]
+    steps = np.moveaxis(rows, -1, 2)  # (n_steps, n_bins, n_snapshots, n_channels)
+    centres = sliding_window_view(time, n)[::every].mean(axis=1)
+    return FramedSnapshots(_squeeze(steps), np.asarray(centres))
 
 
 def _squeeze(steps: Complex) -> Complex:
@@ -137,6 +147,7 @@ def frame_stream(
     frequencies: Sequence[float],
     *,
     n_snapshots: int = 1,
+    stride: int | None = None,
     **live: Any,
 ) -> Iterator[tuple[float, Complex]]:
     """Yield the snapshots of each step of a stream as soon as it is complete.
@@ -151,6 +162,8 @@ def frame_stream(
         Frequencies, Hz.
     n_snapshots : int
         Number of successive windows in one step; an incomplete last step is dropped.
+    stride : int, optional
+        Windows between steps; by default steps do not overlap.
     **live : object
         Other arguments of `live_snapshots`.
 
@@ -163,5 +176,28 @@ def frame_stream(
     """
     if len(frequencies) > 1 and np.dtype(live.get("dtype", "int16")).kind == "c":
         raise ValueError("frequencies must be one for a stream of complex frames")
-    at = list(frequencies) if len(frequencies) > 1 else frequencies[0]
-    yield from live_snapshots(source, n_channels, frequency=at, n_snapshots=n_snapshots, **live)
+    n = count("n_snapshots", n_snapshots)
+    every = n if stride is None else count("stride", stride)
+    at_once = math.gcd(n, every)  # windows
+    windows: list[Complex] = []
+    times: list[float] = []
+    n_steps, skip = 0, 0
+    blocks = live_snapshots(source, n_channels, frequency=list(frequencies), n_snapshots=at_once,
+                            **live)  # fmt: skip
+    for time, z in blocks:
+        if skip:  # windows between steps that are farther apart than they are long
+            skip -= at_once
+            continue
+        windows.append(z.reshape(len(frequencies), at_once, n_channels))
+        times.append(time)
+        if len(windows) * at_once < n:
+            continue
+        n_steps += 1
+        yield float(np.mean(times)), _squeeze(np.concatenate(windows, axis=1))
+        done = every // at_once
+        skip = at_once * max(0, done - len(windows))
+        windows, times = windows[done:], times[done:]
+    if not n_steps:
+        raise ValueError(
+            f"the stream ended after {len(windows) * at_once} windows; one step requires {n}"
+        )

@@ -118,6 +118,7 @@ class Recording:
         window: int | None = None,
         hop: int | None = None,
         start: int = 0,
+        stop: int | None = None,
     ) -> Snapshots:
         """Return narrowband snapshots at one frequency, or at several.
 
@@ -131,9 +132,9 @@ class Recording:
         hop : int, optional
             Samples between windows. By default windows do not overlap, so that the noise of two
             snapshots is independent.
-        start : int
-            First sample (or complex snapshot). Phases and times refer to the first sample of the
-            recording.
+        start, stop : int
+            First sample (or complex snapshot) and the one after the last; the end if None. Phases
+            and times refer to the first sample of the recording.
 
         Returns
         -------
@@ -155,9 +156,9 @@ class Recording:
                 raise ValueError("window and hop must be None for a recording of complex snapshots")
             if start >= len(self.samples):
                 raise ValueError(f"start must be below {len(self.samples)}; got {start}")
-            values = np.asarray(self.samples[start:], complex)
+            values = np.asarray(self.samples[start:stop], complex)
             known = given[0] if np.ndim(given) else given
-            return Snapshots(values, self._snapshot_times()[start:], known)
+            return Snapshots(values, self._snapshot_times()[start:stop], known)
         if self.rate is None:
             raise ValueError("a frequency requires the rate of the recording: pass rate= in Hz")
         if frequency is None:
@@ -167,7 +168,7 @@ class Recording:
         hop = hop if hop is not None else window
         self._check_length(count("window", window, 2), start)
         spectrum = WindowedSpectrum(self.rate, bins, window)
-        values = spectrum.amplitudes(self.samples[start:], hop, start)
+        values = spectrum.amplitudes(self.samples[start:stop], hop, start)
         centres = start + hop * np.arange(len(values)) + window / 2
         time = np.asarray(centres / self.rate, np.float64)
         if isinstance(frequency, Sequence | np.ndarray):

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Any, BinaryIO
+from io import BytesIO
+from typing import Any, BinaryIO, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from arrivals.recordings.narrowband import (
 )
 from arrivals.trackers import Tracker
 from arrivals.trackers.run import header, text
-from arrivals.typing import Complex
+from arrivals.typing import Complex, Float
 from arrivals.validation import count, one_of, positive
 
 DTYPES = {
@@ -137,7 +138,7 @@ def _steps(source: BinaryIO, frame: int, window: int, hop: int, n: int) -> Itera
         return
     frames = len(buffer) // frame
     windows = max(0, (frames - window) // hop + 1)
-    if n > 1 and windows:
+    if windows:
         raise ValueError(f"the stream ended after {windows} windows; one step requires {n}")
     raise ValueError(
         f"the stream ended after {frames} frames of {frame} bytes; one window requires {window}"
@@ -154,6 +155,60 @@ def _complex_frames(frames: NDArray[Any]) -> Complex:
 def _scaled(samples: NDArray[Any]) -> NDArray[Any]:
     """Return integers as numbers in [-1, 1), others unchanged."""
     return samples * 2.0 ** (1 - 8 * samples.itemsize) if samples.dtype.kind == "i" else samples
+
+
+def read_ahead(
+    source: BinaryIO, n_channels: int, duration: float, *, dtype: str = "int16", rate: float
+) -> tuple[Float, BinaryIO]:
+    """Return the first samples of a stream, and a source that begins with them.
+
+    Parameters
+    ----------
+    source : binary file
+        As in `live_snapshots`.
+    n_channels : int
+        Number of channels.
+    duration : float
+        Length of what is read, s; less if the stream ends before.
+    dtype : str
+        As in `live_snapshots`, real.
+    rate : float
+        Frames per second, Hz.
+
+    Returns
+    -------
+    samples : ndarray, shape (n_samples, n_channels)
+    source : binary file
+        The whole stream.
+
+    Examples
+    --------
+    >>> import io
+    >>> raw = np.arange(6, dtype="<f4").tobytes()
+    >>> samples, source = read_ahead(io.BytesIO(raw), 2, 1.0, dtype="float32", rate=2.0)
+    >>> samples.tolist(), source.read(100) == raw
+    ([[0.0, 1.0], [2.0, 3.0]], True)
+    """
+    kind = np.dtype(DTYPES[one_of("dtype", dtype, tuple(DTYPES))])
+    frame = kind.itemsize * count("n_channels", n_channels)
+    head = source.read(
+        int(np.ceil(positive("duration", duration) * positive("rate", rate))) * frame
+    )
+    whole = len(head) // frame * frame
+    samples = _scaled(np.frombuffer(head[:whole], kind).reshape(-1, n_channels))
+    return samples.astype(np.float64), cast(BinaryIO, _Replay(head, source))
+
+
+class _Replay:
+    """Bytes that were read before, followed by the rest of their source."""
+
+    def __init__(self, head: bytes, source: BinaryIO) -> None:
+        self._head, self._source = BytesIO(head), source
+
+    def read(self, size: int) -> bytes:
+        """Return the next bytes."""
+        block = self._head.read(size)
+        return block if len(block) == size else block + self._source.read(size - len(block))
 
 
 def track_live(

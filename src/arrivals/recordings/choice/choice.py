@@ -1,0 +1,122 @@
+"""Records: what is given, and what is chosen for a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from arrivals.validation import count, items, positive
+
+
+@dataclass(frozen=True, eq=False)
+class TrackOptions:
+    """Arguments of `arrivals.track` that are given; None for what is to be chosen.
+
+    Parameters
+    ----------
+    tracker : str, optional
+        Registered name.
+    frequencies : float or sequence of float, optional
+        Frequencies, Hz.
+    band : (float, float), optional
+        Edges, Hz, in place of frequencies: all bins of the window between them.
+    window, hop, snapshots, stride : int, optional
+        Samples of a window and between windows; windows in a step and between steps.
+    settings : mapping of str to object
+        Parameters of the tracker, as in `set_params`.
+
+    Examples
+    --------
+    >>> TrackOptions(frequencies=440).frequencies
+    (440.0,)
+    """
+
+    tracker: str | None = None
+    frequencies: float | Sequence[float] | None = None
+    band: Sequence[float] | None = None
+    window: int | None = None
+    hop: int | None = None
+    snapshots: int | None = None
+    stride: int | None = None
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.frequencies is not None and self.band is not None:
+            raise ValueError("pass only one of frequencies and band")
+        if self.frequencies is not None:
+            given: Any = self.frequencies
+            several = items("frequencies", given) if isinstance(given, Iterable) else [given]
+            bins = tuple(positive("frequency", each) for each in several)
+            if not bins:
+                raise ValueError("frequencies must have at least one; got none")
+            object.__setattr__(self, "frequencies", bins)
+        if self.band is not None and len(self.band) != 2:
+            raise ValueError(f"band must have two edges, Hz; got {len(self.band)} numbers")
+        for name, least in (("window", 2), ("hop", 1), ("snapshots", 1), ("stride", 1)):
+            if getattr(self, name) is not None:
+                count(name, getattr(self, name), least)
+
+    @property
+    def has_frequencies(self) -> bool:
+        """True if frequencies or a band are given."""
+        return self.frequencies is not None or self.band is not None
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Frequencies, windows and tracker of a recording.
+
+    Parameters
+    ----------
+    reason : str
+        What the recording is; empty if nothing of weight was left to choose.
+    tracker : str
+        Registered name.
+    frequencies : tuple of float
+        Frequencies of the bins, Hz.
+    band : (float, float), optional
+        Edges, Hz, if the frequencies are all bins of the window between them.
+    window, hop : int, optional
+        As in `Recording.snapshots`.
+    n_snapshots, stride : int
+        Windows in a step and, if steps overlap, between steps.
+    settings : mapping of str to object
+        Parameters of the tracker.
+
+    Examples
+    --------
+    >>> choice = Choice("a tone", "svalse", (440.0,), window=1024, n_snapshots=4)
+    >>> print(choice)
+    a tone: --tracker svalse --frequencies 440 --window 1024 --snapshots 4
+    """
+
+    reason: str
+    tracker: str
+    frequencies: tuple[float, ...]
+    band: tuple[float, float] | None = None
+    window: int | None = None
+    hop: int | None = None
+    n_snapshots: int = 1
+    stride: int | None = None
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        words = [f"--tracker {self.tracker}"]
+        if self.band is None:
+            words.append(f"--frequencies {_numbers(self.frequencies)}")
+        else:
+            words.append(f"--band {_numbers(self.band)}")
+        framing = {"window": self.window, "hop": self.hop, "snapshots": self.n_snapshots}
+        framing |= {"stride": self.stride}
+        words += [f"--{name} {value}" for name, value in framing.items() if value is not None]
+        words += [f"--set {name}={_text(value)}" for name, value in self.settings.items()]
+        return f"{self.reason}: {' '.join(words)}"
+
+
+def _text(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _numbers(values: Iterable[float]) -> str:
+    return " ".join(f"{each:.9g}" for each in values)

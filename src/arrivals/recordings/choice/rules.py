@@ -1,0 +1,196 @@
+"""Rules that choose frequencies, windows and tracker from array, rate and spectrum."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from arrivals.measurement_models import SensorArray
+from arrivals.recordings.choice.choice import Choice, TrackOptions
+from arrivals.recordings.choice.limits import STEP_S, BandLimits, power_of_two
+from arrivals.recordings.choice.spectrum import MeanSpectrum
+from arrivals.recordings.framing import frequencies_in
+from arrivals.recordings.narrowband import default_window
+from arrivals.typing import Float
+
+WIDEBAND, NARROWBAND = "wideband_mixture", "svalse"
+N_SNAPSHOTS = 4  # half-overlapping windows in a step of wideband sources below speech
+LINE_SNAPSHOTS, LINE_WINDOWS = 2, 4  # in a step of lines; their length in default windows
+NEIGHBOURS = 4  # bins of a Hann window that count as one
+LEAST_BINS = 8  # of a mixture over bins
+STRIDE_S = 0.048  # between steps of speech, which overlap
+SHORTEST_STEP_S, STEPS = 0.005, 20  # of complex snapshots
+POWER_FLOOR, MAX_SNR_DB = 3.0, 20.0  # of svalse on recorded data
+
+
+def choose(
+    array: SensorArray,
+    rate: float | None,
+    spectrum: MeanSpectrum | None,
+    options: TrackOptions | None = None,
+    n_samples: int | None = None,
+) -> Choice:
+    """Return what is given, completed by what fits the array and the recording.
+
+    Parameters
+    ----------
+    array : SensorArray
+        The array.
+    rate : float or None
+        Rows of the recording per second, Hz.
+    spectrum : MeanSpectrum or None
+        Spectrum of real samples; None for complex snapshots.
+    options : TrackOptions, optional
+        What is given.
+    n_samples : int, optional
+        Rows of the recording, if known.
+
+    Returns
+    -------
+    Choice
+        Complete.
+
+    Raises
+    ------
+    ValueError
+        If no frequency is usable, or one is required: complex snapshots do not contain theirs.
+
+    Notes
+    -----
+    Without frequencies and band, real samples of a recording
+
+    - with lines are tracked at these by `svalse`, 2 long windows a step;
+    - without, by `wideband_mixture` at all bins of `BandLimits`: windows of 32 ms, every 16 ms,
+      steps of 128 ms, every 48 ms;
+    - below the frequencies of speech by `svalse` at all bins, in windows of three periods of the
+      lowest.
+
+    `svalse` gets settings for recorded data then: snapshots of a step and neighbouring bins are
+    tempered, weak sources are left out, and deviations from plane waves count as noise. With
+    frequencies, or a band and a tracker other than `wideband_mixture`, nothing else is changed:
+    one window a step without overlap.
+
+    Examples
+    --------
+    >>> array = SensorArray.uca(8, radius=0.046, speed=343.0)
+    >>> quiet = MeanSpectrum(np.arange(1.0, 8000.0, 4.0), *np.ones((2, 2000)))
+    >>> print(choose(array, 16000.0, quiet))  # doctest: +ELLIPSIS
+    wideband sources, 224 bins: --tracker wideband_mixture --band 300 7306.81 --window 512 ...
+    """
+    options = TrackOptions() if options is None else options
+    if spectrum is None:
+        return _of_snapshots(rate, options, n_samples)
+    if rate is None:
+        raise ValueError("real samples require a rate: pass their number per second, rate (--rate)")
+    if options.frequencies is not None:
+        return _of_frequencies(array, options)
+    if options.band is not None:
+        limits, lines = BandLimits.given(options.band, rate), np.zeros(0)
+        if options.tracker not in (None, WIDEBAND):
+            return _of_given_band(rate, options)
+    else:
+        limits = BandLimits.of(array, rate)
+        lines = spectrum.lines(limits.low, limits.high)
+    if len(lines) and options.tracker != WIDEBAND:
+        choice = _of_lines(lines, rate, options, n_samples)
+    else:
+        choice = _of_band(limits, rate, options)
+    snr_db = spectrum.snr_db(choice.frequencies, limits.low, limits.high)
+    return _completed(choice, options, snr_db)
+
+
+def _of_snapshots(rate: float | None, options: TrackOptions, n_samples: int | None) -> Choice:
+    """Choose the number of complex snapshots in a step: one, or several at a high rate."""
+    if options.band is not None:
+        raise ValueError("a band requires real samples; got complex snapshots: pass a frequency")
+    if options.frequencies is None:
+        raise ValueError("complex snapshots require their frequency, Hz: pass --frequency")
+    if options.tracker is not None or options.snapshots is not None or rate is None:
+        return _as_given("", options, _bins(options))
+    step = STEP_S if n_samples is None else min(STEP_S, n_samples / rate / STEPS)
+    n = int(max(step, SHORTEST_STEP_S) * rate)
+    if n < 2:
+        return _as_given("complex snapshots", options, _bins(options))
+    settings = _recorded(n) | dict(options.settings)
+    return Choice(f"complex snapshots, {n} a step", NARROWBAND, _bins(options), n_snapshots=n,
+                  stride=options.stride, settings=settings)  # fmt: skip
+
+
+def _bins(options: TrackOptions) -> tuple[float, ...]:
+    return options.frequencies if isinstance(options.frequencies, tuple) else ()
+
+
+def _of_frequencies(array: SensorArray, options: TrackOptions) -> Choice:
+    """Take frequencies as they are given."""
+    n = len(_bins(options))
+    noun = "this frequency" if n == 1 else f"these {n} frequencies"
+    reason = f"narrowband sources, {noun} alone (wideband ones, such as speech, need none)"
+    reason = "" if options.tracker else reason
+    return _as_given(reason, options, _bins(options))
+
+
+def _of_given_band(rate: float, options: TrackOptions) -> Choice:
+    """Take all bins of the given band, and the given tracker."""
+    frequencies = tuple(frequencies_in(options.band or (), rate, options.window))
+    noun = "1 bin" if len(frequencies) == 1 else f"{len(frequencies)} bins together"
+    hint = "" if options.snapshots else f" (speech: --tracker {WIDEBAND})"
+    return _as_given(f"{options.tracker} at {noun}{hint}", options, frequencies)
+
+
+def _as_given(reason: str, options: TrackOptions, frequencies: tuple[float, ...]) -> Choice:
+    band = None if options.band is None else (float(options.band[0]), float(options.band[1]))
+    tracker, n = options.tracker or NARROWBAND, options.snapshots or 1
+    framing = options.window, options.hop, n, options.stride
+    return Choice(reason, tracker, frequencies, band, *framing, dict(options.settings))
+
+
+def _of_lines(lines: Float, rate: float, options: TrackOptions, n_samples: int | None) -> Choice:
+    """Choose windows that resolve the lines, and that the recording has."""
+    frequencies = tuple(float(f"{each:.6g}") for each in lines)
+    apart = float(np.diff(lines).min()) if len(lines) > 1 else np.inf
+    wanted = max(LINE_WINDOWS * default_window(rate, min(frequencies)), 4 * rate / apart)
+    window = 2 ** math.ceil(math.log2(wanted))
+    if n_samples is not None:
+        window = min(window, 2 ** int(math.log2(max(4, n_samples / 8))))
+    noun = "one spectral line" if len(lines) == 1 else f"{len(lines)} spectral lines"
+    tracker = options.tracker or NARROWBAND
+    return Choice(noun, tracker, frequencies, None, window, None, LINE_SNAPSHOTS)
+
+
+def _of_band(limits: BandLimits, rate: float, options: TrackOptions) -> Choice:
+    """Choose windows and tracker for all bins of a band."""
+    window = options.window or power_of_two(limits.window_duration * rate)
+    band = (float(f"{limits.low:.6g}"), float(f"{limits.high:.6g}"))
+    frequencies = tuple(frequencies_in(band, rate, window))
+    is_speech = limits.has_speech and len(frequencies) >= LEAST_BINS
+    tracker = options.tracker or (WIDEBAND if is_speech else NARROWBAND)
+    hop = options.hop or window // 2
+    n = max(1, round(STEP_S * rate / hop)) if tracker == WIDEBAND else N_SNAPSHOTS
+    reason = f"wideband sources, {len(frequencies)} bins"
+    overlaps = tracker == WIDEBAND and options.snapshots is None
+    stride = min(n, max(1, round(STRIDE_S * rate / hop))) if overlaps else None
+    return Choice(reason, tracker, frequencies, band, window, hop, n, stride)
+
+
+def _completed(choice: Choice, options: TrackOptions, snr_db: float) -> Choice:
+    """Return a choice with what is given, and settings for recorded data if svalse is chosen."""
+    window, n = options.window or choice.window or 2, options.snapshots or choice.n_snapshots
+    settings: dict[str, Any] = dict(options.settings)
+    if options.tracker is None and choice.tracker == NARROWBAND:
+        alike = n if choice.band is None else NEIGHBOURS * n
+        settings = _recorded(alike, snr_db) | settings
+    hop = options.hop or choice.hop or window // 2
+    stride = options.stride or choice.stride
+    return replace(choice, window=window, hop=hop, n_snapshots=n, stride=stride, settings=settings)
+
+
+def _recorded(n: int, snr_db: float = MAX_SNR_DB) -> dict[str, Any]:
+    """Return settings of svalse for recorded data, of which n snapshots count as one."""
+    return {
+        "solver__tempering": float(n),
+        "solver__power_floor": POWER_FLOOR,
+        "solver__max_snr_db": snr_db,
+    }

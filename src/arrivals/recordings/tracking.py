@@ -1,0 +1,234 @@
+"""Track directions through a recording, with whatever is not given chosen from it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from arrivals.measurement_models import SensorArray
+from arrivals.recordings.choice import Choice, MeanSpectrum, TrackOptions, choose
+from arrivals.recordings.choice.assembly import assembled, make_tracker, takes_samples
+from arrivals.recordings.framing import FramedSnapshots, frame_recording
+from arrivals.recordings.narrowband import check_frequency, default_window
+from arrivals.recordings.readers import read
+from arrivals.recordings.recording import Recording
+from arrivals.recordings.sample_stream import band_samples, track_samples
+from arrivals.trackers.run import Run
+from arrivals.typing import Complex
+
+BLOCK = 2**22  # complex numbers of the steps that are computed together: 64 MB
+READING = ("rate", "variable", "transpose", "max_bytes")  # arguments of `read`
+
+
+def track(
+    recording: str | PathLike[str] | Recording | ArrayLike,
+    array: str | PathLike[str] | SensorArray | None = None,
+    *,
+    tracker: str | None = None,
+    frequencies: float | Sequence[float] | None = None,
+    band: Sequence[float] | None = None,
+    window: int | None = None,
+    hop: int | None = None,
+    snapshots: int | None = None,
+    **more: Any,
+) -> Run:
+    """Track directions of arrival through a recording.
+
+    Whatever is not given is chosen from the array and the recording, as `choose` says: talkers and
+    other wideband sources are tracked by `wideband_mixture` at all usable bins, in steps of 128 ms;
+    spectral lines, and sources below the frequencies of speech, by `svalse`.
+
+    Parameters
+    ----------
+    recording : str, path, Recording or array_like
+        File (as in `read`), recording, or samples (n_samples, n_channels), which require `rate`.
+    array : str, path or SensorArray, optional
+        Array file, or array; that of the recording if None.
+    tracker : str, optional
+        Registered name; see `arrivals.trackers.available()`.
+    frequencies : float or sequence of float, optional
+        Frequencies, Hz.
+    band : (float, float), optional
+        Edges, Hz, in place of frequencies: all bins of the window between them.
+    window, hop : int, optional
+        Samples of a window, and between windows.
+    snapshots : int, optional
+        Windows in a step.
+    **more : object
+        `rate`, `variable`, `transpose` and `max_bytes` of `read`; `stride`, windows between steps,
+        which do not overlap without; other names are parameters of the tracker, as in `set_params`.
+
+    Returns
+    -------
+    Run
+        Estimates over time; times in s from the first sample.
+
+    Raises
+    ------
+    ValueError, TypeError, OSError
+        If an argument or a file is invalid, there is no array, or no frequency is usable.
+
+    Examples
+    --------
+    >>> array = SensorArray.ula(6, spacing=0.08, speed=343.0)
+    >>> t = np.arange(8000)[:, None] / 8000
+    >>> delay = array.positions[:, 0] * np.sin(0.3) / 343.0
+    >>> noise = 0.1 * np.random.default_rng(0).standard_normal((8000, 6))
+    >>> run = track(np.cos(2 * np.pi * 1500 * (t + delay)) + noise, array, rate=8000)
+    >>> float(np.nanmedian(run.doa).round(2)), run.time[:2]
+    (0.3, array([0.048, 0.112]))
+    """
+    from threadpoolctl import threadpool_limits
+
+    reading = {name: more.pop(name) for name in READING if name in more}
+    stride = more.pop("stride", None)
+    options = TrackOptions(tracker, frequencies, band, window, hop, snapshots, stride, more)
+    recording = _recording(recording, array, reading)
+    if band is not None and takes_samples(tracker):
+        return _track_band(recording, options)
+    choice = choice_for(recording, options)
+    _, made = assembled(_array_of(recording), choice, recording.rate)
+    steps = RecordedSteps(recording, choice)
+    with threadpool_limits(1, "blas"):  # matrices are small: more threads only wait
+        run = made.run(steps)
+    return run.at(steps.time) if np.isfinite(steps.time).all() else run
+
+
+def _track_band(recording: Recording, options: TrackOptions) -> Run:
+    """Track by a tracker of single real samples."""
+    array, rate = _array_of(recording), recording.rate
+    if recording.is_narrowband or rate is None or options.band is None:
+        raise ValueError("a band requires real samples with a rate")
+    measurement = band_samples(array, rate, options.band)
+    made = make_tracker(options.tracker or "", measurement, options.settings)
+    return track_samples(made, recording.samples, rate, every=options.hop or 1)
+
+
+def choice_for(recording: Recording, options: TrackOptions | None = None) -> Choice:
+    """Return the choice for a recording that carries its array.
+
+    Parameters
+    ----------
+    recording : Recording
+        With `array`.
+    options : TrackOptions, optional
+        What is given.
+
+    Returns
+    -------
+    Choice
+        Its text is a line that says what was chosen, as options of `arrivals track`.
+
+    Examples
+    --------
+    >>> array = SensorArray.uca(6, radius=0.04, speed=343.0)
+    >>> noise = np.random.default_rng(0).standard_normal((16000, 6))
+    >>> choice = choice_for(Recording(noise, 16000.0, array=array))
+    >>> choice.tracker, choice.window, choice.n_snapshots, len(choice.frequencies)
+    ('wideband_mixture', 512, 8, 196)
+    """
+    array, rate = _array_of(recording), recording.rate
+    options = options or TrackOptions()
+    if recording.is_narrowband:
+        spectrum = None
+    elif options.has_frequencies or rate is None:
+        spectrum = MeanSpectrum.empty()
+    else:
+        spectrum = MeanSpectrum.of(recording.samples, rate)
+    return choose(array, rate, spectrum, options, len(recording.samples))
+
+
+class RecordedSteps:
+    """Snapshots of the steps of a recording, computed in blocks as they are iterated over.
+
+    Parameters
+    ----------
+    recording : Recording
+        The recording.
+    choice : Choice
+        What is chosen for it.
+
+    Raises
+    ------
+    ValueError
+        If the recording is shorter than a step; after the last step, if no sample was finite.
+
+    Examples
+    --------
+    >>> choice = Choice("noise", "svalse", (100.0, 200.0), window=100, hop=50, n_snapshots=4)
+    >>> steps = RecordedSteps(Recording(np.ones((1000, 3)), 1000.0), choice)
+    >>> len(steps), next(iter(steps)).shape, steps.time
+    (4, (2, 4, 3), array([0.125, 0.325, 0.525, 0.725]))
+    """
+
+    def __init__(self, recording: Recording, choice: Choice) -> None:
+        self._recording, self._choice = recording, choice
+        self._every = choice.stride or choice.n_snapshots
+        self._window = self._hop = 1
+        if not recording.is_narrowband and recording.rate is not None:
+            lowest = check_frequency(min(choice.frequencies), recording.rate)
+            self._window = choice.window or default_window(recording.rate, lowest)
+            self._hop = choice.hop or self._window
+        n_windows = (len(recording.samples) - self._window) // self._hop + 1
+        self._n_steps = max(0, (n_windows - choice.n_snapshots) // self._every + 1)
+        first = self._part(0, 1)  # refuses invalid arguments
+        if not np.isfinite(first.time).all():
+            self.time = np.full(self._n_steps, np.nan)
+        elif recording.time is not None or recording.is_narrowband:
+            self.time = self.framed().time
+        else:
+            at = np.arange(self._n_steps) * (self._every * self._hop / (recording.rate or 1.0))
+            self.time = np.asarray(first.time[0] + at)
+
+    def __len__(self) -> int:
+        return self._n_steps
+
+    def __iter__(self) -> Iterator[Complex]:
+        any_finite = False
+        size = self._choice.n_snapshots * len(self._choice.frequencies)
+        n = max(1, BLOCK // (size * self._recording.n_channels))
+        for first in range(0, self._n_steps, n):
+            values = self._part(first, min(n, self._n_steps - first)).values
+            any_finite = any_finite or bool(np.isfinite(values).any())
+            yield from values
+        if not any_finite:
+            raise ValueError("no sample of the array's channels is finite")
+
+    def framed(self) -> FramedSnapshots:
+        """Return all steps at once."""
+        return self._part(0, max(1, self._n_steps))
+
+    def _part(self, first: int, n_steps: int) -> FramedSnapshots:
+        choice, start = self._choice, first * self._every * self._hop
+        n_windows = (n_steps - 1) * self._every + choice.n_snapshots
+        return frame_recording(
+            self._recording, choice.frequencies, window=choice.window, hop=choice.hop,
+            n_snapshots=choice.n_snapshots, stride=choice.stride, start=start,
+            stop=start + (n_windows - 1) * self._hop + self._window,
+        )  # fmt: skip
+
+
+def _recording(recording: Any, array: Any, reading: dict[str, Any]) -> Recording:
+    """Return a recording of the sensors of an array."""
+    if array is not None and not isinstance(array, SensorArray):
+        array = SensorArray.from_toml(array)
+    if not isinstance(recording, Recording):
+        if array is None:
+            raise ValueError("array must be an array file or a SensorArray; got None")
+        return read(recording, array=array, rate_required=True, **reading)
+    if reading:
+        raise TypeError(f"{', '.join(reading)} must be left out for a Recording, which has its own")
+    if array is None or array == recording.array:
+        return recording
+    samples = array.select(recording.samples)
+    return Recording(samples, recording.rate, recording.time, array)
+
+
+def _array_of(recording: Recording) -> SensorArray:
+    if recording.array is None:
+        raise ValueError("the recording has no array: pass array, a file or a SensorArray")
+    return recording.array
