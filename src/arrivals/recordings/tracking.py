@@ -39,7 +39,7 @@ def track(
     """Track directions of arrival through a recording.
 
     Whatever is not given is chosen from the array and the recording, as `choose` says: talkers and
-    other wideband sources are tracked by `wideband_mixture` at all usable bins, in steps of 128 ms;
+    other wideband sources are tracked by `wideband_mixture` at all usable bins, in steps of 64 ms;
     spectral lines, and sources below the frequencies of speech, by `svalse`.
 
     Parameters
@@ -129,7 +129,7 @@ def choice_for(recording: Recording, options: TrackOptions | None = None) -> Cho
     >>> noise = np.random.default_rng(0).standard_normal((16000, 6))
     >>> choice = choice_for(Recording(noise, 16000.0, array=array))
     >>> choice.tracker, choice.window, choice.n_snapshots, len(choice.frequencies)
-    ('wideband_mixture', 512, 8, 196)
+    ('wideband_mixture', 512, 4, 196)
     """
     array, rate = _array_of(recording), recording.rate
     options = options or TrackOptions()

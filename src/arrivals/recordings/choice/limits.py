@@ -13,7 +13,7 @@ from arrivals.recordings.framing import frequencies_in
 from arrivals.validation import positive
 
 LOWEST_HZ = 300.0  # below, rooms have few directions and much noise
-WINDOW_S, STEP_S = 0.032, 0.128  # of speech
+WINDOW_S, SPEECH_STEP_S = 0.032, 0.064  # of speech
 PERIODS = 3.0  # least number of periods in a window
 
 

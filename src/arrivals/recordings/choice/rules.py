@@ -10,7 +10,7 @@ import numpy as np
 
 from arrivals.measurement_models import SensorArray
 from arrivals.recordings.choice.choice import Choice, TrackOptions
-from arrivals.recordings.choice.limits import STEP_S, BandLimits, power_of_two
+from arrivals.recordings.choice.limits import SPEECH_STEP_S, BandLimits, power_of_two
 from arrivals.recordings.choice.spectrum import MeanSpectrum
 from arrivals.recordings.framing import frequencies_in
 from arrivals.recordings.narrowband import default_window
@@ -21,8 +21,7 @@ N_SNAPSHOTS = 4  # half-overlapping windows in a step of wideband sources below 
 LINE_SNAPSHOTS, LINE_WINDOWS = 2, 4  # in a step of lines; their length in default windows
 NEIGHBOURS = 4  # bins of a Hann window that count as one
 LEAST_BINS = 8  # of a mixture over bins
-STRIDE_S = 0.048  # between steps of speech, which overlap
-SHORTEST_STEP_S, STEPS = 0.005, 20  # of complex snapshots
+STEP_S, SHORTEST_STEP_S, STEPS = 0.128, 0.005, 20  # of complex snapshots
 POWER_FLOOR, MAX_SNR_DB = 3.0, 20.0  # of svalse on recorded data
 
 
@@ -64,7 +63,7 @@ def choose(
 
     - with lines are tracked at these by `svalse`, 2 long windows a step;
     - without, by `wideband_mixture` at all bins of `BandLimits`: windows of 32 ms, every 16 ms,
-      steps of 128 ms, every 48 ms;
+      steps of 64 ms;
     - below the frequencies of speech by `svalse` at all bins, in windows of three periods of the
       lowest.
 
@@ -168,11 +167,9 @@ def _of_band(limits: BandLimits, rate: float, options: TrackOptions) -> Choice:
     is_speech = limits.has_speech and len(frequencies) >= LEAST_BINS
     tracker = options.tracker or (WIDEBAND if is_speech else NARROWBAND)
     hop = options.hop or window // 2
-    n = max(1, round(STEP_S * rate / hop)) if tracker == WIDEBAND else N_SNAPSHOTS
+    n = max(1, round(SPEECH_STEP_S * rate / hop)) if tracker == WIDEBAND else N_SNAPSHOTS
     reason = f"wideband sources, {len(frequencies)} bins"
-    overlaps = tracker == WIDEBAND and options.snapshots is None
-    stride = min(n, max(1, round(STRIDE_S * rate / hop))) if overlaps else None
-    return Choice(reason, tracker, frequencies, band, window, hop, n, stride)
+    return Choice(reason, tracker, frequencies, band, window, hop, n)
 
 
 def _completed(choice: Choice, options: TrackOptions, snr_db: float) -> Choice:
