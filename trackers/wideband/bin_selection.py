@@ -67,15 +67,14 @@ class BinLevels:
         """
         n = energy.shape[1]
         level = 10 * np.log10(np.maximum(energy, 10 ** (SILENCE_DB / 10)))
-        has_power = np.asarray((level > SILENCE_DB).any(axis=1))
-        quietest = np.where(has_power, level.min(axis=1) + FLOOR_OVER_MINIMUM_DB, np.inf)
+        quietest = np.where(level > SILENCE_DB, level, np.inf).min(axis=1) + FLOOR_OVER_MINIMUM_DB
         later = self.later(seconds, settings)
         floor = np.minimum(later.floor, quietest)
         fall = settings.decay * seconds / n * np.arange(1, n + 1)
         # highest level before each snapshot, as it would have been at the start of the step
         history = np.concatenate([self.peak[:, None], level + fall], axis=1)
         highest = np.fmax.accumulate(history, axis=1)
-        loud = has_power[:, None] & (level > floor[:, None] + settings.floor_db)
+        loud = level > floor[:, None] + settings.floor_db
         onset = level > highest[:, :-1] - fall + settings.onset_db
         levels = BinLevels(np.asarray(floor), np.asarray(highest[:, -1] - fall[-1]))
         return levels, np.asarray(loud), np.asarray(onset)

@@ -14,6 +14,7 @@ from arrivals.typing import Float
 
 MIN_SHARE = 1e-4  # of the background and of each source while a mixture is fitted
 MIN_DENSITY = 1e-12
+MAX_BIRTH_SHARE = 1 - 1e-6
 MAX_LOG_RATIO = 30.0  # of one bin over the mixture, for a new source
 
 
@@ -65,6 +66,7 @@ def fit(evidence: Single, prior: Float, start: Float, settings: MixtureSettings)
     n, K, q = len(evidence), len(prior), start
     share = np.full(K + 1, (1 - settings.background) / max(K, 1))
     share[0] = settings.background if K else 1.0
+    share = np.maximum(share, MIN_SHARE)
     level = np.zeros((n, K + 1))
     log_prior = np.log(prior + MIN_DENSITY)
     for _ in range(settings.iterations if K else 0):
@@ -127,7 +129,7 @@ def _birth_density(
 ) -> Float | None:
     """Return the density at which a new source starts; None if it explains too little."""
     # B(θ) = Σ_i ln(1 - c + c exp(ℓ_i(θ) - m_i)) / T
-    c = np.float32(settings.birth_share)
+    c = np.float32(min(settings.birth_share, MAX_BIRTH_SHARE))
     over = evidence - mixture.log_evidence[:, None].astype(np.float32)
     over = np.exp(np.clip(over, -MAX_LOG_RATIO, MAX_LOG_RATIO))
     gain = np.log1p(c * (over - 1)).sum(axis=0, dtype=np.float64) / settings.tempering

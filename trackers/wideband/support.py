@@ -6,13 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from arrivals.trackers.wideband.direction_grid import DirectionGrid
+from arrivals.trackers.wideband.direction_grid import SMALLEST, DirectionGrid
 from arrivals.trackers.wideband.mixture import Mixture, log_odds_gain
 from arrivals.trackers.wideband.settings import MixtureSettings
 from arrivals.trackers.wideband.tracked_sources import REPORTED, TrackedSources
 from arrivals.typing import Int
 
 UNSUPPORTED = 0.3  # existence to which that of a source of too small a share decays
+CERTAIN = 1e-4  # least distance of an updated existence from 0 and 1
 MAX_GAIN = 30.0  # of the log odds in one step
 
 
@@ -29,9 +30,10 @@ def updated(
     mixture, and of two sources that are near one is left.
     """
     gain = log_odds_gain(mixture, sources.density, settings.tempering)
-    odds = np.log(sources.existence) - np.log1p(-sources.existence)
+    predicted = np.clip(sources.existence, SMALLEST, 1 - np.finfo(float).eps)
+    odds = np.log(predicted) - np.log1p(-predicted)
     odds = odds + np.clip(gain, -settings.max_loss * seconds, MAX_GAIN)
-    existence = np.clip(1 / (1 + np.exp(-np.clip(odds, -20, 20))), 1e-4, 1 - 1e-4)
+    existence = np.clip(1 / (1 + np.exp(-np.clip(odds, -20, 20))), CERTAIN, 1 - CERTAIN)
     share = mixture.share[1:]
     decay = float(np.exp(-seconds / settings.unsupported))
     lower = np.maximum(decay * existence, np.minimum(existence, UNSUPPORTED))

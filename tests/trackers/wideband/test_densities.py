@@ -101,6 +101,17 @@ def test_bins_without_data_or_power_keep_their_levels_and_do_not_count() -> None
     assert not (loud | onset).any()
 
 
+def test_zeros_in_part_of_a_step_are_no_noise_floor() -> None:
+    """After a drop-out of one snapshot, noise would be louder than its floor for hours."""
+    energy = np.random.default_rng(1).gamma(6, size=(5, 8))
+    dropped = energy.copy()
+    dropped[:, 2] = 0.0
+    levels, loud, onset = BinLevels.empty(5).after(dropped, 0.128, SETTINGS)
+    others = np.delete(energy, 2, axis=1)
+    np.testing.assert_allclose(levels.floor, 10 * np.log10(2 * others.min(axis=1)))
+    assert not (loud | onset)[:, 2].any()
+
+
 @pytest.mark.parametrize(
     ("name", "value"),
     [("tempering", 0.0), ("iterations", 0), ("background", 1.5), ("memory", -1.0),
