@@ -85,15 +85,34 @@ class ScanResponse:
         return np.asarray(1 - 1 / (1 + self.ratio * self.norm), dtype=np.float32)
 
 
-def unit_snapshots(snapshots: Complex) -> tuple[SingleComplex, Float]:
-    """Return whitened snapshots (F, M, N) as unit vectors, (F, N, M), and energies e, (F, N)."""
+def unit_snapshots(snapshots: Complex, bins: Bool) -> tuple[SingleComplex, Float]:
+    """Return snapshots as unit vectors, and their energies.
+
+    Parameters
+    ----------
+    snapshots : ndarray of complex, shape (n_valid_bins, n_sensors, n_snapshots)
+        Whitened snapshots of the bins with data.
+    bins : ndarray of bool, shape (n_bins,)
+        Which these are.
+
+    Returns
+    -------
+    unit : ndarray of complex, shape (n_bins, n_snapshots, n_sensors)
+        z̃ / |z̃|, NaN of bins without data.
+    energy : ndarray, shape (n_bins, n_snapshots)
+        e = |z̃|², NaN of bins without data.
+    """
+    if not bins.all():
+        of_all = np.full((len(bins), *snapshots.shape[1:]), np.nan, dtype=np.complex128)
+        of_all[bins] = snapshots
+        snapshots = of_all
     z = np.swapaxes(snapshots, 1, 2)
     energy = (z.real**2 + z.imag**2).sum(axis=-1)
     size = np.sqrt(np.where(energy > 0, energy, 1.0))
     return (z / size[..., None]).astype(np.complex64), np.asarray(energy)
 
 
-@lru_cache(maxsize=16)  # one for each set of sensors and bins with valid data
+@lru_cache(maxsize=16)  # one for each set of sensors with valid data
 def scan_response(manifold: Manifold, grid: DirectionGrid, ratio: float) -> ScanResponse:
     """Return the responses of a manifold on a grid, cached.
 
@@ -138,7 +157,7 @@ def bin_evidence(response: ScanResponse, unit: SingleComplex, counted: Bool) -> 
 def mean_powers(
     at_sources: ScanResponse, unit: SingleComplex, energy: Float, loud: Bool, share: Float
 ) -> Float:
-    """Return the mean power of each source over all bins and snapshots, (K,).
+    """Return the mean power of each source over all bins and snapshots with data, (K,).
 
     Those that are loud are assigned to the sources and to diffuse sound.
 
@@ -149,7 +168,7 @@ def mean_powers(
     unit : ndarray of complex, shape (n_bins, n_snapshots, n_sensors)
         Whitened snapshots as unit vectors.
     energy : ndarray, shape (n_bins, n_snapshots)
-        e, their energies.
+        e, their energies; NaN of bins without data.
     loud : ndarray of bool, shape (n_bins, n_snapshots)
         Which are louder than the noise.
     share : ndarray, shape (K + 1,)
@@ -161,4 +180,4 @@ def mean_powers(
     r = np.exp(w - np.logaddexp.reduce(w, axis=1, keepdims=True))[:, 1:]
     # |w|² = |ã^H z̃|² / g² = s e / g
     power = s * energy[loud][:, None] / at_sources.norm[bins]
-    return np.asarray((r * power).sum(axis=0) / loud.size)
+    return np.asarray((r * power).sum(axis=0) / np.count_nonzero(~np.isnan(energy)))

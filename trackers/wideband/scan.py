@@ -8,6 +8,7 @@ import numpy as np
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.direction_measurement import DirectionMeasurement
+from arrivals.measurement_models.manifolds.manifold import Manifold
 from arrivals.trackers.wideband.direction_grid import DirectionGrid
 from arrivals.trackers.wideband.settings import MixtureSettings
 from arrivals.trackers.wideband.tracked_sources import TrackedSources
@@ -22,10 +23,10 @@ class Scan:
     ----------
     model : DirectionMeasurement
         Model whose snapshots are whitened.
+    manifold : Manifold
+        Its response.
     grid : DirectionGrid
         Directions.
-    n_bins, n_nuisance : int
-        Frequency bins, and values of an unknown slowness or elevation: 1 if there is none.
 
     Examples
     --------
@@ -37,9 +38,8 @@ class Scan:
     """
 
     model: DirectionMeasurement
+    manifold: Manifold
     grid: DirectionGrid
-    n_bins: int
-    n_nuisance: int
 
     @classmethod
     def of(cls, measurement: DirectionMeasurement, settings: MixtureSettings) -> Scan:
@@ -55,12 +55,22 @@ class Scan:
         # of a line, a direction from behind is one in front
         behind = manifold.to_doa(manifold.from_doa(np.array([0.75 * np.pi])), slack=np.inf)
         grid = DirectionGrid(bool(abs(behind[0]) <= np.pi / 2), settings.grid_step)
-        return cls(model, grid, manifold.n_bins, len(manifold.nuisance_weights))
+        return cls(model, manifold, grid)
+
+    @property
+    def n_nuisance(self) -> int:
+        """Number of values of an unknown slowness or elevation, 1 if there is none."""
+        return len(self.manifold.nuisance_weights)
 
     @property
     def n_points(self) -> int:
         """Number of points of the grid."""
         return self.n_nuisance * len(self.grid.doa)
+
+    def is_like(self, other: Scan) -> bool:
+        """Return True if levels and densities have the same bins and points in both."""
+        same_bins = self.manifold.n_bins == other.manifold.n_bins
+        return same_bins and self.grid == other.grid and self.n_nuisance == other.n_nuisance
 
     def walk(self, sources: TrackedSources, variance: float) -> TrackedSources:
         """Return the sources after a random walk of their directions."""

@@ -121,7 +121,7 @@ class WidebandMixture(DirectionTracker):
         self.scan = Scan.of(self.measurement, self.settings)
         self.scanned = self.measurement, self.settings
         self.sources = TrackedSources.none(self.scan.n_points)
-        self.levels = BinLevels.empty(self.scan.n_bins)
+        self.levels = BinLevels.empty(self.scan.manifold.n_bins)
         self.elapsed, self.gap, self.n_labels = 0.0, 0.0, 0
         self.report_none()
 
@@ -156,13 +156,11 @@ class WidebandMixture(DirectionTracker):
         observed, settings = self.scan.model.observe(z), self.settings
         if observed is None:
             return
-        response = scan_response(observed.manifold, self.scan.grid, settings.source_ratio)
-        unit, energy = unit_snapshots(observed.snapshots)
-        of_all_bins = np.full((len(observed.bins), energy.shape[1]), np.nan)
-        of_all_bins[observed.bins] = energy
+        manifold = self.scan.manifold.without(np.flatnonzero(~observed.sensors))
+        response = scan_response(manifold, self.scan.grid, settings.source_ratio)
+        unit, energy = unit_snapshots(observed.snapshots, observed.bins)
         levels = self.levels.later(self.gap, settings)
-        levels, loud, onset = levels.after(of_all_bins, self.elapsed, settings)
-        loud, onset = loud[observed.bins], onset[observed.bins]
+        levels, loud, onset = levels.after(energy, self.elapsed, settings)
         evidence = bin_evidence(response, unit, loud & onset)  # ℓ_i(θ)
         sources, power = self.sources, None
         if len(evidence) < max(settings.min_rate * self.elapsed, 1):  # a pause
@@ -185,7 +183,7 @@ class WidebandMixture(DirectionTracker):
         """Start anew where `set_params` changed the model or the grid."""
         if self.scanned != (self.measurement, self.settings):
             scan = Scan.of(self.measurement, self.settings)
-            if (scan.n_bins, scan.n_points) != (self.scan.n_bins, self.scan.n_points):
+            if not scan.is_like(self.scan):
                 self.reset()
             self.scan, self.scanned = scan, (self.measurement, self.settings)
 

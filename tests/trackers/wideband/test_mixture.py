@@ -22,6 +22,7 @@ MODEL = ArraySnapshot(
     SensorArray.uca(5, 0.3), [1.0, 1.3, 2.0], n_snapshots=4, noise_coherence="diffuse", white=0.2
 )
 SETTINGS = MixtureSettings(tempering=3.0)
+ALL_BINS = np.ones(3, dtype=np.bool_)
 
 
 def draw(seed: int = 0) -> Complex:
@@ -40,7 +41,7 @@ def test_evidence_is_the_ratio_of_two_angular_gaussians() -> None:
     observed = MODEL.observe(z)
     assert observed is not None
     response = scan_response(observed.manifold, GRID, 3.0)
-    unit, _ = unit_snapshots(observed.snapshots)
+    unit, _ = unit_snapshots(observed.snapshots, observed.bins)
     found = bin_evidence(response, unit, np.ones((3, 4), dtype=bool)).reshape(3, 4, -1)
     a = MODEL.steering_vector(GRID.doa)  # (G, F, M)
     positions = MODEL.array.positions
@@ -60,7 +61,7 @@ def test_evidence_does_not_depend_on_the_level_of_a_bin() -> None:
     level = np.random.default_rng(1).exponential(size=(3, 4, 1)) * 1e50
     response, counted = scan_response(manifold, GRID, 3.0), np.ones((3, 4), dtype=bool)
     one, other = (
-        bin_evidence(response, unit_snapshots(MODEL.observe(y).snapshots)[0], counted)  # type: ignore[union-attr]
+        bin_evidence(response, unit_snapshots(MODEL.observe(y).snapshots, ALL_BINS)[0], counted)  # type: ignore[union-attr]
         for y in (z, z * level)
     )
     np.testing.assert_allclose(one, other, atol=1e-4)
@@ -131,7 +132,7 @@ def test_power_of_a_source_is_the_mean_over_its_bins_those_of_others_included() 
     w = np.array([[3.0, 0, 0, 0], [0, 2.0, 0, 1.0], [0, 0, 0, 0]])
     z = MODEL.wave([GRID.doa[7]], w[..., None])
     Y = MODEL.manifold().steering(GRID.doa[[7]])[0, :, :, 0][:, :, None] * w[:, None]
-    unit, energy = unit_snapshots(Y)
+    unit, energy = unit_snapshots(Y, ALL_BINS)
     response = scan_response(MODEL.manifold(), GRID, 3.0).at(np.array([7]))
     power = mean_powers(response, unit, energy, energy > 0, np.array([1e-6, 1 - 1e-6]))
     assert z.shape == MODEL.shape

@@ -6,6 +6,7 @@ import pytest
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.motion_models import BernoulliVonMises
 from arrivals.trackers import MixtureSettings, Run, WidebandMixture
+from arrivals.trackers.wideband.bin_evidence import scan_response
 from arrivals.typing import Complex, Float
 
 ARRAY = SensorArray.uca(6, radius=0.046, speed=343.0)
@@ -166,6 +167,35 @@ def test_stated_deviation_and_existence_cover_the_errors() -> None:
 def test_bad_parameters_are_refused(arguments: dict[str, object], message: str) -> None:
     with pytest.raises((ValueError, TypeError), match=message):
         WidebandMixture(CIRCLE, **arguments)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("end", [0.0, 1.0])
+@pytest.mark.parametrize("name", ["background", "birth_share", "birth_existence", "min_share"])
+def test_shares_and_existence_may_be_zero_or_one(name: str, end: float) -> None:
+    z = sparse(np.full((6, 1), 0.7), np.random.default_rng(12))
+    run = track(CIRCLE, z, settings=MixtureSettings().replace(**{name: end}))
+    has_births = (name, end) not in {("birth_share", 0.0), ("min_share", 1.0)}
+    assert run.doa.shape[1] == has_births
+    np.testing.assert_allclose(run.doa[2:], 0.7, atol=0.03)
+
+
+@pytest.mark.parametrize(("p_activate", "p_deactivate"), [(0.0, 1.0), (1.0, 0.0)])
+def test_existence_is_a_probability_however_certain_the_motion(
+    p_activate: float, p_deactivate: float
+) -> None:
+    motion = BernoulliVonMises(sigma_doa=0.1, p_activate=p_activate, p_deactivate=p_deactivate)
+    z = sparse(np.full((6, 1), 0.7), np.random.default_rng(13))
+    run = track(CIRCLE, z, motion=motion, step_duration=1.0)
+    assert 0.5 < run.existence[0, 0] < 1
+
+
+def test_bins_that_come_and_go_need_no_new_responses() -> None:
+    z = sparse(np.full((6, 1), 0.7), np.random.default_rng(14))
+    z[np.random.default_rng(15).random(z.shape[:2]) < 0.2] = np.nan
+    scan_response.cache_clear()
+    run = track(CIRCLE, z)
+    assert scan_response.cache_info().misses == 1
+    assert run.doa[-1, 0] == pytest.approx(0.7, abs=0.03)
 
 
 def test_settings_change_while_it_runs_and_a_new_grid_starts_anew() -> None:
