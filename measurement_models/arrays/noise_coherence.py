@@ -15,7 +15,7 @@ from arrivals.measurement_models.arrays.sensor_array import SensorArray
 from arrivals.measurements import numbers
 from arrivals.messages import shown
 from arrivals.parameters import FrozenModel
-from arrivals.typing import Bool, Complex, Float
+from arrivals.typing import Bool, Complex, Float, Int
 from arrivals.validation import number
 
 MIN_EIGENVALUE = 1e-9  # of a matrix with ones on the diagonal
@@ -56,12 +56,12 @@ class NoiseCoherence(FrozenModel):
         """Γ with the axis of the bins: (n_bins or 1, n_sensors, n_sensors)."""
         return self.matrix if self.matrix.ndim == 3 else self.matrix[None]
 
-    def without(self, sensors: Sequence[int]) -> NoiseCoherence:
+    def without(self, sensors: Sequence[int] | Int) -> NoiseCoherence:
         """Return the coherence of the others, without some sensors, named by index."""
         kept = np.setdiff1d(np.arange(self.matrix.shape[-1]), sensors)
         return NoiseCoherence(self.matrix[..., kept[:, None], kept])
 
-    def only(self, bins: Sequence[int]) -> NoiseCoherence:
+    def only(self, bins: Sequence[int] | Int) -> NoiseCoherence:
         """Return the coherence at some of the bins."""
         return self if self.matrix.ndim == 2 else NoiseCoherence(self.matrix[list(bins)])
 

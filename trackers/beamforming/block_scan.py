@@ -6,10 +6,11 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.arrays.noise_coherence import NoiseCoherence
-from arrivals.trackers.beamforming.spectrum import scan_directions
+from arrivals.trackers.beamforming.spectrum import mean_beam_power, scan_directions
 from arrivals.typing import Bool, Complex, Float
 
 TINY = np.finfo(float).tiny
@@ -123,15 +124,14 @@ def part_in_use(model: ArraySnapshot, sensors: Bool, bins: Bool | None) -> Array
 
 @lru_cache(maxsize=64)
 def _part(model: ArraySnapshot, sensors: bytes, bins: bytes) -> ArraySnapshot:
-    kept = np.flatnonzero(np.frombuffer(sensors, dtype=np.bool_))
-    waves = model.waves.without(np.setdiff1d(np.arange(model.array.n_sensors), kept))
+    missing = np.flatnonzero(~np.frombuffer(sensors, dtype=np.bool_))
+    waves = model.waves.without(missing)
     noise = model.coherence if isinstance(model.noise_coherence, NoiseCoherence) else None
     used = np.flatnonzero(np.frombuffer(bins, dtype=np.bool_))
     if bins:
         waves = waves.only(used)
     if noise is not None:
-        matrix = noise.matrix[used] if bins and noise.matrix.ndim > 2 else noise.matrix
-        noise = NoiseCoherence(matrix[..., kept, :][..., kept])
+        noise = (noise.only(used) if bins else noise).without(missing)
     return model.replace(
         array=waves.array,
         response=waves.response,
@@ -172,7 +172,8 @@ def root_mean_amplitudes(model: ArraySnapshot, doa: Float, Y: Complex) -> Comple
         return np.zeros(0, dtype=np.complex128)
     valid = ~np.isnan(Y)
     y = np.where(valid, Y, 0)
-    A = strongest(model.waves.steering(doa), y)
+    A = model.waves.steering(doa)
+    A = A[0] if len(A) == 1 else strongest(A, [mean_beam_power(a[None], Y) for a in A])
     AH = np.swapaxes(A.conj(), 1, 2)
     if valid.all():  # normal equations of a bin, (n_bins, K, K)
         w = np.linalg.solve(_loaded(AH @ A), AH @ y)
@@ -184,15 +185,15 @@ def root_mean_amplitudes(model: ArraySnapshot, doa: Float, Y: Complex) -> Comple
     return np.asarray(np.sqrt((w.real**2 + w.imag**2).sum(axis=(0, 2)) / n_valid) + 0j)
 
 
-def strongest(A: Complex, y: Complex) -> Complex:
-    """Return responses (n_bins, n_sensors, n), each at the nuisance of its largest beam power.
+def strongest(A: Complex, power: ArrayLike) -> Complex:
+    """Return responses or filters of directions, each at the nuisance of its largest power.
 
     Parameters
     ----------
     A : ndarray, shape (n_nuisance, n_bins, n_sensors, n)
-        Responses.
-    y : ndarray, shape (n_bins, n_sensors, n_snapshots)
-        Snapshots, 0 where a sensor is missing.
+        Responses or filters.
+    power : array_like, shape (n_nuisance, n)
+        Powers.
 
     Returns
     -------
@@ -201,15 +202,10 @@ def strongest(A: Complex, y: Complex) -> Complex:
     Examples
     --------
     >>> A = np.array([[1.0, 1.0], [1.0, -1.0]]).reshape(2, 1, 2, 1)
-    >>> strongest(A, np.array([[[1.0], [-1.0]]])).ravel()
+    >>> strongest(A, [[1.0], [3.0]]).ravel()
     array([ 1., -1.])
     """
-    if len(A) == 1:
-        return np.asarray(A[0])
-    beam = np.swapaxes(A.conj(), 2, 3) @ y
-    norm = np.maximum((A.real**2 + A.imag**2).sum(axis=2), TINY)
-    power = ((beam.real**2 + beam.imag**2).sum(axis=-1) / norm).sum(axis=1)
-    best = power.argmax(axis=0)
+    best = np.argmax(power, axis=0)
     return np.asarray(np.moveaxis(A[best, :, :, np.arange(len(best))], 0, -1))
 
 

@@ -75,9 +75,14 @@ def mean_capon_power(A: Complex, R: Complex) -> Float:
     >>> mean_capon_power(np.ones((1, 2, 4, 1)), np.stack([np.eye(4), 3 * np.eye(4)]))
     array([0.5])
     """
+    return np.asarray(_capon_solution(A, R)[1].mean(axis=1).max(axis=0))
+
+
+def _capon_solution(A: Complex, R: Complex) -> tuple[Complex, Float]:
+    """Return R⁻¹a and 1 / aᴴR⁻¹a, (n_nuisance, n_bins, n_directions)."""
     solved = np.linalg.inv(R) @ A
     inverse = (A.real * solved.real + A.imag * solved.imag).sum(axis=2)
-    return np.asarray((1 / np.maximum(inverse, MIN_INVERSE)).mean(axis=1).max(axis=0))
+    return solved, np.asarray(1 / np.maximum(inverse, MIN_INVERSE))
 
 
 @register("mvdr")
@@ -182,7 +187,8 @@ class MVDR(RunningCovariance, CBF):
     def block_amplitudes(self, doa: Float, Y: Complex) -> Complex:
         """Return the root of the mean of |wᴴy|², w = R⁻¹a / aᴴR⁻¹a, over bins and snapshots.
 
-        Snapshots with missing sensors are left out; if no other is there, the least-squares fit.
+        A slowness or elevation is that of the spectrum. Snapshots with missing sensors are left
+        out; if no other is there, the least-squares fit.
         """
         sensors, bins = used_data(self.data_weights())
         Y = Y[:, sensors] if bins is None else Y[np.ix_(bins, sensors)]
@@ -191,10 +197,10 @@ class MVDR(RunningCovariance, CBF):
         if not len(doa) or not is_complete.any():
             return root_mean_amplitudes(model, doa, Y)
         y = model.whitening() @ np.where(is_complete[:, None], Y, 0)
-        A = strongest(whitened_responses(model, doa), y)
-        solved = np.linalg.solve(self._loaded_covariance(sensors, bins), A)
-        inverse = (A.real * solved.real + A.imag * solved.imag).sum(axis=1)
-        output = np.swapaxes(solved.conj(), 1, 2) @ y / np.maximum(inverse, MIN_INVERSE)[..., None]
+        R = self._loaded_covariance(sensors, bins)
+        solved, power = _capon_solution(whitened_responses(model, doa), R)
+        w = strongest(solved * power[:, :, None], power.mean(axis=1))
+        output = np.swapaxes(w.conj(), 1, 2) @ y
         if self.measurement.is_single:
             return np.asarray(output[0, :, 0])
         power = (output.real**2 + output.imag**2).sum(axis=(0, 2)) / is_complete.sum()
