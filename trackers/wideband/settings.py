@@ -7,12 +7,15 @@ from typing import Any
 
 import numpy as np
 
+from arrivals.messages import shown
 from arrivals.parameters import FrozenModel
-from arrivals.validation import count, not_negative, one_of, positive, probability
+from arrivals.validation import count, not_negative, number, one_of, positive, probability
 
 COUNTS = {"iterations": 100, "max_sources": 100, "max_births": 100}
 PROBABILITIES = ("background", "birth_share", "min_share", "birth_existence")
-MAY_BE_ZERO = ("relocation", "merge", "birth_evidence")
+MAY_BE_ZERO = ("relocation", "merge", "birth_evidence", "max_loss", "min_rate", "floor_db",
+               "floor_rise", "decay")  # fmt: skip
+MAX_ONSET_DB = 1000
 
 
 @dataclass(frozen=True)
@@ -61,7 +64,7 @@ class MixtureSettings(FrozenModel):
         Level over its noise floor from which a bin counts, dB; rise of the floor, dB/s.
     onset_db, decay : float
         A bin counts if its level exceeds the highest before, which falls by `decay`, dB/s, by
-        `onset_db`, dB: echoes follow later and weaker.
+        `onset_db`, dB, which may be negative: echoes follow later and weaker.
 
     Raises
     ------
@@ -111,4 +114,10 @@ class MixtureSettings(FrozenModel):
             return count(name, value, maximum=COUNTS[name])
         if name in PROBABILITIES:
             return probability(name, value)
+        if name == "onset_db":
+            if not abs(number(name, value)) <= MAX_ONSET_DB:
+                raise ValueError(
+                    f"{name} must lie in [-{MAX_ONSET_DB}, {MAX_ONSET_DB}]; got {shown(value)}"
+                )
+            return float(value)
         return not_negative(name, value) if name in MAY_BE_ZERO else positive(name, value)

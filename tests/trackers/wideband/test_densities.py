@@ -101,6 +101,14 @@ def test_bins_without_data_or_power_keep_their_levels_and_do_not_count() -> None
     assert not (loud | onset).any()
 
 
+@pytest.mark.parametrize("onset_db", [-1.0, 0.0, 1.0])
+def test_bins_near_the_highest_before_count_if_onset_db_is_negative(onset_db: float) -> None:
+    level = np.array([[0.0, -0.5, 0.7, 2.0]])  # dB
+    steady = MixtureSettings(onset_db=onset_db, decay=0.0)
+    _, _, onset = BinLevels.empty(1).after(10 ** (level / 10), 0.1, steady)
+    assert onset[0].tolist() == [True, onset_db < -0.5, onset_db < 0.7, True]
+
+
 def test_zeros_in_part_of_a_step_are_no_noise_floor() -> None:
     """After a drop-out of one snapshot, noise would be louder than its floor for hours."""
     energy = np.random.default_rng(1).gamma(6, size=(5, 8))
@@ -115,7 +123,8 @@ def test_zeros_in_part_of_a_step_are_no_noise_floor() -> None:
 @pytest.mark.parametrize(
     ("name", "value"),
     [("tempering", 0.0), ("iterations", 0), ("background", 1.5), ("memory", -1.0),
-     ("diffuse", "yes"), ("max_sources", 1.5), ("floor_db", np.nan)],
+     ("diffuse", "yes"), ("max_sources", 1.5), ("floor_db", np.nan), ("onset_db", np.nan),
+     ("onset_db", -1e4)],
 )  # fmt: skip
 def test_setting_out_of_range_is_refused_by_name(name: str, value: object) -> None:
     with pytest.raises((ValueError, TypeError), match=f"^{name} must"):
