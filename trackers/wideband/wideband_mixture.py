@@ -156,7 +156,9 @@ class WidebandMixture(DirectionTracker):
         observed, settings = self.scan.model.observe(z), self.settings
         if observed is None:
             return
-        manifold = self.scan.manifold.without(np.flatnonzero(~observed.sensors))
+        manifold = self.scan.manifold
+        if not observed.sensors.all():
+            manifold = manifold.without(np.flatnonzero(~observed.sensors))
         response = scan_response(manifold, self.scan.grid, settings.source_ratio)
         unit, energy = unit_snapshots(observed.snapshots, observed.bins)
         levels = self.levels.later(self.gap, settings)
