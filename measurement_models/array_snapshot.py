@@ -70,7 +70,7 @@ class ArraySnapshot(SnapshotNoise):
         Γ = (1 - white) sinc(2 d/λ) + white I; or matrices (n_bins, n_sensors, n_sensors) or
         (n_sensors, n_sensors), Hermitian and positive definite with ones on the diagonal.
     white : float
-        White share of the variance of "diffuse" noise, at least 1e-9.
+        White share of the variance of "diffuse" noise, at least 1e-8.
 
     Notes
     -----

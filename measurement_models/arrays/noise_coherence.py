@@ -19,6 +19,7 @@ from arrivals.typing import Bool, Complex, Float, Int
 from arrivals.validation import number
 
 MIN_EIGENVALUE = 1e-9  # of a matrix with ones on the diagonal
+MIN_WHITE = 1e-8  # the smallest eigenvalue of diffuse noise is that of its white part, rounded
 MAX_ROUNDING = 1e-9  # of the diagonal, and of Γ - Γᴴ
 
 
@@ -150,7 +151,7 @@ def diffuse_coherence(array: SensorArray, wavelengths: ArrayLike, white: float =
     wavelengths : array_like, shape (n_bins,)
         Metres.
     white : float
-        Share of the variance that is white, from 1e-9 to 1.
+        Share of the variance that is white, from 1e-8 to 1.
 
     Returns
     -------
@@ -198,16 +199,16 @@ def coherence_of(
 
 
 def white_share(white: Any) -> float:
-    """Return a share of white noise from 1e-9 to 1.
+    """Return a share of white noise from 1e-8 to 1.
 
     Examples
     --------
     >>> white_share(0)
     Traceback (most recent call last):
-    ValueError: white must lie in [1e-09, 1]; got 0
+    ValueError: white must lie in [1e-08, 1]; got 0
     """
-    if not MIN_EIGENVALUE <= number("white", white) <= 1:
-        raise ValueError(f"white must lie in [{MIN_EIGENVALUE}, 1]; got {shown(white)}")
+    if not MIN_WHITE <= number("white", white) <= 1:
+        raise ValueError(f"white must lie in [{MIN_WHITE}, 1]; got {shown(white)}")
     return float(white)
 
 

@@ -309,7 +309,8 @@ BAD: list[tuple[dict[str, Any], type[Exception], str]] = [
     ({"noise_coherence": 2 * np.eye(6) - 1}, ValueError, "must be positive definite; got"),
     ({"noise_coherence": [["a"] * 6] * 6}, TypeError, "noise_coherence must be numbers"),
     ({"noise_coherence": [[1.0], [1.0, 2.0]]}, ValueError, "must have rows of one length"),
-    ({"noise_coherence": "diffuse", "white": 0.0}, ValueError, r"white must lie in \[1e-09, 1\]"),
+    ({"noise_coherence": "diffuse", "white": 0.0}, ValueError, r"white must lie in \[1e-08, 1\]"),
+    ({"noise_coherence": "diffuse", "white": 1e-9}, ValueError, r"white must lie in \[1e-08, 1\]"),
     ({"white": 1.5}, ValueError, "got 1.5"),
     ({"white": "much"}, TypeError, "white must be a number"),
 ]
@@ -324,7 +325,7 @@ def test_coherence_that_is_none_raises(
     assert "\n" not in str(caught.value)
 
 
-def test_smallest_white_share_has_finite_whitening() -> None:
-    close = SensorArray.ula(8, 1e-3)
-    model = ArraySnapshot(close, 1.0, noise_coherence="diffuse", white=1e-8)
+@pytest.mark.parametrize("close", [SensorArray.ula(8, 1e-3), SensorArray.uca(6, 0.01)])
+def test_smallest_white_share_has_finite_whitening(close: SensorArray) -> None:
+    model = ArraySnapshot(close, [1.0, 30.0], noise_coherence="diffuse", white=1e-8)
     assert np.isfinite(model.whitening()).all()
