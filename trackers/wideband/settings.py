@@ -54,7 +54,8 @@ class MixtureSettings(FrozenModel):
     max_loss : float
         Most that the log odds of existence lose, 1/s.
     relocation : float
-        Rate at which the density of an inactive source becomes uniform, 1/s.
+        Rate at which the density of an inactive source becomes uniform, 1/s: above 0, the label of
+        a source that pauses may pass to a new one elsewhere.
     memory, confirm : float
         Time for which an inactive source keeps its label, and for which one that never had a
         label is kept, s.
@@ -94,7 +95,7 @@ class MixtureSettings(FrozenModel):
     pause: float = 0.25
     unsupported: float = 0.106
     max_loss: float = 23.0
-    relocation: float = 0.16
+    relocation: float = 0.0
     memory: float = 2.0
     confirm: float = 0.26
     min_rate: float = 31.0

@@ -68,6 +68,17 @@ def test_label_survives_a_pause_of_two_seconds(pause: int, kept: bool) -> None:
     assert (run.label[-1, 0] == 0) == kept
 
 
+@pytest.mark.parametrize("array", [ARRAY, LINE], ids=["circle", "line"])
+def test_label_of_a_source_that_pauses_does_not_pass_to_the_next(array: SensorArray) -> None:
+    """Three sources in turn, each for ten steps."""
+    doa = np.full((30, 3), np.nan)
+    for k, angle in enumerate([0.9, -0.8, 0.1]):
+        doa[10 * k : 10 * k + 10, k] = angle
+    model = model_of(array)
+    run = track(model, sparse(doa, np.random.default_rng(16), model))
+    assert run.label[[8, 18, 28], 0].tolist() == [0, 1, 2]
+
+
 def test_amplitude_is_the_root_of_the_mean_power() -> None:
     rng = np.random.default_rng(3)
     level = rng.exponential(size=(30, *CIRCLE.shape[:-1], 1)) ** 2
