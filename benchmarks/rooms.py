@@ -57,7 +57,7 @@ def compare(case: RoomCase, methods: list[str]) -> list[Row]:
             methods.remove(name)
             continue
         cpu = (time.process_time() - started) / scene.duration
-        scores = asdict(score(truth, found.doa_deg, found.label))
+        scores = asdict(score(truth, found.doa_deg, found.label, found.std_deg))
         rows.append({"method": name, **asdict(case), **scores, "cpu": cpu})
     return rows
 
@@ -81,6 +81,7 @@ def table(rows: Sequence[Row]) -> None:
               f"| {100 * column(own, 'missed').mean():.1f} | {column(own, 'false').mean():.2f} "
               f"| {column(own, 'silent').mean():.2f} | {column(own, 'switches').mean():.2f} "
               f"| {column(own, 'cpu').mean():.4f} |")  # fmt: skip
+    coverage(by_method)
     cells = list(dict.fromkeys((row["rt60"], row["kind"]) for row in rows))
     print("\n| GOSPA | " + " | ".join(f"{rt60:g} s, {kind}" for rt60, kind in cells) + " |")
     print("|---" * (len(cells) + 1) + "|")
@@ -90,6 +91,20 @@ def table(rows: Sequence[Row]) -> None:
             for cell in cells
         ]
         print(f"| {name} | " + " | ".join(f"{mean:.1f}" for mean in means) + " |")
+
+
+def coverage(by_method: dict[str, list[Row]]) -> None:
+    """Print the coverage of the stated deviations by array and by reverberation time."""
+    print("\n| within the stated 68 and 95 %, in % | of | errors of 68 | of 95 |")
+    print("|---" * 4 + "|")
+    for name, own in by_method.items():
+        for key in ("array", "rt60"):
+            for value in dict.fromkeys(row[key] for row in own):
+                some = [row for row in own if row[key] == value]
+                shares = [100 * column(some, f"within{level}") for level in (68, 95)]
+                if np.isfinite(shares).any():
+                    means = " | ".join(f"{np.nanmean(each):.0f}" for each in shares)
+                    print(f"| {name} | {key} {value} | {means} |")
 
 
 def main() -> None:

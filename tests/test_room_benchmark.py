@@ -90,3 +90,14 @@ def test_methods_return_one_row_a_step(name: str) -> None:
     found = METHODS[name](SCENE, recording(), truth.active.sum(axis=1))
     assert len(found.doa_deg) == len(truth.active)
     assert 0 <= score(truth, found.doa_deg, found.label).gospa < 40
+
+
+def test_coverage_is_the_share_of_errors_within_the_deviation() -> None:
+    truth = truth_of(recording())
+    offset = np.where(np.arange(len(truth.active)) % 2, 1.0, 3.0)
+    doa = np.where(truth.active, truth.doa_deg, np.nan)[:, :1] + offset[:, None]
+    found = score(truth, doa, None, np.full_like(doa, 2.0))
+    odd = truth.active[1::2, 0].sum() / truth.active[:, 0].sum()
+    assert found.within68 == pytest.approx(odd)
+    assert found.within95 == 1.0
+    assert np.isnan(score(truth, doa, None).within68)

@@ -31,10 +31,14 @@ from arrivals.typing import Complex, Float, Int
 
 
 class Found(NamedTuple):
-    """Directions, degrees, (n_steps, n_slots), NaN where there is none; labels, or None."""
+    """Directions, degrees, (n_steps, n_slots), NaN where there is none.
+
+    Labels, and standard deviations, degrees; None if the method has none.
+    """
 
     doa_deg: Float
     label: Int | None
+    std_deg: Float | None = None
 
 
 Method = Callable[[TalkersInRoom, RoomRecording, Int], Found]
@@ -58,7 +62,8 @@ def tracker(
         one = trial.tracker(name, **{"measurement": model} | settings)
         result = one.run(trial.measurements)
         label = result.label
-        return Found(np.rad2deg(result.doa), label if (label >= 0).any() else None)
+        std = np.rad2deg(result.std) if np.isfinite(result.std).any() else None
+        return Found(np.rad2deg(result.doa), label if (label >= 0).any() else None, std)
 
     return run
 

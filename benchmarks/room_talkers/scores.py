@@ -49,6 +49,8 @@ class Score:
         Number of directions a step in pauses of all talkers.
     switches : float
         Label switches; NaN without labels.
+    within68, within95 : float
+        Share of the errors within 1 and 1.96 stated standard deviations; NaN without these.
     """
 
     gospa: float
@@ -57,6 +59,8 @@ class Score:
     false: float
     silent: float
     switches: float
+    within68: float = np.nan
+    within95: float = np.nan
 
 
 def bridged(active: Bool) -> Bool:
@@ -82,7 +86,9 @@ def truth_of(recording: RoomRecording) -> StepTruth:
     return StepTruth(np.rad2deg(recording.doa[centre]), active, some & ~active)
 
 
-def score(truth: StepTruth, doa_deg: Float, label: Int | None) -> Score:
+def score(
+    truth: StepTruth, doa_deg: Float, label: Int | None, std_deg: Float | None = None
+) -> Score:
     """Return the scores of directions (n_steps, n_slots), NaN where there is none.
 
     An optional talker costs nothing, missed or found: a direction within the cut-off of one is not
@@ -110,6 +116,10 @@ def score(truth: StepTruth, doa_deg: Float, label: Int | None) -> Score:
     missed = truth.active.sum() - counts.sum()
     total = error[counts].sum() + CUT_OFF / 2 * (missed + false[spoken].sum())
     matched = Matches(steps, talker, slot, error)
+    within = (np.nan, np.nan)
+    if std_deg is not None and counts.any():
+        z = (error / std_deg[steps, slot])[counts]
+        within = float((z < 1).mean()), float((z < 1.96).mean())
     return Score(
         gospa=total / spoken.sum(),
         error=float(error[counts].mean()) if counts.any() else np.nan,
@@ -117,4 +127,6 @@ def score(truth: StepTruth, doa_deg: Float, label: Int | None) -> Score:
         false=false[spoken].mean(),
         silent=float(false[silent].mean()) if silent.any() else 0.0,
         switches=np.nan if label is None else label_switches(matched, label),
+        within68=within[0],
+        within95=within[1],
     )
