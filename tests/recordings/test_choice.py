@@ -102,6 +102,20 @@ def test_lines_that_come_and_go_like_vowels_are_none() -> None:
     assert choose(CIRCLE, 16000.0, spectrum).tracker == "wideband_mixture"
 
 
+@pytest.mark.parametrize("level", [0.5, 1.0, 4.0])
+def test_tones_under_sound_that_comes_and_goes_do_not_hide_it(level: float) -> None:
+    t = np.arange(64_000)[:, None] / 16000.0
+    bursts = noise(64_000) * (t % 1.0 < 0.3)
+    tone = np.cos(2 * np.pi * 1234.5 * t)
+    hum = sum(np.cos(2 * np.pi * 50 * k * t + k) / k for k in range(1, 30))
+    for steady in (tone, hum):
+        x = bursts + level * steady + 0.01 * noise(64_000)
+        choice = choose(CIRCLE, 16000.0, MeanSpectrum.of(x, 16000.0))
+        assert choice.tracker == "wideband_mixture"
+    alone = MeanSpectrum.of(level * tone + 0.01 * noise(64_000), 16000.0)
+    assert choose(CIRCLE, 16000.0, alone).tracker == "svalse"
+
+
 def test_spectrum_of_few_missing_or_silent_samples_has_no_lines() -> None:
     for x in (np.ones((10, 2)), np.zeros((500, 2)), np.full((500, 2), np.nan)):
         assert len(MeanSpectrum.of(x, 1000.0).lines(1.0, 500.0)) == 0

@@ -13,6 +13,8 @@ from arrivals.typing import Float
 LONGEST, MOST_WINDOWS, MOST_CHANNELS = 4096, 256, 8
 LINE_DB = 12.0  # least height of a line over the smoothed spectrum; speech has less than 10
 LINE_SHARE = 0.25  # least share of the lines in the power of the band
+BURST_RATIO = 3.0  # of mean to median power; noise has 1 to 1.44, speech with pauses 10
+BURST_SHARE = 0.01  # most that sounds that come and go may have of the power
 MOST_LINES = 16
 SMOOTHING = 41  # bins of the running median
 
@@ -95,7 +97,8 @@ class MeanSpectrum:
         """Return the frequencies, Hz, of lines between two limits, at most 16, in ascending order.
 
         A line is a peak of the steady spectrum, 12 dB over its running median. There is none
-        unless they have together a quarter of the mean power between the limits.
+        unless they have together a quarter of the mean power between the limits, nor if more than
+        1 % of it comes and goes between the lines, as speech over a machine does.
         """
         from scipy.ndimage import median_filter
 
@@ -105,7 +108,9 @@ class MeanSpectrum:
         level = 10 * np.log10(np.maximum(self.steady, 1e-30 * self.steady.max()))
         excess = level - median_filter(level, size=min(SMOOTHING, len(level)), mode="nearest")
         raised = inside & (excess >= LINE_DB)
-        if self.power[raised].sum() < LINE_SHARE * self.power[inside].sum():
+        total, between = self.power[inside].sum(), inside & ~raised
+        bursts = (self.power[between] - BURST_RATIO * self.steady[between]).sum()
+        if self.power[raised].sum() < LINE_SHARE * total or bursts > BURST_SHARE * total:
             return np.zeros(0)
         neighbours = np.pad(level, 2, constant_values=-np.inf)
         highest = np.max([neighbours[i : i + len(level)] for i in (0, 1, 3, 4)], axis=0)
