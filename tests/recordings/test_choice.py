@@ -137,6 +137,18 @@ def test_what_is_given_is_kept() -> None:
     assert choose(WIDE, 25.0, EMPTY, options).settings["solver__max_snr_db"] == 7.0
 
 
+def test_mixture_at_given_frequencies_gets_its_windows_and_steps() -> None:
+    options = TrackOptions("wideband_mixture", np.arange(500.0, 2500.0, 125.0).tolist())
+    choice = choose(CIRCLE, 16000.0, EMPTY, options)
+    assert (choice.window, choice.hop, choice.n_snapshots) == (512, 256, 4)
+    assert choice.frequencies == options.frequencies
+    few = TrackOptions("wideband_mixture", 2000.0)
+    with pytest.warns(UserWarning, match="less than 8 frequencies; got 1"):
+        choose(CIRCLE, 16000.0, EMPTY, few)
+    with pytest.warns(UserWarning, match="pass a wider band"):
+        choose(CIRCLE, None, None, few)
+
+
 def test_complex_snapshots_of_a_high_rate_are_tracked_several_a_step() -> None:
     options = TrackOptions(frequencies=433.92e6)
     choice = choose(CIRCLE, 240e3, None, options, n_samples=24_000)
@@ -156,6 +168,7 @@ def test_complex_snapshots_of_a_high_rate_are_tracked_several_a_step() -> None:
         (CIRCLE, None, EMPTY, {}, "real samples require a rate"),
         (CIRCLE, 16000.0, None, {}, "complex snapshots require their frequency"),
         (CIRCLE, 16000.0, None, {"band": (1, 2)}, "a band requires real samples"),
+        (CIRCLE, 16000.0, None, {"frequencies": 5, "window": 64}, "window and hop must be None"),
         (CIRCLE, 16000.0, EMPTY, {"band": (1, 9000)}, "half the rate, 8000 Hz; got 1 and 9000"),
         (CIRCLE, 16000.0, EMPTY, {"band": (1, 2, 3)}, "band must have two edges"),
         (CIRCLE, 16000.0, EMPTY, {"frequencies": []}, "at least one; got none"),

@@ -150,6 +150,23 @@ def test_stream_without_a_rate_is_refused_before_it_is_read(
         assert "real samples require a rate" in capsys.readouterr().err
 
 
+def test_error_of_a_recording_without_a_valid_step_is_the_only_line(
+    talk: Float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("a.toml").write_text(TOML)
+    samples = talk[: 2 * RATE].astype("<f4")
+    samples[::100] = np.nan
+    np.savez("gaps.npz", samples=samples, rate=RATE)
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(samples.tobytes())))
+    for source in (["gaps.npz"], ["-", "--rate", str(RATE), "--dtype", "float32"]):
+        assert main(["track", *source, "--array", "a.toml", "--out", "t.csv"]) == 2
+        message = capsys.readouterr().err
+        assert message.count("\n") == 1
+        assert "is finite" in message
+        assert not Path("t.csv").exists()
+
+
 @pytest.mark.parametrize(
     ("arguments", "more", "message"),
     [
@@ -158,6 +175,7 @@ def test_stream_without_a_rate_is_refused_before_it_is_read(
         ((np.ones((99, 6)), ARRAY), {}, "the rate is unknown"),
         ((np.ones((9999, 6)), ARRAY), {"rate": 8000, "wndow": 3}, "wndow"),
         ((np.ones((9999, 5)), ARRAY), {"rate": 8000}, "must have 6 channels; got 5"),
+        ((np.ones((9999, 6)), ARRAY), {"rate": 8000, "window": 10**9}, "9999 samples; one window"),
     ],
 )
 def test_track_of_incomplete_arguments_is_refused(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable
 from typing import BinaryIO
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy as np
 from arrivals.cli.models import n_stream_channels, printed_warnings, require_speed
 from arrivals.cli.outputs import Bar, draw, live_output, refuse, write_table
 from arrivals.measurement_models import SensorArray
+from arrivals.measurements import is_missing
 from arrivals.recordings.choice import Choice, MeanSpectrum, TrackOptions, choose
 from arrivals.recordings.choice.assembly import assembled
 from arrivals.recordings.framing import frame_stream
@@ -45,17 +46,18 @@ def _track_file(
     if options.frequencies:  # refuse invalid arguments before the file is read
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            assembled(array, choose(array, np.inf, MeanSpectrum.empty(), options), None)
+            rate = 4 * np.max(options.frequencies)  # any that has the frequencies
+            assembled(array, choose(array, rate, MeanSpectrum.empty(), options), None)
     refuse(arguments, ("dtype", "channels"), "requires samples from standard input")
     recording = read(arguments.file, rate=arguments.rate, variable=arguments.variable,
                      transpose=arguments.transpose, array=array, rate_required=True)  # fmt: skip
-    choice = choice_for(recording, options)
     with printed_warnings():
+        choice = choice_for(recording, options)
         measurement, tracker = assembled(array, choice, recording.rate)
-    steps = RecordedSteps(recording, choice)
+        steps = RecordedSteps(recording, choice)
     time = steps.time if np.isfinite(steps.time).all() else None
-    _print_choice(choice, options)
-    result = tracker.run(bar(steps, desc=choice.tracker))
+    announced = map(_announcement(choice, options), steps)
+    result = tracker.run(bar(announced, desc=choice.tracker, total=len(steps)))
     result = result if time is None else result.at(time)
     write_table(result, arguments.out)
     if arguments.plot:
@@ -63,11 +65,22 @@ def _track_file(
         draw(arguments.plot, result, snapshots=snapshots, measurement=measurement, time=time)
 
 
-def _print_choice(choice: Choice, options: TrackOptions) -> None:
-    """Print what was chosen, if anything was, on standard error."""
+def _announcement(choice: Choice, options: TrackOptions) -> Callable[[Complex], Complex]:
+    """Return an identity that prints what was chosen, if anything was, at the first valid snapshot.
+
+    If no snapshot is valid, the error is then the only line on standard error.
+    """
     complete = options.tracker and options.has_frequencies and options.snapshots
-    if choice.reason and not complete:
-        print(f"arrivals: {choice}", file=sys.stderr)
+    is_due = bool(choice.reason and not complete)
+
+    def announce(z: Complex) -> Complex:
+        nonlocal is_due
+        if is_due and not is_missing(z):
+            is_due = False
+            print(f"arrivals: {choice}", file=sys.stderr)
+        return z
+
+    return announce
 
 
 def _track_stream(
@@ -75,23 +88,18 @@ def _track_stream(
 ) -> None:
     refuse(arguments, ("plot", "variable", "transpose"), "requires a file, not a stream")
     n_channels = n_stream_channels(arguments.channels, array)
-    choice, source = _stream_choice(arguments, array, options, n_channels)
     with printed_warnings():
+        choice, source = _stream_choice(arguments, array, options, n_channels)
         _, tracker = assembled(array, choice, arguments.rate)
-    snapshots = frame_stream(
+    frames = frame_stream(
         source, n_channels, choice.frequencies, n_snapshots=choice.n_snapshots,
         stride=choice.stride, dtype=arguments.dtype or "int16", rate=arguments.rate,
         window=choice.window, hop=choice.hop,
     )  # fmt: skip
-
-    def steps() -> Iterator[tuple[float, Complex]]:
-        for i, (time, z) in enumerate(snapshots):
-            if i == 0:  # the arguments are valid
-                _print_choice(choice, options)
-            yield time, array.select(z)
-
+    announce = _announcement(choice, options)
+    steps = ((time, announce(array.select(z))) for time, z in frames)
     with live_output(arguments.out) as write:
-        track_live(tracker, bar(steps(), desc=choice.tracker), write)
+        track_live(tracker, bar(steps, desc=choice.tracker), write)
 
 
 def _stream_choice(

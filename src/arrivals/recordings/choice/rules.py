@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import replace
 from typing import Any
 
@@ -68,9 +69,10 @@ def choose(
       lowest.
 
     `svalse` gets settings for recorded data then: snapshots of a step and neighbouring bins are
-    tempered, weak sources are left out, and deviations from plane waves count as noise. With
-    frequencies, or a band and a tracker other than `wideband_mixture`, nothing else is changed:
-    one window a step without overlap.
+    tempered, weak sources are left out, and deviations from plane waves count as noise.
+
+    `wideband_mixture` gets its windows and steps at given frequencies, too. With frequencies, or
+    a band, and another tracker nothing else is changed: one window a step without overlap.
 
     Examples
     --------
@@ -80,12 +82,35 @@ def choose(
     wideband sources, 224 bins: --tracker wideband_mixture --band 300 7306.81 --window 512 ...
     """
     options = TrackOptions() if options is None else options
+    choice = _choice(array, rate, spectrum, options, n_samples)
+    n_bins = len(choice.frequencies)
+    if choice.tracker == WIDEBAND and n_bins < LEAST_BINS:
+        warnings.warn(
+            f"{WIDEBAND} misses most sources with less than {LEAST_BINS} frequencies; got {n_bins}:"
+            " pass a wider band, a longer window, or neither frequency nor band",
+            stacklevel=2,
+        )
+    return choice
+
+
+def _choice(
+    array: SensorArray,
+    rate: float | None,
+    spectrum: MeanSpectrum | None,
+    options: TrackOptions,
+    n_samples: int | None,
+) -> Choice:
     if spectrum is None:
         return _of_snapshots(rate, options, n_samples)
     if rate is None:
         raise ValueError("real samples require a rate: pass their number per second, rate (--rate)")
+    if n_samples is not None and options.window is not None and options.window > n_samples:
+        raise ValueError(
+            f"the recording has {n_samples} samples; one window requires {options.window}: "
+            "pass a shorter window"
+        )
     if options.frequencies is not None:
-        return _of_frequencies(array, options)
+        return _of_frequencies(rate, options)
     if options.band is not None:
         limits, lines = BandLimits.given(options.band, rate), np.zeros(0)
         if options.tracker not in (None, WIDEBAND):
@@ -107,12 +132,17 @@ def _of_snapshots(rate: float | None, options: TrackOptions, n_samples: int | No
         raise ValueError("a band requires real samples; got complex snapshots: pass a frequency")
     if options.frequencies is None:
         raise ValueError("complex snapshots require their frequency, Hz: pass --frequency")
-    if options.tracker is not None or options.snapshots is not None or rate is None:
+    if options.window is not None or options.hop is not None:
+        raise ValueError("window and hop must be None for complex snapshots")
+    if options.tracker is not None:
         return _as_given("", options, _bins(options))
+    if options.snapshots is not None or rate is None:
+        reason = f"complex snapshots, {options.snapshots or 1} a step"
+        return _as_given(reason, options, _bins(options))
     step = STEP_S if n_samples is None else min(STEP_S, n_samples / rate / STEPS)
     n = int(max(step, SHORTEST_STEP_S) * rate)
     if n < 2:
-        return _as_given("complex snapshots", options, _bins(options))
+        return _as_given("complex snapshots, 1 a step", options, _bins(options))
     settings = _recorded(n) | dict(options.settings)
     return Choice(f"complex snapshots, {n} a step", NARROWBAND, _bins(options), n_snapshots=n,
                   stride=options.stride, settings=settings)  # fmt: skip
@@ -122,9 +152,15 @@ def _bins(options: TrackOptions) -> tuple[float, ...]:
     return options.frequencies if isinstance(options.frequencies, tuple) else ()
 
 
-def _of_frequencies(array: SensorArray, options: TrackOptions) -> Choice:
-    """Take frequencies as they are given."""
+def _of_frequencies(rate: float, options: TrackOptions) -> Choice:
+    """Take frequencies as they are given; for the mixture, in steps of speech."""
     n = len(_bins(options))
+    if options.tracker == WIDEBAND:
+        limits = BandLimits(min(_bins(options)), max(_bins(options)))
+        frames = _frames(limits, rate, options, WIDEBAND)
+        reason = "wideband sources at given frequencies"
+        choice = Choice(reason, WIDEBAND, _bins(options), None, *frames)
+        return _completed(choice, options, MAX_SNR_DB)
     noun = "this frequency" if n == 1 else f"these {n} frequencies"
     reason = f"narrowband sources, {noun} alone (wideband ones, such as speech, need none)"
     reason = "" if options.tracker else reason
@@ -161,15 +197,27 @@ def _of_lines(lines: Float, rate: float, options: TrackOptions, n_samples: int |
 
 def _of_band(limits: BandLimits, rate: float, options: TrackOptions) -> Choice:
     """Choose windows and tracker for all bins of a band."""
-    window = options.window or power_of_two(limits.window_duration * rate)
+    window = _window(limits, rate, options)
     band = (float(f"{limits.low:.6g}"), float(f"{limits.high:.6g}"))
     frequencies = tuple(frequencies_in(band, rate, window))
     is_speech = limits.has_speech and len(frequencies) >= LEAST_BINS
     tracker = options.tracker or (WIDEBAND if is_speech else NARROWBAND)
-    hop = options.hop or window // 2
-    n = max(1, round(SPEECH_STEP_S * rate / hop)) if tracker == WIDEBAND else N_SNAPSHOTS
     reason = f"wideband sources, {len(frequencies)} bins"
-    return Choice(reason, tracker, frequencies, band, window, hop, n)
+    return Choice(reason, tracker, frequencies, band, *_frames(limits, rate, options, tracker))
+
+
+def _window(limits: BandLimits, rate: float, options: TrackOptions) -> int:
+    return options.window or power_of_two(limits.window_duration * rate)
+
+
+def _frames(
+    limits: BandLimits, rate: float, options: TrackOptions, tracker: str
+) -> tuple[int, int, int]:
+    """Return window, hop and number of windows in a step of wideband sources."""
+    window = _window(limits, rate, options)
+    hop = options.hop or window // 2
+    is_mixture = tracker == WIDEBAND
+    return window, hop, max(1, round(SPEECH_STEP_S * rate / hop)) if is_mixture else N_SNAPSHOTS
 
 
 def _completed(choice: Choice, options: TrackOptions, snr_db: float) -> Choice:
