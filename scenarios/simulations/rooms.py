@@ -10,6 +10,9 @@ import numpy as np
 
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.motion_models import BernoulliVonMises
+from arrivals.recordings.choice import BandLimits
+from arrivals.recordings.framing import frame_recording, frequencies_in
+from arrivals.recordings.recording import Recording
 from arrivals.scenarios.base import Scenario, Trial
 from arrivals.scenarios.registry import register
 from arrivals.scenarios.room_acoustics.diffuse_noise import diffuse_noise
@@ -138,14 +141,10 @@ class TalkersInRoom(Scenario):
     @property
     def frequencies(self) -> list[float]:
         """Frequencies, Hz."""
-        positions = ARRAYS[self.array].positions
-        spacing = np.linalg.norm(positions[1:] - positions[0], axis=1).min()
-        alias = SPEED / (2 * float(spacing))
-        width = RATE / WINDOW
-        first = np.ceil(max(300.0, 0.04 * alias) / width)
-        last = np.floor(min(1.5 * alias, 0.475 * RATE) / width)
-        k = np.linspace(first, last, self.n_bins or int(last - first) + 1)
-        return [float(f) for f in width * np.round(k)]
+        limits = BandLimits.of(ARRAYS[self.array], RATE)
+        bins = frequencies_in((limits.low, limits.high), RATE, WINDOW)
+        chosen = np.linspace(0, len(bins) - 1, self.n_bins or len(bins))
+        return [bins[i] for i in np.round(chosen).astype(np.int64)]
 
     @property
     def measurement(self) -> ArraySnapshot:
@@ -272,10 +271,6 @@ class TalkersInRoom(Scenario):
 
     def frames(self, samples: Float) -> Complex:
         """Return the snapshots of samples (n_samples, n_sensors): (n_steps, *measurement.shape)."""
-        n_steps = ((len(samples) - WINDOW) // HOP + 1) // WINDOWS
-        rows = HOP * np.arange(n_steps * WINDOWS)[:, None] + np.arange(WINDOW)
-        taper = np.hanning(WINDOW + 1)[:-1, None]
-        bins = np.round(np.array(self.frequencies) * WINDOW / RATE).astype(np.int64)
-        y = np.fft.rfft(samples[rows] * taper, axis=1)[:, bins] * (2 / taper.sum())
-        y = y.reshape(n_steps, WINDOWS, len(bins), -1).swapaxes(1, 2)
-        return np.asarray(y.reshape(n_steps, *self.measurement.shape))
+        return frame_recording(
+            Recording(samples, RATE), self.frequencies, window=WINDOW, hop=HOP, n_snapshots=WINDOWS
+        ).values
