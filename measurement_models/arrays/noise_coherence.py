@@ -35,7 +35,7 @@ class NoiseCoherence(FrozenModel):
     Raises
     ------
     ValueError
-        If it is no such matrix.
+        If it is not such a matrix.
 
     Examples
     --------

@@ -23,7 +23,7 @@ class ZeroRuns:
     Parameters
     ----------
     length : ndarray, shape (..., n_channels)
-        Zeros up to the newest sample; 0 where that is no zero.
+        Zeros up to the newest sample; 0 where that is not zero.
     missing : ndarray of bool, shape (..., n_channels)
         Channels whose run is missing; all of them before their first sample that is not zero.
     zeros, repeated : ndarray, shape (...)

@@ -147,7 +147,7 @@ def _birth_density(
 def log_odds_gain(mixture: Mixture, prior: Float, tempering: float) -> Float:
     """Return by how much the step raises the log odds of each source's existence, (K,).
 
-    The tempered evidence of the mixture over that of the mixture without the source, less the
+    The tempered evidence of the mixture over that of the mixture without the source, minus the
     divergence of its density.
     """
     w = np.log(mixture.share) + mixture.level

@@ -70,7 +70,7 @@ def track(
     Raises
     ------
     ValueError, TypeError, OSError
-        If an argument or a file is invalid, there is no array, or no frequency is usable.
+        If an argument or a file is invalid, an array is missing, or no frequency is usable.
 
     Examples
     --------
