@@ -175,6 +175,8 @@ def test_error_of_a_recording_without_a_valid_step_is_the_only_line(
         ((np.ones((99, 6)), ARRAY), {}, "the rate is unknown"),
         ((np.ones((9999, 6)), ARRAY), {"rate": 8000, "wndow": 3}, "wndow"),
         ((np.ones((9999, 5)), ARRAY), {"rate": 8000}, "must have 6 channels; got 5"),
+        ((np.ones((9999, 6)), np.ones((6, 2))), {"rate": 8000}, "SensorArray; got ndarray"),
+        ((np.ones((9999, 6)), ARRAY), {"rate": 8000, "band": 900}, "band must be a sequence"),
         ((np.ones((9999, 6)), ARRAY), {"rate": 8000, "window": 10**9}, "9999 samples; one window"),
     ],
 )
@@ -194,6 +196,8 @@ def test_tracker_of_real_samples_requires_a_band() -> None:
         arrivals.track(x, line, rate=RATE, tracker="interpolation_ekf")
     sampled: dict[str, Any] = {"tracker": "interpolation_ekf", "band": (500.0, 2000.0), "hop": 100}
     run = arrivals.track(x, line, rate=RATE, **sampled)
+    with pytest.raises(ValueError, match="window must be left out for 'interpolation_ekf'"):
+        arrivals.track(x, line, rate=RATE, window=512, **sampled)
     assert_allclose(run.time, (100 * np.arange(1, 21) - 1) / RATE)
 
 

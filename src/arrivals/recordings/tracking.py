@@ -103,6 +103,9 @@ def _track_band(recording: Recording, options: TrackOptions) -> Run:
     array, rate = _array_of(recording), recording.rate
     if recording.is_narrowband or rate is None or options.band is None:
         raise ValueError("a band requires real samples with a rate")
+    for name in ("window", "snapshots", "stride"):
+        if getattr(options, name) is not None:
+            raise ValueError(f"{name} must be left out for {options.tracker!r}, of real samples")
     measurement = band_samples(array, rate, options.band)
     made = make_tracker(options.tracker or "", measurement, options.settings)
     return track_samples(made, recording.samples, rate, every=options.hop or 1)
@@ -214,6 +217,9 @@ class RecordedSteps:
 
 def _recording(recording: Any, array: Any, reading: dict[str, Any]) -> Recording:
     """Return a recording of the sensors of an array."""
+    if not isinstance(array, SensorArray | str | PathLike | None):
+        got = type(array).__name__
+        raise TypeError(f"array must be an array file or a SensorArray; got {got}")
     if array is not None and not isinstance(array, SensorArray):
         array = SensorArray.from_toml(array)
     if not isinstance(recording, Recording):

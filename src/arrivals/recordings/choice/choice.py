@@ -51,7 +51,7 @@ class TrackOptions:
             if not bins:
                 raise ValueError("frequencies must have at least one; got none")
             object.__setattr__(self, "frequencies", bins)
-        if self.band is not None and len(self.band) != 2:
+        if self.band is not None and len(items("band", self.band)) != 2:
             raise ValueError(f"band must have two edges, Hz; got {len(self.band)} numbers")
         for name, least in (("window", 2), ("hop", 1), ("snapshots", 1), ("stride", 1)):
             if getattr(self, name) is not None:
