@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -221,7 +222,7 @@ def _recording(recording: Any, array: Any, reading: dict[str, Any]) -> Recording
         got = type(array).__name__
         raise TypeError(f"array must be an array file or a SensorArray; got {got}")
     if array is not None and not isinstance(array, SensorArray):
-        array = SensorArray.from_toml(array)
+        array = SensorArray.from_toml(Path(array))
     if not isinstance(recording, Recording):
         if array is None:
             raise ValueError("array must be an array file or a SensorArray; got None")
