@@ -37,7 +37,7 @@ def aic(eigenvalues: ArrayLike, n_snapshots: float) -> Float:
     Raises
     ------
     ValueError
-        If there is no eigenvalue, or one that is not finite, or no snapshot.
+        If eigenvalues or snapshots are missing, or an eigenvalue is not finite.
 
     References
     ----------
