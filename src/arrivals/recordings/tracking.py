@@ -71,11 +71,7 @@ def track(
     Raises
     ------
     ValueError, TypeError, OSError
-<<<<<<< HEAD
         If an argument or a file is invalid, an array is missing, or no frequency is usable.
-=======
-        If an argument or a file is invalid, the array is missing, or all frequencies are unusable.
->>>>>>> 4927e89 (Run the study of rooms again; keep lines and words within limits)
 
     Examples
     --------
