@@ -13,8 +13,8 @@ from arrivals.validation import count, not_negative, number, one_of, positive, p
 
 COUNTS = {"iterations": 100, "max_sources": 100, "max_births": 100}
 PROBABILITIES = ("background", "birth_share", "min_share", "birth_existence")
-MAY_BE_ZERO = ("relocation", "merge", "birth_evidence", "max_loss", "min_rate", "floor_db",
-               "floor_rise", "decay")  # fmt: skip
+MAY_BE_ZERO = ("relocation", "model_deviation", "merge", "birth_evidence", "max_loss",
+               "min_rate", "floor_db", "floor_rise", "decay")  # fmt: skip
 MAX_ONSET_DB = 1000
 
 
@@ -35,6 +35,9 @@ class MixtureSettings(FrozenModel):
         Number T of bins that count as one independent bin.
     deviation_tempering : float
         The same for the stated standard deviation; calibrated on simulated rooms.
+    model_deviation : float
+        Part of the stated standard deviation that more bins do not reduce, rad: rounding to the
+        grid, noise that is not diffuse, echoes within a window.
     iterations : int
         Variational iterations of a fit.
     background, birth_share, min_share : float
@@ -83,6 +86,7 @@ class MixtureSettings(FrozenModel):
     source_ratio: float = 3.0
     tempering: float = 25.0
     deviation_tempering: float = 5.0
+    model_deviation: float = float(np.deg2rad(0.5))
     iterations: int = 3
     background: float = 0.3
     birth_share: float = 0.15

@@ -32,7 +32,6 @@ DEFAULT_MOTION = BernoulliVonMises(
     sigma_doa=float(np.deg2rad(8.4)), p_activate=0.31, p_deactivate=0.124
 )
 DEFAULT_SETTINGS = MixtureSettings()
-ROUNDING = 0.1  # error of directions between grid points, in steps
 
 
 @register("wideband_mixture")
@@ -196,6 +195,6 @@ class WidebandMixture(DirectionTracker):
         doa, variance = self.scan.moments(sources.density[active])
         # bins are T times fewer than they seem; the direction is T_std times as uncertain
         sharpening = self.settings.deviation_tempering / self.settings.tempering
-        std = np.sqrt(sharpening * variance + (ROUNDING * self.grid.step) ** 2)
+        std = np.sqrt(sharpening * variance + self.settings.model_deviation**2)
         amplitude = None if power is None else np.sqrt(power[active])
         self.report(doa, std, sources.existence[active], amplitude, sources.label[active])
