@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.motion_models import BernoulliVonMises
 from arrivals.scenarios import Trial, create, mean_gospa
-from arrivals.trackers import CBF, MVDR, SVALSE, VALSE, CoordinateSolver, NewtonSolver, Run
+from arrivals.trackers import CBF, SVALSE, VALSE, CoordinateSolver, NewtonSolver, Run
 from arrivals.typing import Complex, Float
 
 CIRCLE = ArraySnapshot(SensorArray.uca(8, radius=0.65), wavelength=1.0)
@@ -323,11 +323,6 @@ def test_incompatible_parts_are_rejected(
 ) -> None:
     with pytest.raises(ValueError, match=message):
         SVALSE(model, SLOW, **params)
-
-
-def test_mvdr_requires_single_snapshots() -> None:
-    with pytest.raises(ValueError, match=r"one snapshot a step, .* shape \(2, 3, 8\)"):
-        MVDR(SEVERAL)
 
 
 def test_rejected_measurement_leaves_the_belief_unchanged() -> None:
