@@ -219,3 +219,20 @@ def test_settings_change_while_it_runs_and_a_new_grid_starts_anew() -> None:
     tracker.predict()
     assert tracker.sources.n == 0
     assert len(tracker.grid.doa) == 72
+
+
+def test_motion_is_per_unit_of_time_and_the_default_per_second() -> None:
+    z = sparse(np.full((15, 1), 0.7), np.random.default_rng(12))
+    per_step = BernoulliVonMises(sigma_doa=0.05)
+    one = WidebandMixture(CIRCLE, per_step, step_duration=0.128)
+    other = WidebandMixture(CIRCLE, per_step, step_duration=0.064)
+    for tracker in (one, other):
+        tracker.run(z)
+        tracker.predict()
+    np.testing.assert_allclose(one.x, other.x, atol=0.02)
+    grid = one.grid
+    spread = np.eye(len(grid.doa))[10] @ grid.walk(float(per_step.Q(1.0)[0, 0]))
+    assert spread @ grid.offset[10] ** 2 == pytest.approx(0.05**2, rel=0.02)
+    trial_like = WidebandMixture(CIRCLE, BernoulliVonMises(sigma_doa=np.deg2rad(3.0),
+                                 p_activate=0.05, p_deactivate=0.02)).run(z)  # fmt: skip
+    np.testing.assert_allclose(trial_like.doa, track(CIRCLE, z).doa, atol=2e-3)
