@@ -34,7 +34,7 @@ COMMANDS: dict[str, list[str]] = {
     "reproduce": ["reproduce", "nothing", "--quiet"],
 }
 OPTIONS: dict[str, tuple[str, ...]] = {
-    "track": ("--frequency", "--frequencies", "--band", "--snapshots", "--stride", "--snr",
+    "track": ("--frequency", "--frequencies", "--band", "--snapshots", "--snr",
               "--tracker", "--set", "--out", "--signals", "--rate", "--window", "--hop",
               "--variable", "--transpose", "--dtype", "--channels", "--quiet", "--array",
               "--nothing"),

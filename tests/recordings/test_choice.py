@@ -52,7 +52,7 @@ def test_power_of_two_is_the_nearest(n: float) -> None:
 def test_wideband_sound_gets_the_mixture_at_all_usable_bins() -> None:
     choice = choose(CIRCLE, 16000.0, MeanSpectrum.of(noise(16000), 16000.0))
     assert (choice.tracker, choice.window, choice.hop) == ("wideband_mixture", 512, 256)
-    assert (choice.n_snapshots, choice.stride) == (4, None)
+    assert choice.n_snapshots == 4
     assert_allclose(choice.frequencies, np.arange(10, 234) * 31.25)
     assert choice.settings == {}
 
@@ -126,13 +126,13 @@ def test_spectrum_of_few_missing_or_silent_samples_has_no_lines() -> None:
 
 def test_what_is_given_is_kept() -> None:
     settings = {"solver__tempering": 2.0}
-    options = TrackOptions("svalse", [440, 880], None, 1024, 300, 5, 2, settings)
+    options = TrackOptions("svalse", [440, 880], None, 1024, 300, 5, settings)
     choice = choose(CIRCLE, 16000.0, EMPTY, options)
-    assert choice == Choice("", "svalse", (440.0, 880.0), None, 1024, 300, 5, 2, settings)
+    assert choice == Choice("", "svalse", (440.0, 880.0), None, 1024, 300, 5, settings)
     options = TrackOptions(band=(500.0, 4000.0), window=256, snapshots=6)
     choice = choose(CIRCLE, 16000.0, EMPTY, options)
     assert (choice.tracker, choice.window, choice.hop) == ("wideband_mixture", 256, 128)
-    assert (choice.n_snapshots, choice.stride, choice.band) == (6, None, (500.0, 4000.0))
+    assert (choice.n_snapshots, choice.band) == (6, (500.0, 4000.0))
     options = TrackOptions(settings={"solver__max_snr_db": 7.0})
     assert choose(WIDE, 25.0, EMPTY, options).settings["solver__max_snr_db"] == 7.0
 
@@ -174,7 +174,7 @@ def test_complex_snapshots_of_a_high_rate_are_tracked_several_a_step() -> None:
         (CIRCLE, 16000.0, EMPTY, {"frequencies": []}, "at least one; got none"),
         (CIRCLE, 16000.0, EMPTY, {"frequencies": 5, "band": (1, 2)}, "only one of"),
         (CIRCLE, 16000.0, EMPTY, {"window": 1}, "window must be at least 2; got 1"),
-        (CIRCLE, 16000.0, EMPTY, {"stride": 0}, "stride must be at least 1; got 0"),
+        (CIRCLE, 16000.0, EMPTY, {"snapshots": 0}, "snapshots must be at least 1; got 0"),
     ],
 )  # fmt: skip
 def test_choice_of_unusable_arguments_is_refused(
@@ -204,7 +204,7 @@ def test_choice_given_by_hand_is_the_same(
     args = seen[0]
     again = choose(array, rate, EMPTY, TrackOptions(
         args.tracker, args.frequencies, args.band, args.window, args.hop, args.snapshots,
-        args.stride, dict(args.set)))  # fmt: skip
+        dict(args.set)))  # fmt: skip
     assert_allclose(again.frequencies, choice.frequencies, rtol=1e-9)
-    for name in ("tracker", "window", "hop", "n_snapshots", "stride", "settings"):
+    for name in ("tracker", "window", "hop", "n_snapshots", "settings"):
         assert getattr(again, name) == getattr(choice, name)

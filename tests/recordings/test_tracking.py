@@ -97,7 +97,7 @@ def test_steps_do_not_depend_on_the_block_size(
     talk: Float, is_complex: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     recording = Recording(talk[:20_000] + (0j if is_complex else 0), RATE, array=ARRAY)
-    framing = (None, None, 7, 3) if is_complex else (512, 200, 7, 3)
+    framing = (None, None, 7) if is_complex else (512, 200, 7)
     choice = Choice("", "svalse", (500.0, 1000.0)[: 1 if is_complex else 2], None, *framing)
     whole = RecordedSteps(recording, choice)
     expected = whole.framed()

@@ -100,8 +100,6 @@ def _add_track(commands: Any) -> None:
                 "samples")  # fmt: skip
     option("--snapshots", type=int, metavar="N",
            help="number of successive windows in one step (1 with --frequency)")  # fmt: skip
-    option("--stride", type=int, metavar="N",
-           help="windows between steps (those of a step: no overlap)")  # fmt: skip
     option(
         "--snr",
         type=float,

@@ -34,7 +34,7 @@ def track_snapshots(arguments: argparse.Namespace, array: SensorArray, bar: Bar)
     frequencies = arguments.frequency if arguments.frequencies is None else arguments.frequencies
     options = TrackOptions(
         arguments.tracker, frequencies, arguments.band, arguments.window, arguments.hop,
-        arguments.snapshots, arguments.stride, dict(arguments.set),
+        arguments.snapshots, dict(arguments.set),
     )  # fmt: skip
     track = _track_stream if arguments.file == "-" else _track_file
     track(arguments, array, options, bar)
@@ -93,7 +93,7 @@ def _track_stream(
         _, tracker = assembled(array, choice, arguments.rate)
     frames = frame_stream(
         source, n_channels, choice.frequencies, n_snapshots=choice.n_snapshots,
-        stride=choice.stride, dtype=arguments.dtype or "int16", rate=arguments.rate,
+        dtype=arguments.dtype or "int16", rate=arguments.rate,
         window=choice.window, hop=choice.hop,
     )  # fmt: skip
     announce = _announcement(choice, options)

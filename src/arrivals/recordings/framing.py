@@ -147,7 +147,6 @@ def frame_stream(
     frequencies: Sequence[float],
     *,
     n_snapshots: int = 1,
-    stride: int | None = None,
     **live: Any,
 ) -> Iterator[tuple[float, Complex]]:
     """Yield the snapshots of each step of a stream as soon as it is complete.
@@ -162,8 +161,6 @@ def frame_stream(
         Frequencies, Hz.
     n_snapshots : int
         Number of successive windows in one step; an incomplete last step is dropped.
-    stride : int, optional
-        Windows between steps; by default steps do not overlap.
     **live : object
         Other arguments of `live_snapshots`.
 
@@ -176,28 +173,7 @@ def frame_stream(
     """
     if len(frequencies) > 1 and np.dtype(live.get("dtype", "int16")).kind == "c":
         raise ValueError("frequencies must be one for a stream of complex frames")
-    n = count("n_snapshots", n_snapshots)
-    every = n if stride is None else count("stride", stride)
-    at_once = math.gcd(n, every)  # windows
-    windows: list[Complex] = []
-    times: list[float] = []
-    n_steps, skip = 0, 0
-    blocks = live_snapshots(source, n_channels, frequency=list(frequencies), n_snapshots=at_once,
-                            **live)  # fmt: skip
+    blocks = live_snapshots(source, n_channels, frequency=list(frequencies),
+                            n_snapshots=n_snapshots, **live)  # fmt: skip
     for time, z in blocks:
-        if skip:  # windows between steps that are farther apart than they are long
-            skip -= at_once
-            continue
-        windows.append(z.reshape(len(frequencies), at_once, n_channels))
-        times.append(time)
-        if len(windows) * at_once < n:
-            continue
-        n_steps += 1
-        yield float(np.mean(times)), _squeeze(np.concatenate(windows, axis=1))
-        done = every // at_once
-        skip = at_once * max(0, done - len(windows))
-        windows, times = windows[done:], times[done:]
-    if not n_steps:
-        raise ValueError(
-            f"the stream ended after {len(windows) * at_once} windows; one step requires {n}"
-        )
+        yield time, _squeeze(z.reshape(len(frequencies), n_snapshots, n_channels))

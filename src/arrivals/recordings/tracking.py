@@ -60,8 +60,8 @@ def track(
     snapshots : int, optional
         Windows in a step.
     **more : object
-        `rate`, `variable`, `transpose` and `max_bytes` of `read`; `stride`, windows between steps,
-        which do not overlap without; other names are parameters of the tracker, as in `set_params`.
+        `rate`, `variable`, `transpose` and `max_bytes` of `read`; other names are parameters of the
+        tracker, as in `set_params`.
 
     Returns
     -------
@@ -86,8 +86,7 @@ def track(
     from threadpoolctl import threadpool_limits
 
     reading = {name: more.pop(name) for name in READING if name in more}
-    stride = more.pop("stride", None)
-    options = TrackOptions(tracker, frequencies, band, window, hop, snapshots, stride, more)
+    options = TrackOptions(tracker, frequencies, band, window, hop, snapshots, more)
     recording = _recording(recording, array, reading)
     if band is not None and takes_samples(tracker):
         return _track_band(recording, options)
@@ -104,7 +103,7 @@ def _track_band(recording: Recording, options: TrackOptions) -> Run:
     array, rate = _array_of(recording), recording.rate
     if recording.is_narrowband or rate is None or options.band is None:
         raise ValueError("a band requires real samples with a rate")
-    for name in ("window", "snapshots", "stride"):
+    for name in ("window", "snapshots"):
         if getattr(options, name) is not None:
             raise ValueError(f"{name} must be left out for {options.tracker!r}, of real samples")
     measurement = band_samples(array, rate, options.band)
@@ -171,22 +170,20 @@ class RecordedSteps:
 
     def __init__(self, recording: Recording, choice: Choice) -> None:
         self._recording, self._choice = recording, choice
-        self._every = choice.stride or choice.n_snapshots
         self._window = self._hop = 1
         if not recording.is_narrowband and recording.rate is not None:
             lowest = check_frequency(min(choice.frequencies), recording.rate)
             self._window = choice.window or default_window(recording.rate, lowest)
             self._hop = choice.hop or self._window
+        self._step = self._hop * choice.n_snapshots
         n_windows = (len(recording.samples) - self._window) // self._hop + 1
-        self._n_steps = max(0, (n_windows - choice.n_snapshots) // self._every + 1)
+        self._n_steps = max(0, n_windows // choice.n_snapshots)
         first = self._part(0, 1)  # refuses invalid arguments
-        if not np.isfinite(first.time).all():
-            self.time = np.full(self._n_steps, np.nan)
-        elif recording.time is not None or recording.is_narrowband:
+        if recording.time is not None:
             self.time = self.framed().time
         else:
-            at = np.arange(self._n_steps) * (self._every * self._hop / (recording.rate or 1.0))
-            self.time = np.asarray(first.time[0] + at)
+            at = np.arange(self._n_steps) * (self._step / (recording.rate or 1.0))
+            self.time = np.asarray(first.time[0] + at)  # NaN without a rate
 
     def __len__(self) -> int:
         return self._n_steps
@@ -207,12 +204,11 @@ class RecordedSteps:
         return self._part(0, max(1, self._n_steps))
 
     def _part(self, first: int, n_steps: int) -> FramedSnapshots:
-        choice, start = self._choice, first * self._every * self._hop
-        n_windows = (n_steps - 1) * self._every + choice.n_snapshots
+        choice, start = self._choice, first * self._step
         return frame_recording(
             self._recording, choice.frequencies, window=choice.window, hop=choice.hop,
-            n_snapshots=choice.n_snapshots, stride=choice.stride, start=start,
-            stop=start + (n_windows - 1) * self._hop + self._window,
+            n_snapshots=choice.n_snapshots, start=start,
+            stop=start + n_steps * self._step - self._hop + self._window,
         )  # fmt: skip
 
 

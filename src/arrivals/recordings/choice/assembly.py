@@ -160,5 +160,5 @@ def assembled(
     settings = dict(choice.settings)
     hop = choice.hop or choice.window
     if hop and rate and "step_duration" in inspect.signature(find(choice.tracker)).parameters:
-        settings = {"step_duration": hop * (choice.stride or choice.n_snapshots) / rate} | settings
+        settings = {"step_duration": hop * choice.n_snapshots / rate} | settings
     return measurement, make_tracker(choice.tracker, measurement, settings)

@@ -21,8 +21,8 @@ class TrackOptions:
         Frequencies, Hz.
     band : (float, float), optional
         Edges, Hz, in place of frequencies: all bins of the window between them.
-    window, hop, snapshots, stride : int, optional
-        Samples of a window and between windows; windows in a step and between steps.
+    window, hop, snapshots : int, optional
+        Samples of a window and between windows; windows in a step.
     settings : mapping of str to object
         Parameters of the tracker, as in `set_params`.
 
@@ -38,7 +38,6 @@ class TrackOptions:
     window: int | None = None
     hop: int | None = None
     snapshots: int | None = None
-    stride: int | None = None
     settings: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -53,7 +52,7 @@ class TrackOptions:
             object.__setattr__(self, "frequencies", bins)
         if self.band is not None and len(items("band", self.band)) != 2:
             raise ValueError(f"band must have two edges, Hz; got {len(self.band)} numbers")
-        for name, least in (("window", 2), ("hop", 1), ("snapshots", 1), ("stride", 1)):
+        for name, least in (("window", 2), ("hop", 1), ("snapshots", 1)):
             if getattr(self, name) is not None:
                 count(name, getattr(self, name), least)
 
@@ -79,8 +78,8 @@ class Choice:
         Edges, Hz, if the frequencies are all bins of the window between them.
     window, hop : int, optional
         As in `Recording.snapshots`.
-    n_snapshots, stride : int
-        Windows in a step and, if steps overlap, between steps.
+    n_snapshots : int
+        Windows in a step.
     settings : mapping of str to object
         Parameters of the tracker.
 
@@ -98,7 +97,6 @@ class Choice:
     window: int | None = None
     hop: int | None = None
     n_snapshots: int = 1
-    stride: int | None = None
     settings: Mapping[str, Any] = field(default_factory=dict)
 
     def __str__(self) -> str:
@@ -108,7 +106,6 @@ class Choice:
         else:
             words.append(f"--band {_numbers(self.band)}")
         framing = {"window": self.window, "hop": self.hop, "snapshots": self.n_snapshots}
-        framing |= {"stride": self.stride}
         words += [f"--{name} {value}" for name, value in framing.items() if value is not None]
         words += [f"--set {name}={_text(value)}" for name, value in self.settings.items()]
         return f"{self.reason}: {' '.join(words)}"

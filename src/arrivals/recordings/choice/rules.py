@@ -145,7 +145,7 @@ def _of_snapshots(rate: float | None, options: TrackOptions, n_samples: int | No
         return _as_given("complex snapshots, 1 a step", options, _bins(options))
     settings = _recorded(n) | dict(options.settings)
     return Choice(f"complex snapshots, {n} a step", NARROWBAND, _bins(options), n_snapshots=n,
-                  stride=options.stride, settings=settings)  # fmt: skip
+                  settings=settings)  # fmt: skip
 
 
 def _bins(options: TrackOptions) -> tuple[float, ...]:
@@ -178,7 +178,7 @@ def _of_given_band(rate: float, options: TrackOptions) -> Choice:
 def _as_given(reason: str, options: TrackOptions, frequencies: tuple[float, ...]) -> Choice:
     band = None if options.band is None else (float(options.band[0]), float(options.band[1]))
     tracker, n = options.tracker or NARROWBAND, options.snapshots or 1
-    framing = options.window, options.hop, n, options.stride
+    framing = options.window, options.hop, n
     return Choice(reason, tracker, frequencies, band, *framing, dict(options.settings))
 
 
@@ -228,8 +228,7 @@ def _completed(choice: Choice, options: TrackOptions, snr_db: float) -> Choice:
         alike = n if choice.band is None else NEIGHBOURS * n
         settings = _recorded(alike, snr_db) | settings
     hop = options.hop or choice.hop or window // 2
-    stride = options.stride or choice.stride
-    return replace(choice, window=window, hop=hop, n_snapshots=n, stride=stride, settings=settings)
+    return replace(choice, window=window, hop=hop, n_snapshots=n, settings=settings)
 
 
 def _recorded(n: int, snr_db: float = MAX_SNR_DB) -> dict[str, Any]:
