@@ -130,7 +130,10 @@ def test_number_and_spectra_of_the_sources_are_set_by_the_model(
         (("--signals", "o.mp3"), ("signal files must end in .wav or .npy",)),
         (("--signals", "nowhere/o.wav"), ("the folder does not exist",)),
         (("--signals", "t.csv", "--out", "t.csv"), ("different files",)),
-        (("--signals", "o.wav", "--tracker", "cbf"), ("'cbf' estimates no signals",)),
+        (
+            ("--signals", "o.wav", "--tracker", "cbf"),
+            ("that estimates signals; got cbf",),
+        ),
         (("--signals", "o.wav", "--window", "64"), ("cannot store complex signals: use .npy",)),
         (("--band", "500", "9000"), ("half the rate, 4000 Hz; got 500 and 9000",)),
         (("--band", "500", "900", "--window", "64"), ("--band requires real samples",)),
@@ -156,6 +159,14 @@ def test_signals_invalid_argument_prints_one_line_and_writes_no_file(
     assert message.count("\n") == 1
     assert all(word in message for word in words)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_signals_without_a_tracker_are_refused(
+    scene: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    job = ["track", str(scene / "talk.wav"), "--array", str(scene / "array.toml")]
+    assert main([*job, "--signals", "o.wav"]) == 2
+    assert "requires a tracker that estimates signals; got None" in capsys.readouterr().err
 
 
 def test_signals_of_zeros_streams_and_other_arrays_are_refused(

@@ -35,7 +35,7 @@ def separates(arguments: argparse.Namespace) -> bool:
     if arguments.signals and arguments.file == "-":
         raise ValueError("--signals requires a file, not a stream")
     if arguments.signals and not estimates_signals:
-        raise ValueError(f"--signals: the tracker {name or 'svalse'!r} estimates no signals")
+        raise ValueError(f"--signals requires a tracker that estimates signals; got {name}")
     return estimates_signals and arguments.file != "-"
 
 
