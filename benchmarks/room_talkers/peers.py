@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models import ArraySnapshot
 from arrivals.motion_models import ConstantVelocity
+from arrivals.motion_models.von_mises import wrap
 from arrivals.scenarios.room_acoustics.speech_signals import RATE
 from arrivals.scenarios.simulations.rooms import (
     HOP,
@@ -127,8 +128,7 @@ class PhaseTransform(DirectionTracker):
         rest = P - P[first] * self.overlap[first]
         peaks = find_peaks(rest, circular=circular)
         for peak in peaks[rest[peaks] >= self.second * P[first]][:1]:
-            apart = self.doa_grid[peak] - doa[0]
-            if np.abs((apart + np.pi) % (2 * np.pi) - np.pi) > self.width:
+            if np.abs(wrap(self.doa_grid[peak] - doa[0])) > self.width:
                 doa.append(float(self.doa_grid[peak]))
         self.report(doa)
 

@@ -9,12 +9,11 @@ from scipy.optimize import linear_sum_assignment
 
 from arrivals.scenarios.metrics.assignment import Matches, label_switches
 from arrivals.scenarios.room_acoustics.speech_signals import RATE
-from arrivals.scenarios.simulations.rooms import HOP, WINDOW, WINDOWS, RoomRecording
+from arrivals.scenarios.simulations.rooms import MIN_ACTIVE, RoomRecording, step_samples
 from arrivals.typing import Bool, Float, Int
 
 CUT_OFF = 20.0  # degrees
 HANGOVER, SHORT_PAUSE = 0.3, 0.5  # s: after an utterance, and within one
-STEP = HOP * WINDOWS  # samples
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,10 +77,8 @@ def bridged(active: Bool) -> Bool:
 
 def truth_of(recording: RoomRecording) -> StepTruth:
     """Return the truth of the steps of a recording."""
-    n_steps = ((len(recording.samples) - WINDOW) // HOP + 1) // WINDOWS
-    centre = STEP * np.arange(n_steps) + ((WINDOWS - 1) * HOP + WINDOW) // 2
-    rows = (centre[:, None] + np.arange(-STEP // 2, STEP // 2)).clip(0, len(recording.samples) - 1)
-    active = recording.active[rows].mean(axis=1) >= 1 / 3
+    centre, rows = step_samples(len(recording.samples))
+    active = recording.active[rows].mean(axis=1) >= MIN_ACTIVE
     some = bridged(recording.active)[rows].any(axis=1)
     return StepTruth(np.rad2deg(recording.doa[centre]), active, some & ~active)
 

@@ -227,7 +227,7 @@ def convolve_moving(signal: Float, responses: Sequence[Float]) -> Float:
 
     n = len(signal)
     received = np.zeros((n, responses[0].shape[1]))
-    at = np.linspace(0, n - 1, len(responses)) if len(responses) > 1 else np.zeros(1)
+    at = np.linspace(0, n - 1, len(responses))
     for k, response in enumerate(responses):
         ends = at[max(k - 1, 0)], at[min(k + 1, len(at) - 1)]
         first, last = (0, n) if len(at) == 1 else (int(np.ceil(ends[0])), int(ends[1]) + 1)

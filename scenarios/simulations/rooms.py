@@ -10,6 +10,7 @@ import numpy as np
 
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.motion_models import BernoulliVonMises
+from arrivals.motion_models.von_mises import wrap
 from arrivals.recordings.choice import BandLimits
 from arrivals.recordings.framing import frame_recording, frequencies_in
 from arrivals.recordings.recording import Recording
@@ -31,11 +32,13 @@ from arrivals.scenarios.room_acoustics.speech_signals import (
     utterances,
 )
 from arrivals.scenarios.simulations.speech import SHIPPED, shipped_speech
-from arrivals.typing import Bool, Complex, Float
+from arrivals.typing import Bool, Complex, Float, Int
 from arrivals.validation import count, number, one_of, positive
 
 SPEED = 343.0  # m/s
 WINDOW, HOP, WINDOWS = 512, 256, 8  # samples; windows of a step of 128 ms
+STEP = HOP * WINDOWS  # samples
+MIN_ACTIVE = 1 / 3  # least share of a step in which a talker is active
 ARRAYS = {
     "circle": SensorArray.uca(6, 0.046, speed=SPEED),
     "line": SensorArray.ula(8, 0.04, speed=SPEED),
@@ -231,7 +234,7 @@ class TalkersInRoom(Scenario):
             samples += received
             powers.append(np.mean(received[on] ** 2) if on.any() else np.nan)
             active.append(on)
-            at = np.linspace(0, n - 1, len(places)) if len(places) > 1 else np.zeros(1)
+            at = np.linspace(0, n - 1, len(places))
             doa.append(np.interp(np.arange(n), at, layout.doa[talker]))
         power = np.nanmean(powers)
         noise = rng.standard_normal(samples.shape)
@@ -259,13 +262,9 @@ class TalkersInRoom(Scenario):
             As `sample` draws it.
         """
         z = self.frames(recording.samples)
-        step = WINDOWS * HOP
-        centre = step * np.arange(len(z)) + ((WINDOWS - 1) * HOP + WINDOW) // 2
-        rows = centre[:, None] + np.arange(-step // 2, step // 2)
-        active = recording.active[rows.clip(0, len(recording.active) - 1)].mean(axis=1) >= 1 / 3
-        truth = np.where(active, recording.doa[centre], np.nan)
-        if self.array != "line":
-            truth = (truth + np.pi) % (2 * np.pi) - np.pi
+        centre, rows = step_samples(len(recording.samples))
+        active = recording.active[rows].mean(axis=1) >= MIN_ACTIVE
+        truth = np.where(active, wrap(recording.doa[centre]), np.nan)
         motion = BernoulliVonMises(sigma_doa=np.deg2rad(3.0), p_activate=0.05, p_deactivate=0.02)
         return Trial(z, truth, self.measurement, motion)
 
@@ -274,3 +273,20 @@ class TalkersInRoom(Scenario):
         return frame_recording(
             Recording(samples, RATE), self.frequencies, window=WINDOW, hop=HOP, n_snapshots=WINDOWS
         ).values
+
+
+def step_samples(n_samples: int) -> tuple[Int, Int]:
+    """Return the middles of the steps, (n_steps,), and the samples about them, (n_steps, 2048).
+
+    The last sample of the recording stands in place of those after it.
+
+    Examples
+    --------
+    >>> centre, rows = step_samples(5000)
+    >>> centre, rows[:, [0, -1]].tolist()
+    (array([1152, 3200]), [[128, 2175], [2176, 4223]])
+    """
+    n_steps = ((n_samples - WINDOW) // HOP + 1) // WINDOWS
+    centre = STEP * np.arange(n_steps) + (STEP - HOP + WINDOW) // 2
+    rows = centre[:, None] + np.arange(-STEP // 2, STEP // 2)
+    return centre, rows.clip(max=n_samples - 1)
