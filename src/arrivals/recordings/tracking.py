@@ -1,4 +1,4 @@
-"""Track directions through a recording, with whatever is not given chosen from it."""
+"""Track directions through a recording, by settings given or chosen from it."""
 
 from __future__ import annotations
 

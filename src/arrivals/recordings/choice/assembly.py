@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, get_type_hints
 
 from arrivals.measurement_models import ArraySamples, ArraySnapshot, SensorArray
-from arrivals.recordings.choice.choice import Choice
+from arrivals.recordings.choice.options import Choice
 from arrivals.trackers import Tracker, find
 
 

@@ -17,7 +17,7 @@ WINDOW_S, SPEECH_STEP_S = 0.032, 0.064  # of speech
 PERIODS = 3.0  # least number of periods in a window
 
 
-def alias_limit(array: SensorArray) -> float:
+def alias_frequency(array: SensorArray) -> float:
     """Return the frequency, Hz, at which the smallest spacing is half the wavelength.
 
     Parameters
@@ -36,7 +36,7 @@ def alias_limit(array: SensorArray) -> float:
 
     Examples
     --------
-    >>> alias_limit(SensorArray.ula(4, spacing=0.05, speed=340.0))
+    >>> alias_frequency(SensorArray.ula(4, spacing=0.05, speed=340.0))
     3400.0
     """
     if array.speed is None:
@@ -70,7 +70,7 @@ class BandLimits:
     @classmethod
     def of(cls, array: SensorArray, rate: float) -> BandLimits:
         """Return the band of an array at a rate, Hz."""
-        alias = alias_limit(array)
+        alias = alias_frequency(array)
         low = max(0.04 * alias, min(LOWEST_HZ, alias / 4))
         high = min(1.5 * alias, 0.475 * positive("rate", rate))
         if low >= high:

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from arrivals.measurement_models import SensorArray
-from arrivals.recordings.choice.choice import Choice, TrackOptions
 from arrivals.recordings.choice.limits import SPEECH_STEP_S, BandLimits, power_of_two
+from arrivals.recordings.choice.options import Choice, TrackOptions
 from arrivals.recordings.choice.spectrum import MeanSpectrum
 from arrivals.recordings.framing import frequencies_in
 from arrivals.recordings.narrowband import default_window

@@ -1,4 +1,4 @@
-"""Records: what is given, and what is chosen for a recording."""
+"""Options of `arrivals.track`, given and chosen."""
 
 from __future__ import annotations
 
