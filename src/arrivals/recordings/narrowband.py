@@ -166,8 +166,10 @@ class WindowedSpectrum:
         for i in range(0, n_windows, n_block):
             n = min(n_block, n_windows - i)
             block = _finite(samples[i * hop : (i + n - 1) * hop + self.window])
+            # 2 / Σ w(k) · Σ w(k) x(s + k) exp(-j 2π f k / rate)
             frames = self._taper * sliding_window_view(block, self.window, axis=1)[:, ::hop]
             self._transform(frames, y[i : i + n].transpose(2, 0, 1))
+        # times exp(-j 2π f (first_sample + s) / rate)
         start = (first_sample + hop * np.arange(n_windows))[:, None]
         cycles = start * self._f / self.rate
         y *= np.exp(-2j * np.pi * (cycles % 1))[:, :, None]

@@ -91,13 +91,9 @@ def live_snapshots(
     if kind.kind == "c":
         if window is not None or hop is not None:
             raise ValueError("window and hop must be None for complex frames")
-        bins, window, hop, half, rate = (
-            [],
-            1,
-            1,
-            0.0,
-            1.0 if rate is None else positive("rate", rate),
-        )
+        bins: list[float] = []
+        window, hop, half = 1, 1, 0.0
+        rate = 1.0 if rate is None else positive("rate", rate)
     else:
         if rate is None or frequency is None:
             raise ValueError("real samples require a rate and a frequency, Hz")
