@@ -13,6 +13,7 @@ from arrivals.cli.main import run as run_cli
 from arrivals.measurement_models import SensorArray
 from arrivals.recordings.choice import BandLimits, Choice, MeanSpectrum, TrackOptions, choose
 from arrivals.recordings.choice.limits import power_of_two
+from arrivals.scenarios.simulations.speech import SHIPPED, voice
 from arrivals.typing import Float
 
 CIRCLE = SensorArray.uca(8, radius=0.046, speed=343.0)
@@ -100,6 +101,12 @@ def test_lines_that_come_and_go_like_vowels_are_none() -> None:
                         .sum(axis=1) for _ in range(40)])  # fmt: skip
     spectrum = MeanSpectrum.of(x[:, None] + noise(len(x), 1), 16000.0)
     assert choose(CIRCLE, 16000.0, spectrum).tracker == "wideband_mixture"
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_shipped_speech_has_no_lines(name: str) -> None:
+    choice = choose(CIRCLE, 8000.0, MeanSpectrum.of(voice(name)[:, None], 8000.0))
+    assert choice.tracker == "wideband_mixture"
 
 
 @pytest.mark.parametrize("level", [0.5, 1.0, 4.0])

@@ -11,9 +11,9 @@ from arrivals.recordings.narrowband import WindowedSpectrum
 from arrivals.typing import Float
 
 LONGEST, MOST_WINDOWS, MOST_CHANNELS = 4096, 256, 8
-LINE_DB = 12.0  # least height of a line over the smoothed spectrum; speech has less than 10
+LINE_DB = 12.0  # least height of a line over the smoothed spectrum
 LINE_SHARE = 0.25  # least share of the lines in the power of the band
-BURST_RATIO = 3.0  # of mean to median power; noise has 1 to 1.44, speech with pauses 10
+BURST_RATIO = 3.0  # least, of mean to median power; that of noise is 1 / ln 2 = 1.44
 BURST_SHARE = 0.01  # most that sounds that come and go may have of the power
 MOST_LINES = 16
 SMOOTHING = 41  # bins of the running median
