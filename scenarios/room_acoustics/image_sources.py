@@ -15,7 +15,7 @@ from arrivals.typing import Float, Int
 from arrivals.validation import count, not_negative, positive, real, shaped
 
 HALF_WIDTH = 20  # samples: half of the windowed sinc of a fractional delay
-MAX_ORDER = 200  # 10.9 million images
+MAX_ORDER = 200  # 10.7 million images
 N_DIRECTIONS = 500  # of a mean over the sphere
 
 
