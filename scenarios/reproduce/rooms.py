@@ -15,7 +15,7 @@ from arrivals.scenarios.metrics.gospa import mean_gospa
 from arrivals.scenarios.reproduce.claims import Claim
 from arrivals.scenarios.reproduce.decisions import Decision, below
 from arrivals.scenarios.reproduce.report import Report
-from arrivals.scenarios.simulations.rooms import TalkersInRoom
+from arrivals.scenarios.simulations.rooms import RoomRecording, TalkersInRoom
 from arrivals.trackers import NewtonSolver
 from arrivals.trackers.run import Run
 
@@ -69,8 +69,9 @@ def rooms(runs: int, seed: int) -> Report:
 def _scores(scene: str, seed: int) -> list[tuple[float, ...]]:
     """Return GOSPA, its parts and the label switches, NaN without labels, of every method."""
     scores: list[tuple[float, ...]] = []
+    recording = SCENES[scene].record(np.random.default_rng(seed))
     for method in METHODS:
-        trial, run = _run(SCENES[scene], method, seed)
+        trial, run = _run(SCENES[scene], method, recording)
         truth, doa = np.rad2deg(trial.truth), np.rad2deg(run.doa)
         g = mean_gospa(truth, doa, c=CUT_OFF, period=360.0)
         switches = label_switches(matches(truth, doa, CUT_OFF, 360.0), run.label)
@@ -79,14 +80,14 @@ def _scores(scene: str, seed: int) -> list[tuple[float, ...]]:
     return scores
 
 
-def _run(scene: TalkersInRoom, method: str, seed: int) -> tuple[Trial, Run]:
+def _run(scene: TalkersInRoom, method: str, recording: RoomRecording) -> tuple[Trial, Run]:
     params: dict[str, Any] = {}
     name, _, noise = method.partition(", ")
     if name == "svalse":
         scene = scene.replace(n_bins=BINS)
         model = scene.measurement.replace(noise_coherence=noise.removesuffix(" noise"))
         params = {"measurement": model, "solver": NewtonSolver(tempering=32.0, power_floor=1.0)}
-    trial = scene.sample(np.random.default_rng(seed))
+    trial = scene.trial(recording)
     return trial, trial.tracker(name, **params).run(trial.measurements)
 
 
@@ -114,9 +115,11 @@ def _draw(seed: int) -> Figure:
 
     from arrivals.plots.bearing_time import plot_bearing_time
 
+    scene = SCENES[LINE]
+    recording = scene.record(np.random.default_rng(seed))
     figure = Figure(figsize=(9.0, 7.5), layout="constrained")
     for ax, method in zip(figure.subplots(2, sharex=True), (MIXTURE, DIFFUSE), strict=True):
-        trial, run = _run(SCENES[LINE], method, seed)
+        trial, run = _run(scene, method, recording)
         plot_bearing_time(run, ax=ax)
         ax.plot(np.rad2deg(trial.truth), linestyle="none", marker="+", markersize=4,
                 color="black", zorder=5)  # fmt: skip
