@@ -86,7 +86,7 @@ def calls(kind: str, rng: np.random.Generator) -> Iterator[Call]:
         value = str(rng.choice(VALUES))
         if chance < 0.4:
             name = kind.partition(" ")[0]
-            option = str(rng.choice(OPTIONS.get(name.partition(" ")[0], ("--quiet", "--nothing"))))
+            option = str(rng.choice(OPTIONS.get(name, ("--quiet", "--nothing"))))
             arguments += [option, value]
         elif chance < 0.75 and at < len(arguments):
             arguments[at] = value
