@@ -79,7 +79,7 @@ def table(rows: Sequence[Row]) -> None:
         mean_error = np.nanmean(error) if np.isfinite(error).any() else np.nan
         print(f"| {name} | {g.mean():.2f} ± {g.std() / np.sqrt(len(g)):.2f} | {mean_error:.1f} "
               f"| {100 * column(own, 'missed').mean():.1f} | {column(own, 'false').mean():.2f} "
-              f"| {column(own, 'silent').mean():.2f} | {column(own, 'switches').mean():.2f} "
+              f"| {column(own, 'in_pauses').mean():.2f} | {column(own, 'switches').mean():.2f} "
               f"| {column(own, 'cpu').mean():.4f} |")  # fmt: skip
     coverage(by_method)
     cells = list(dict.fromkeys((row["rt60"], row["kind"]) for row in rows))

@@ -44,7 +44,7 @@ class Score:
         Degrees; cut-off 20, p = 1.
     missed, false : float
         Share of the active talkers, and number a step.
-    silent : float
+    in_pauses : float
         Number of directions a step in pauses of all talkers.
     switches : float
         Label switches; NaN without labels.
@@ -56,7 +56,7 @@ class Score:
     error: float
     missed: float
     false: float
-    silent: float
+    in_pauses: float
     switches: float
     within68: float = np.nan
     within95: float = np.nan
@@ -97,7 +97,7 @@ def score(
         slots = np.flatnonzero(~np.isnan(found))
         talkers = np.flatnonzero(truth.active[step] | truth.optional[step])
         d = np.abs((truth.doa_deg[step, talkers, None] - found[slots] + 180) % 360 - 180)
-        # what a pair saves: a missed and a false one, or a false one alone
+        # savings of a pair: a missed and a false one, or a false one alone
         optional = truth.optional[step, talkers, None]
         saved = np.where(d < CUT_OFF, np.where(optional, CUT_OFF / 2, CUT_OFF - d), 0.0)
         rows, columns = linear_sum_assignment(-saved)
@@ -108,21 +108,21 @@ def score(
     steps, talker, slot = np.array([p[:3] for p in pairs], dtype=np.int64).reshape(-1, 3).T
     error = np.array([p[3] for p in pairs])
     counts = truth.active[steps, talker]
-    spoken = truth.active.any(axis=1)
-    silent = ~(truth.active | truth.optional).any(axis=1)
+    with_talker = truth.active.any(axis=1)
+    pause = ~(truth.active | truth.optional).any(axis=1)
     missed = truth.active.sum() - counts.sum()
-    total = error[counts].sum() + CUT_OFF / 2 * (missed + false[spoken].sum())
+    total = error[counts].sum() + CUT_OFF / 2 * (missed + false[with_talker].sum())
     matched = Matches(steps, talker, slot, error)
     within = (np.nan, np.nan)
     if std_deg is not None and counts.any():
         z = (error / std_deg[steps, slot])[counts]
         within = float((z < 1).mean()), float((z < 1.96).mean())
     return Score(
-        gospa=total / spoken.sum(),
+        gospa=total / with_talker.sum(),
         error=float(error[counts].mean()) if counts.any() else np.nan,
         missed=missed / truth.active.sum(),
-        false=false[spoken].mean(),
-        silent=float(false[silent].mean()) if silent.any() else 0.0,
+        false=false[with_talker].mean(),
+        in_pauses=float(false[pause].mean()) if pause.any() else 0.0,
         switches=np.nan if label is None else label_switches(matched, label),
         within68=within[0],
         within95=within[1],

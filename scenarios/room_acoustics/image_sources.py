@@ -169,7 +169,7 @@ def delay_and_add(delay: ArrayLike, gain: ArrayLike) -> Float:
     Parameters
     ----------
     delay : array_like, shape (n_pulses, n_channels)
-        Delays, samples, not negative; what a pulse has before time 0 is cut off.
+        Delays, samples, not negative; the part of a pulse before time 0 is cut off.
     gain : array_like, shape (n_pulses, n_channels)
         Amplitudes.
 

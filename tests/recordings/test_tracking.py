@@ -25,7 +25,7 @@ DOA = (60.0, -100.0)
 
 
 def plane_wave(x: Float, doa: float) -> Float:
-    """Return what the sensors receive of a signal at the origin: (n_samples, 6)."""
+    """Return a plane wave at the sensors, of a signal at the origin: (n_samples, 6)."""
     f = np.fft.rfftfreq(len(x), 1 / RATE)
     wavelength = 343.0 / np.maximum(f, 1e-9)
     a: Complex = ARRAY.steering_vector(np.deg2rad(doa), wavelength)

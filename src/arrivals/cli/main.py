@@ -79,7 +79,7 @@ def _add_track(commands: Any) -> None:
         description="Track directions of arrival through a recording (WAV, npy, npz, MATLAB, "
         "CSV), or through raw interleaved samples from standard input. Frequencies, windows and "
         "tracker are chosen from array and recording (of a stream, its first 2 s) unless they are "
-        "given; a line on standard error says how to give what was chosen.",
+        "given; a line on standard error has the choice as options.",
         epilog="live: arecord -t raw -f S16_LE -r 48000 -c 8 | "
         "arrivals track - --array ARRAY.toml --rate 48000",
         allow_abbrev=False,

@@ -66,7 +66,7 @@ def _track_file(
 
 
 def _announcement(choice: Choice, options: TrackOptions) -> Callable[[Complex], Complex]:
-    """Return an identity that prints what was chosen, if anything was, at the first valid snapshot.
+    """Return an identity that prints the choice, if there was one, at the first valid snapshot.
 
     If no snapshot is valid, the error is then the only line on standard error.
     """

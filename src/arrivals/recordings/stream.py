@@ -165,7 +165,7 @@ def read_ahead(
     n_channels : int
         Number of channels.
     duration : float
-        Length of what is read, s; less if the stream ends before.
+        Length to read, s; less if the stream ends before.
     dtype : str
         As in `live_snapshots`, real.
     rate : float

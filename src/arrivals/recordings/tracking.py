@@ -119,12 +119,12 @@ def choice_for(recording: Recording, options: TrackOptions | None = None) -> Cho
     recording : Recording
         With `array`.
     options : TrackOptions, optional
-        What is given.
+        Given settings.
 
     Returns
     -------
     Choice
-        Its text is a line that says what was chosen, as options of `arrivals track`.
+        Its text is one line: the choice as options of `arrivals track`.
 
     Examples
     --------
@@ -153,7 +153,7 @@ class RecordedSteps:
     recording : Recording
         The recording.
     choice : Choice
-        What is chosen for it.
+        Frequencies, windows and number of windows in a step.
 
     Raises
     ------

@@ -136,7 +136,7 @@ def assembled(
     array : SensorArray
         The array.
     choice : Choice
-        What is chosen.
+        Frequencies, windows and tracker.
     rate : float or None
         Samples per second, Hz.
 

@@ -11,7 +11,7 @@ from arrivals.validation import count, items, positive
 
 @dataclass(frozen=True, eq=False)
 class TrackOptions:
-    """Arguments of `arrivals.track` that are given; None for what is to be chosen.
+    """Arguments of `arrivals.track`; None for those to be chosen.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class Choice:
     Parameters
     ----------
     reason : str
-        What the recording is; empty if nothing of weight was left to choose.
+        Kind of recording; empty if nothing of weight was left to choose.
     tracker : str
         Registered name.
     frequencies : tuple of float

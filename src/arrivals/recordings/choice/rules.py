@@ -33,7 +33,7 @@ def choose(
     options: TrackOptions | None = None,
     n_samples: int | None = None,
 ) -> Choice:
-    """Return what is given, completed by what fits the array and the recording.
+    """Complete given settings by settings that fit the array and the recording.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def choose(
     spectrum : MeanSpectrum or None
         Spectrum of real samples; None for complex snapshots.
     options : TrackOptions, optional
-        What is given.
+        Given settings.
     n_samples : int, optional
         Rows of the recording, if known.
 
@@ -221,7 +221,7 @@ def _frames(
 
 
 def _completed(choice: Choice, options: TrackOptions, snr_db: float) -> Choice:
-    """Return a choice with what is given, and settings for recorded data if svalse is chosen."""
+    """Return a choice with the given settings, and those for recorded data if svalse is chosen."""
     window, n = options.window or choice.window or 2, options.snapshots or choice.n_snapshots
     settings: dict[str, Any] = dict(options.settings)
     if options.tracker is None and choice.tracker == NARROWBAND:
