@@ -152,26 +152,7 @@ class SnapshotNoise(SnapshotGate, SingleSourceSnapshot):
     def observe(
         self, z: ArrayLike | None, reference: Reference = "middle"
     ) -> ObservedSnapshots | None:
-        """Return the bins, sensors and snapshots of a measurement that have valid data.
-
-        Parameters
-        ----------
-        z : array_like, shape `shape`, or None
-            Complex; NaN where a sensor gave no number.
-        reference : {"middle", "first"}
-            As in `manifold`.
-
-        Returns
-        -------
-        ObservedSnapshots or None
-            Data without gaps, in white noise, and their manifold; None if the whole measurement
-            is missing.
-
-        Raises
-        ------
-        ValueError
-            If the shape is wrong, or every sensor has a gap in some snapshot.
-        """
+        """Return what `SnapshotGate.observe` does, with snapshots in white noise, L z."""
         observed = super().observe(z, reference)
         if observed is None or self.coherence is None:
             return observed

@@ -13,7 +13,6 @@ from arrivals.typing import Float
 
 SMALLEST = np.finfo(float).tiny
 UNIFORM_VARIANCE = (6 * np.pi) ** 2  # rad², after which every direction is as likely
-PEAK_HALF_WIDTH = np.deg2rad(18.0)  # of the part of a density whose moments are reported
 
 
 @dataclass(frozen=True)
@@ -68,15 +67,15 @@ class DirectionGrid(FrozenModel):
         """
         return _walk(self, variance)
 
-    def moments(self, density: Float) -> tuple[Float, Float]:
+    def moments(self, density: Float, half_width: float) -> tuple[Float, Float]:
         """Return mean and variance of densities (n, n_directions) about their peaks, (n,), (n,).
 
-        Those of a density narrower than the grid's step are vertex and curvature of the parabola
-        through three points of its logarithm.
+        They are those of the part within `half_width`, rad. Of a density narrower than the grid's
+        step they are vertex and curvature of the parabola through three points of its logarithm.
         """
         top = density.argmax(axis=-1)
         offset = self.offset[top]
-        w = density * (np.abs(offset) <= PEAK_HALF_WIDTH)
+        w = density * (np.abs(offset) <= half_width + 1e-9)
         w = w / np.maximum(w.sum(axis=-1, keepdims=True), SMALLEST)
         mean = (w * offset).sum(axis=-1)
         variance = (w * (offset - mean[:, None]) ** 2).sum(axis=-1)

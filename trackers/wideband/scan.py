@@ -78,7 +78,7 @@ class Scan:
         moved = (q @ self.grid.walk(variance)).reshape(sources.density.shape)
         return replace(sources, density=moved)
 
-    def moments(self, density: Float) -> tuple[Float, Float]:
-        """Return mean and variance of directions from densities (n, n_points)."""
+    def moments(self, density: Float, half_width: float) -> tuple[Float, Float]:
+        """Return mean and variance of directions about the peaks of densities (n, n_points)."""
         by_direction = density.reshape(len(density), self.n_nuisance, len(self.grid.doa))
-        return self.grid.moments(by_direction.sum(axis=1))
+        return self.grid.moments(by_direction.sum(axis=1), half_width)

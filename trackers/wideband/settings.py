@@ -12,7 +12,8 @@ from arrivals.parameters import FrozenModel
 from arrivals.validation import count, not_negative, number, one_of, positive, probability
 
 COUNTS = {"iterations": 100, "max_sources": 100, "max_births": 100}
-PROBABILITIES = ("background", "birth_share", "min_share", "birth_existence")
+PROBABILITIES = ("background", "birth_share", "min_share", "birth_existence", "min_existence",
+                 "unsupported_existence")  # fmt: skip
 MAY_BE_ZERO = ("relocation", "model_deviation", "merge", "birth_evidence", "max_loss",
                "min_rate", "floor_db", "floor_rise", "decay")  # fmt: skip
 MAX_ONSET_DB = 1000
@@ -38,6 +39,8 @@ class MixtureSettings(FrozenModel):
     model_deviation : float
         Part of the stated standard deviation that more bins do not reduce, rad: rounding to the
         grid, noise that is not diffuse, echoes within a window.
+    peak_half_width : float
+        Part of a density about its peak whose mean and deviation are stated, rad.
     iterations : int
         Variational iterations of a fit.
     background, birth_share, min_share : float
@@ -51,11 +54,15 @@ class MixtureSettings(FrozenModel):
         New sources in one step, and reported sources.
     merge : float
         Least distance of two sources, rad.
+    min_existence : float
+        Existence from which a source is active and reported.
     pause, unsupported : float
         Time constants of the existence while no bin counts, and of a source of less than
         `min_share` while others do, s.
-    max_loss : float
-        Most that the log odds of existence lose, 1/s.
+    unsupported_existence : float
+        Existence to which the latter decays.
+    max_loss, max_gain : float
+        Most that the log odds of existence lose, 1/s, and gain in a step.
     relocation : float
         Rate at which the density of an inactive source becomes uniform, 1/s: above 0, the label of
         a source that pauses may pass to a new one elsewhere.
@@ -87,6 +94,7 @@ class MixtureSettings(FrozenModel):
     tempering: float = 25.0
     deviation_tempering: float = 5.0
     model_deviation: float = float(np.deg2rad(0.5))
+    peak_half_width: float = float(np.deg2rad(18.0))
     iterations: int = 3
     background: float = 0.3
     birth_share: float = 0.15
@@ -96,9 +104,12 @@ class MixtureSettings(FrozenModel):
     max_births: int = 2
     max_sources: int = 4
     merge: float = float(np.deg2rad(12.0))
+    min_existence: float = 0.5
     pause: float = 0.25
     unsupported: float = 0.106
+    unsupported_existence: float = 0.3
     max_loss: float = 23.0
+    max_gain: float = 30.0
     relocation: float = 0.0
     memory: float = 2.0
     confirm: float = 0.26

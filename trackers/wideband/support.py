@@ -9,12 +9,10 @@ import numpy as np
 from arrivals.trackers.wideband.direction_grid import SMALLEST, DirectionGrid
 from arrivals.trackers.wideband.mixture import Mixture, log_odds_gain
 from arrivals.trackers.wideband.settings import MixtureSettings
-from arrivals.trackers.wideband.tracked_sources import REPORTED, TrackedSources
+from arrivals.trackers.wideband.tracked_sources import TrackedSources
 from arrivals.typing import Int
 
-UNSUPPORTED = 0.3  # existence to which that of a source of too small a share decays
 CERTAIN = 1e-4  # least distance of an updated existence from 0 and 1
-MAX_GAIN = 30.0  # of the log odds in one step
 
 
 def updated(
@@ -32,13 +30,14 @@ def updated(
     gain = log_odds_gain(mixture, sources.density, settings.tempering)
     predicted = np.clip(sources.existence, SMALLEST, 1 - np.finfo(float).eps)
     odds = np.log(predicted) - np.log1p(-predicted)
-    odds = odds + np.clip(gain, -settings.max_loss * seconds, MAX_GAIN)
+    odds = odds + np.clip(gain, -settings.max_loss * seconds, settings.max_gain)
     existence = np.clip(1 / (1 + np.exp(-np.clip(odds, -20, 20))), CERTAIN, 1 - CERTAIN)
     share = mixture.share[1:]
     decay = float(np.exp(-seconds / settings.unsupported))
-    lower = np.maximum(decay * existence, np.minimum(existence, UNSUPPORTED))
+    lower = np.maximum(decay * existence, np.minimum(existence, settings.unsupported_existence))
     existence = np.where(share < settings.min_share, lower, existence)
-    active = existence >= REPORTED
+    sources = replace(sources, existence=existence)
+    active = sources.active(settings)
     is_new = sources.label < 0
     density = np.where((active | is_new)[:, None], mixture.density, sources.density)
     peaks = density.argmax(axis=1) % len(grid.doa)
@@ -50,4 +49,4 @@ def updated(
             kept.append(int(i))
     kept = sorted(kept, key=lambda i: -existence[i])[: settings.max_sources]
     index = np.array(kept, dtype=np.int64)
-    return replace(sources, density=density, existence=existence).select(index), index
+    return replace(sources, density=density).select(index), index

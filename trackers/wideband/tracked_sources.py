@@ -7,9 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from arrivals.trackers.wideband.settings import MixtureSettings
-from arrivals.typing import Float, Int
-
-REPORTED = 0.5  # least existence of an active source
+from arrivals.typing import Bool, Float, Int
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,9 +72,13 @@ class TrackedSources:
         limit = np.where(self.label >= 0, settings.memory, settings.confirm)
         return np.flatnonzero(self.age <= limit * (1 + 1e-9))
 
-    def labelled(self, n_labels: int) -> TrackedSources:
+    def active(self, settings: MixtureSettings) -> Bool:
+        """Return which sources are active, (n,)."""
+        return np.asarray(self.existence >= settings.min_existence)
+
+    def labelled(self, n_labels: int, settings: MixtureSettings) -> TrackedSources:
         """Return the sources with the next labels for active ones that have none; age 0."""
-        active = self.existence >= REPORTED
+        active = self.active(settings)
         new = active & (self.label < 0)
         label = np.where(new, n_labels - 1 + np.cumsum(new), self.label)
         return replace(self, label=label, age=np.where(active, 0.0, self.age))

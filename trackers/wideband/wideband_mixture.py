@@ -23,7 +23,7 @@ from arrivals.trackers.wideband.mixture import fit_with_births
 from arrivals.trackers.wideband.scan import Scan
 from arrivals.trackers.wideband.settings import MixtureSettings
 from arrivals.trackers.wideband.support import updated
-from arrivals.trackers.wideband.tracked_sources import REPORTED, TrackedSources
+from arrivals.trackers.wideband.tracked_sources import TrackedSources
 from arrivals.typing import Float
 from arrivals.validation import instance, no_control, positive, time_step
 
@@ -74,11 +74,11 @@ class WidebandMixture(DirectionTracker):
 
     Notes
     -----
-    Reported are sources of existence 0.5 and more: mean and standard deviation of the density
-    about its peak, and as amplitude the root of the mean power over the bins and snapshots of the
-    step of what is assigned to the source. A source that pauses keeps its density and label for
-    `settings.memory`. Echoes from one direction that arrive within a window of the direct sound,
-    as those of floor and ceiling do on a line, may be reported as a source.
+    Reported are sources of existence `settings.min_existence` and more: mean and standard deviation
+    of the density about its peak, and as amplitude the root of the mean power over the bins and
+    snapshots of the step of what is assigned to the source. A source that pauses keeps its density
+    and label for `settings.memory`. Echoes from one direction that arrive within a window of the
+    direct sound, as those of floor and ceiling do on a line, may be reported as a source.
 
     References
     ----------
@@ -137,7 +137,8 @@ class WidebandMixture(DirectionTracker):
 
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
         """Predict densities and existence; end sources that were inactive for long."""
-        seconds = time_step(dt) * self.step_duration
+        dt = time_step(dt)
+        seconds = dt * self.step_duration
         no_control(u)
         self._apply_changed_parameters()
         motion, time = (DEFAULT_MOTION, seconds) if self.motion is None else (self.motion, dt)
@@ -176,7 +177,7 @@ class WidebandMixture(DirectionTracker):
             sources, kept = updated(sources, mixture, self.scan.grid, settings, self.elapsed)
             power = power[kept]
         self.levels, self.gap, self.elapsed = levels, 0.0, 0.0
-        sources = sources.labelled(self.n_labels)
+        sources = sources.labelled(self.n_labels, settings)
         self.n_labels = max(self.n_labels, int(sources.label.max(initial=-1)) + 1)
         remembered = sources.remembered(settings)
         self.sources = sources.select(remembered)
@@ -192,11 +193,11 @@ class WidebandMixture(DirectionTracker):
 
     def _report(self, power: Float | None = None) -> None:
         """Report the sources that exist, with the powers of this step."""
-        sources = self.sources
-        active = np.flatnonzero((sources.existence >= REPORTED) & (sources.label >= 0))
-        doa, variance = self.scan.moments(sources.density[active])
+        sources, settings = self.sources, self.settings
+        active = np.flatnonzero(sources.active(settings) & (sources.label >= 0))
+        doa, variance = self.scan.moments(sources.density[active], settings.peak_half_width)
         # bins are T times fewer than they seem; the direction is T_std times as uncertain
-        sharpening = self.settings.deviation_tempering / self.settings.tempering
-        std = np.sqrt(sharpening * variance + self.settings.model_deviation**2)
+        sharpening = settings.deviation_tempering / settings.tempering
+        std = np.sqrt(sharpening * variance + settings.model_deviation**2)
         amplitude = None if power is None else np.sqrt(power[active])
         self.report(doa, std, sources.existence[active], amplitude, sources.label[active])

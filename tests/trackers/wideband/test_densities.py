@@ -46,7 +46,7 @@ def test_moments_are_those_of_a_sampled_density(
     grid: DirectionGrid, doa: float, std: float
 ) -> None:
     density = np.exp(-0.5 * (grid.difference(grid.doa, np.array(doa)) / std) ** 2)
-    mean, variance = grid.moments(density[None] / density.sum())
+    mean, variance = grid.moments(density[None] / density.sum(), SETTINGS.peak_half_width)
     assert abs(mean[0] - doa) < 0.02 * std + 1e-3
     assert np.sqrt(variance[0]) == pytest.approx(std, rel=0.1)
 
@@ -54,7 +54,7 @@ def test_moments_are_those_of_a_sampled_density(
 def test_mean_of_a_circle_does_not_depend_on_its_seam() -> None:
     grid = GRIDS[0]
     density = np.exp(40 * np.cos(grid.doa - np.pi + 0.01))[None]
-    mean, _ = grid.moments(density / density.sum())
+    mean, _ = grid.moments(density / density.sum(), SETTINGS.peak_half_width)
     assert abs(np.angle(np.exp(1j * (mean[0] - np.pi + 0.01)))) < 3e-3
 
 
