@@ -160,6 +160,11 @@ class ArraySnapshot(SnapshotNoise):
         return len(self.shape) == 1 and self.slowness is None and self.elevation is None
 
     @property
+    def is_plain(self) -> bool:
+        """True if `is_single`, the elements are isotropic and the noise is white."""
+        return self.is_single and self.response is None and self.coherence is None
+
+    @property
     def waves(self) -> PlaneWaves:
         """Response of the array to plane waves."""
         parts = self.response, self.slowness, self.elevation

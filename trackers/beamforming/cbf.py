@@ -124,14 +124,14 @@ class CBF(DirectionTracker):
 
     def _scan(self, z: Complex) -> Float:
         model = self.measurement
-        if model.is_single and model.response is None and model.coherence is None:
+        if model.is_plain:
             return self.spectrum(model.steering_vector(self.doa_grid), z)
         return self.block_spectrum(model.snapshots(z))
 
     def _amplitude(self, doa: Float, z: Complex) -> Complex:
         """Return amplitudes, or the root of the mean power over several bins and snapshots."""
         model = self.measurement
-        if model.is_single and model.response is None and model.coherence is None:
+        if model.is_plain:
             return self.amplitudes(model.steering_vector(doa), z)
         return self.block_amplitudes(doa, model.snapshots(z))
 

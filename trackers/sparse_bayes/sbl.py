@@ -182,14 +182,9 @@ class SBL(BatchDirectionTracker):
             for index, (tracker, block) in enumerate(group):
                 tracker._report_peaks(powers, index, block)
 
-    @property
-    def _is_plain(self) -> bool:
-        model = self.measurement
-        return model.is_single and model.response is None and model.coherence is None
-
     def _valid_snapshots(self, z: ArrayLike | None) -> ValidSnapshots | None:
         """Return the snapshots of the sensors with valid data; None if missing or zero."""
-        if not self._is_plain:
+        if not self.measurement.is_plain:
             return valid_block(self.measurement, self.measurement.snapshots(z))
         z = numbers("z", np.nan if z is None else z)
         Y = self.measurement.snapshot(z, len(z) if z.ndim == 2 else None)
