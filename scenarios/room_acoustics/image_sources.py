@@ -16,6 +16,7 @@ from arrivals.validation import count, not_negative, positive, real, shaped
 
 HALF_WIDTH = 20  # samples: half of the windowed sinc of a fractional delay
 MAX_ORDER = 200  # 10.7 million images
+MAX_BLOCK = 2**22  # samples of pulses that are added together: 32 MB
 N_DIRECTIONS = 500  # of a mean over the sphere
 
 
@@ -184,16 +185,18 @@ def delay_and_add(delay: ArrayLike, gain: ArrayLike) -> Float:
     array([ 0. ,  0. ,  1. , -0.5,  0. ])
     """
     delay, gain = np.asarray(delay, dtype=np.float64), np.asarray(gain, dtype=np.float64)
-    n_channels = delay.shape[1]
-    first = np.round(delay).astype(np.int64) - HALF_WIDTH
+    n_pulses, n_channels = delay.shape
     taps = np.arange(2 * HALF_WIDTH + 1)
-    t = taps - HALF_WIDTH + (np.round(delay) - delay)[..., None]  # from the pulse, in (-21, 21)
-    pulse = gain[..., None] * np.sinc(t) * np.cos(np.pi * t / (2 * HALF_WIDTH + 2)) ** 2
-    index = first[..., None] + taps
-    n_samples = int(index.max()) + 1
-    flat = index * n_channels + np.arange(n_channels)[:, None]
-    kept = index >= 0
-    total = np.bincount(flat[kept], pulse[kept], minlength=n_samples * n_channels)
+    n_samples = int(np.round(delay.max())) + HALF_WIDTH + 1
+    total = np.zeros(n_samples * n_channels)
+    n_block = max(1, MAX_BLOCK // (len(taps) * n_channels))
+    for i in range(0, n_pulses, n_block):
+        d, g = delay[i : i + n_block], gain[i : i + n_block]
+        t = taps - HALF_WIDTH + (np.round(d) - d)[..., None]  # from the pulse, in (-21, 21)
+        pulse = g[..., None] * np.sinc(t) * np.cos(np.pi * t / (2 * HALF_WIDTH + 2)) ** 2
+        index = (np.round(d).astype(np.int64) - HALF_WIDTH)[..., None] + taps
+        flat, kept = index * n_channels + np.arange(n_channels)[:, None], index >= 0
+        total += np.bincount(flat[kept], pulse[kept], minlength=len(total))
     return np.asarray(total.reshape(n_samples, n_channels))
 
 

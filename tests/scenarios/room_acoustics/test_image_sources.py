@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.signal import butter, sosfilt
 
 from arrivals.measurement_models import SensorArray
-from arrivals.scenarios.room_acoustics import Shoebox, convolve_moving, delay_and_add
+from arrivals.scenarios.room_acoustics import Shoebox, convolve_moving, delay_and_add, image_sources
 from arrivals.typing import Float
 
 RATE, SIZE = 16000.0, (6.0, 5.0, 2.8)
@@ -119,3 +119,11 @@ def test_shoebox_invalid_arguments_are_refused() -> None:
         Shoebox(SIZE).response([7.0, 1.0, 1.0], [[1.0, 1.0, 1.0]], RATE)
     with pytest.raises(ValueError, match="sensors must lie in the room"):
         Shoebox(SIZE).response([1.0, 1.0, 1.0], [[1.0, 1.0]], RATE)
+
+
+def test_pulses_may_be_added_in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(0)
+    delay, gain = rng.uniform(0, 300, (500, 3)), rng.normal(size=(500, 3))
+    whole = delay_and_add(delay, gain)
+    monkeypatch.setattr(image_sources, "MAX_BLOCK", 5000)
+    np.testing.assert_allclose(delay_and_add(delay, gain), whole, atol=1e-12)
