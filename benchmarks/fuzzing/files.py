@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from arrivals.measurement_models import SensorArray
-from arrivals.recordings.networks import read_network
 from arrivals.recordings.readers import read
+from arrivals.recordings.readings import read_network
 from arrivals.scenarios.experiments.monte_carlo import monte_carlo
 from arrivals.scenarios.experiments.study import Study
 from arrivals.scenarios.simulations.sampled_source import InterpolationTone
@@ -27,6 +27,14 @@ from fuzzing.judging import Call
 SAMPLES = np.round(np.random.default_rng(0).standard_normal((64, 3)), 3)
 LEVELS = "time_s,a,b,c\n0,-60,-62.5,\n1,-61,-63,-59\n2,-60.5,-62,-58\n"
 LONG = "time_s,sensor,rss_db\n0,a,-60\n0,b,-61\n1,c,-59\n1,a,-60.5\n"
+DATES = (
+    "timestamp,BSSID,tag,dBm\n2026-05-01T12:00:00.25Z,a,t,-60\n2026-05-01T12:00:00.5Z,b,t,-61\n"
+    "2026-05-01T12:00:01.125Z,c,t,-59\n2026-05-01T12:00:01.5Z,a,t,-60.5\n"
+)
+SURVEY = "WigleWifi-1.6,model=x\nMAC,FirstSeen,RSSI,CurrentLatitude,CurrentLongitude\n" + "".join(
+    f"02:00:00:00:00:00,2026-05-01 12:00:0{k},{-50 - k},60.17{k},24.94{k**2 % 7}\n"
+    for k in range(5)
+)
 PLACES = "name,x_m,y_m\na,0,0\nb,10,0\nc,4,9\n"
 ARRAY = 'kind = "ula"\nn_sensors = 3\nspacing = 0.17\nspeed = 343.0\nmissing = []\n'
 POSITIONS = 'kind = "positions"\npositions = [[0.0, 0.0], [0.1, 0.0], [0.0, 0.2]]\nspeed = 343.0\n'
@@ -92,6 +100,8 @@ TEXTS = {
     "array positions": POSITIONS,
     "network": LEVELS,
     "network long": LONG,
+    "network dates": DATES,
+    "network survey": SURVEY,
     "sensors": PLACES,
 }
 BINARY = ("wav", "wav float", "wav 8", "npy", "npz", "npz small", "network npz", "mat", "mat small")
@@ -161,7 +171,7 @@ def _read(kind: str, path: Path) -> Any:
     if kind.startswith("network"):
         places = folder() / "places.csv"
         places.write_text(PLACES)
-        return read_network(path, places)
+        return read_network(path, None if kind == "network survey" else places)
     if kind == "sensors":
         levels = folder() / "levels.csv"
         levels.write_text(LEVELS)

@@ -1,21 +1,24 @@
 """Track directions of arrival, and positions from signal strength.
 
 The parts live in four subpackages: `arrivals.motion_models`, `arrivals.measurement_models`,
-`arrivals.trackers` and `arrivals.scenarios`. `arrivals.track` tracks a recording in one call.
+`arrivals.trackers` and `arrivals.scenarios`. `arrivals.track` tracks a recording in one call,
+`arrivals.locate` sources by readings of signal strength.
 """
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from arrivals.recordings.readings.locating import locate
     from arrivals.recordings.tracking import track
 
 __version__ = "0.1.0"
-__all__ = ["__version__", "track"]
+__all__ = ["__version__", "locate", "track"]
+
+LAZY = {"locate": "arrivals.recordings.readings.locating", "track": "arrivals.recordings.tracking"}
 
 
 def __getattr__(name: str) -> Any:
-    if name != "track":
+    if name not in LAZY:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from arrivals.recordings.tracking import track
-
-    return track
+    return getattr(import_module(LAZY[name]), name)

@@ -83,7 +83,7 @@ def named_rows(data: bytes) -> list[TableRow]:
     [2.5, nan]
     """
     lines = list(table_lines(data, comments=()))
-    header = [name.strip() for name in lines[0].cells] if lines else []
+    header = _without_empty([name.strip() for name in lines[0].cells]) if lines else []
     repeated = sorted({name for name in header if header.count(name) > 1})
     if repeated:
         raise ValueError(f"the column {repeated[0]!r} is listed twice")
@@ -91,10 +91,18 @@ def named_rows(data: bytes) -> list[TableRow]:
         raise ValueError("there is no row below the header")
     columns = {name: k for k, name in enumerate(header)}
     for line in lines:
-        if len(line.cells) > len(header):
+        if len(_without_empty(line.cells)) > len(header):
             raise ValueError(f"line {line.number} has more cells than the header")
         line.cells.extend([""] * (len(header) - len(line.cells)))
     return [TableRow(line, columns) for line in lines[1:]]
+
+
+def _without_empty(cells: list[str]) -> list[str]:
+    """Return cells without empty ones at the end, as spreadsheets write for empty columns."""
+    n = len(cells)
+    while n and not cells[n - 1].strip():
+        n -= 1
+    return cells[:n]
 
 
 def plain(cell: str, separator: str | None) -> str:

@@ -5,13 +5,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from reading_tables import iso, sensors, text
+from reading_tables import walk as walk_of_a_phone
 
 import arrivals.scenarios
 from arrivals.__main__ import main
-from arrivals.cli.locate import locate_sources
 from arrivals.plots.maps import ellipse, plot_map
-from arrivals.recordings.network_calibration import calibrate
-from arrivals.recordings.networks import Network
+from arrivals.recordings.readings import Network, calibrate
+from arrivals.recordings.readings.tracking import locate_sources
 from arrivals.scenarios import create, read_network
 from arrivals.scenarios.reproduce.rss.measured_network import FLOOR_DB, track_transmitter
 from arrivals.typing import Float
@@ -84,6 +85,10 @@ def test_locate_prints_without_an_output_file(
         (["--alpha", "-2"], "alpha must be finite and positive"),
         (["--sigma", "0"], "sigma must be positive"),
         (["--sources", "0"], "n_sources must be at least 1"),
+        (["--sources", "few"], "--sources: must be a number or auto; got 'few'"),
+        (["--missing", "100", "readings.csv"], "must be numbers; got 'readings.csv': write"),
+        (["--group-by", "floor"], "group_by must be a column; got 'floor': found time_s, s0"),
+        (["--window", "-1"], "window must be finite and positive"),
         (["--tracker", "svalse"], "invalid choice"),
     ],
 )
@@ -201,6 +206,48 @@ def test_locate_refuses_more_sources_than_sensors_with_readings(
     command = ["locate", str(readings), "--sensors", str(sensors), "--sources", "40", "--quiet"]
     assert main(command) == 2
     assert "n_sources must be at most 25, the number of sensors" in capsys.readouterr().err
+
+
+def scan(folder: Path) -> list[str]:
+    """Write a log of two devices at scattered times; return arguments."""
+    late = np.random.default_rng(1)
+    rows = [
+        (iso(time + late.uniform(0, 0.9)), name, device, level)
+        for device, seed in (("phone-1", 1), ("tag-2", 2))
+        for time, name, level in walk_of_a_phone(12, seed=seed)
+    ]
+    (folder / "scan.csv").write_text(text(("timestamp", "BSSID", "device", "RSSI"), rows))
+    return ["locate", str(folder / "scan.csv"), "--sensors", str(sensors(folder)), "--alpha", "2.5"]
+
+
+def test_locate_says_in_one_line_what_was_understood(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, plot = tmp_path / "positions.csv", tmp_path / "map.png"
+    assert main([*scan(tmp_path), "--out", str(out), "--plot", str(plot)]) == 0
+    result = capsys.readouterr()
+    assert result.out == ""
+    lines = [line for line in result.err.splitlines() if line.startswith("arrivals: ")]
+    assert lines == [
+        "arrivals: time 'timestamp' (from 2026-05-01T12:00:00Z); sensor 'BSSID'; level 'RSSI'; "
+        "device 'device' (2, each by itself); times are scattered: steps of 1 s (--window); "
+        "1 source a device (--sources auto: estimate it)"
+    ]
+    rows = list(csv.DictReader(out.read_text().splitlines()))
+    assert [row["device"] for row in rows] == 12 * ["phone-1"] + 12 * ["tag-2"]
+    assert plot.read_bytes().startswith(b"\x89PNG")
+
+
+def test_locate_options_of_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    options = ["--group-by", "DEVICE", "--window", "2", "--missing", "100", "-200", "--sources",
+               "1", "--quiet"]  # fmt: skip
+    assert main([*scan(tmp_path), *options]) == 0
+    result = capsys.readouterr()
+    assert result.err == ""
+    rows = list(csv.DictReader(result.out.splitlines()))
+    assert [int(row["step"]) for row in rows] == 2 * list(range(6))
+    assert main([*scan(tmp_path), "--sources", "auto", "--quiet"]) == 0
+    assert len(capsys.readouterr().out.splitlines()) < 1 + 24  # found after two steps
 
 
 @pytest.mark.filterwarnings("always")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,10 +17,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 CONFIDENCE = 0.95
+MAX_NAMES = 12  # in the legend
 
 
 def plot_map(
-    run: Run,
+    run: Run | Mapping[str, Run],
     *,
     sensors: ArrayLike | None = None,
     truth: ArrayLike | None = None,
@@ -30,8 +32,8 @@ def plot_map(
 
     Parameters
     ----------
-    run : Run
-        Run of a tracker of positions.
+    run : Run, or mapping of str to Run
+        Run of a tracker of positions; or runs by name, such as those of `arrivals.locate`.
     sensors : array_like, shape (n_sensors, 2), optional
         Sensor positions, m; rows with NaN are left out.
     truth : array_like, shape (n_steps, n_sources, 2), optional
@@ -59,8 +61,10 @@ def plot_map(
     >>> plot_map(run, sensors=trial.measurement.sensors).get_xlabel()
     'x, m'
     """
-    if "position" not in run.fields:
-        raise TypeError(f"run must contain positions; got {run.kind.__name__}")
+    runs = run if isinstance(run, Mapping) else {"": run}
+    for one in runs.values():
+        if "position" not in one.fields:
+            raise TypeError(f"run must contain positions; got {one.kind.__name__}")
     count("n_ellipses", n_ellipses)
     ax = new_axes((7.0, 6.4)) if ax is None else ax
     if sensors is not None:
@@ -70,8 +74,14 @@ def plot_map(
         for j, path in enumerate(np.moveaxis(real("truth", truth), 1, 0)):
             ax.plot(*path.T, color="black", linewidth=0.8, linestyle=":",
                     label=None if j else "truth")  # fmt: skip
-    for label in np.unique(run.label[run.label >= 0]).tolist():
-        _draw_track(ax, run, label, n_ellipses)
+    first = 0  # colour of a run's label 0
+    for name, one in runs.items():
+        labels = np.unique(one.label[one.label >= 0]).tolist()
+        for label in labels:
+            number = f"source {label}" if not name or len(labels) > 1 else ""
+            text = " ".join(filter(None, (name, number))) if first < MAX_NAMES else None
+            _draw_track(ax, one, label, n_ellipses, text, PALETTE[(first + label) % len(PALETTE)])
+        first += max(labels, default=-1) + 1
     ax.set(xlabel="x, m", ylabel="y, m")
     ax.set_aspect("equal", adjustable="datalim")
     ax.grid(color="0.92")
@@ -81,13 +91,14 @@ def plot_map(
     return ax
 
 
-def _draw_track(ax: Axes, run: Run, label: int, n_ellipses: int) -> None:
+def _draw_track(
+    ax: Axes, run: Run, label: int, n_ellipses: int, text: str | None, colour: str
+) -> None:
     step, slot = np.nonzero(run.label == label)
     position, spread = run.position[step, slot], run.covariance[step, slot]
-    colour = PALETTE[label % len(PALETTE)]
     breaks = np.flatnonzero(np.diff(step) > 1) + 1
     for n, part in enumerate(np.split(position, breaks)):
-        ax.plot(*part.T, color=colour, linewidth=1.6, label=None if n else f"source {label}")
+        ax.plot(*part.T, color=colour, linewidth=1.6, label=None if n else text)
     ax.scatter(
         position[-1:, 0],
         position[-1:, 1],
