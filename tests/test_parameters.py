@@ -160,7 +160,7 @@ def test_list_of_parts_makes_the_round_trip() -> None:
         ({"kappa": 1.0}, ValueError, "dictionary with the key 'type'"),
         ("svalse", ValueError, "dictionary with the key 'type'; got 'svalse'"),
         ({"type": 3}, ValueError, "no tracker '3'"),
-        ({"type": "svals"}, ValueError, "there is no tracker 'svals'; did you mean svalse"),
+        ({"type": "svals"}, ValueError, "there is no tracker 'svals': did you mean svalse"),
         ({"type": "no_module:Thing"}, ValueError, "there is no class 'no_module:Thing'"),
         ({"type": "arrivals:Thing"}, ValueError, "there is no class 'arrivals:Thing'"),
         ({"type": ":Thing"}, ValueError, "there is no class ':Thing': install"),

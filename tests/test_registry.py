@@ -67,10 +67,10 @@ def test_class_without_the_base_is_refused(animals: Registry[Animal], stranger: 
 
 
 def test_unknown_name_is_refused_with_similar_names() -> None:
-    with pytest.raises(ValueError, match="there is no tracker 'svasle'; did you mean svalse"):
+    with pytest.raises(ValueError, match="there is no tracker 'svasle': did you mean svalse"):
         create("svasle")
     with pytest.raises(
-        ValueError, match=r"no tracker 'xyz'; known: ar_kalman_qrd_rls, .*cbf, .*svalse"
+        ValueError, match=r"no tracker 'xyz': known: ar_kalman_qrd_rls, .*cbf, .*svalse"
     ):
         find("xyz")
 

@@ -1,47 +1,93 @@
-"""Arrays from files.
-
-An array file is TOML. `kind` says which other keys it has:
-
-===========  ==============================================================
-kind         keys
-===========  ==============================================================
-ula          `n_sensors`, `spacing`
-uca          `n_sensors`, `radius`
-symmetric    `distances`: of the sensors on either side of the centre
-positions    `positions`: a list of numbers, of [x, y] or of [x, y, z]
-===========  ==============================================================
-
-and all may have `speed` (m/s), `missing` (numbers of elements that do not work) and `channels`
-(the recording's channel of each element). Lengths are metres. Elements and channels are counted
-from 1 in the file, as they are labelled on the hardware; `channels` names one for every element
-of the whole array, or one for each that is not missing.
-"""
+"""Arrays from files: TOML, JSON, tables of positions, presets."""
 
 from __future__ import annotations
 
+import json
 import tomllib
+from collections.abc import Callable, Mapping
+from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from arrivals.files import file_error, open_input
+from arrivals.measurement_models.arrays.description import from_description
+from arrivals.measurement_models.arrays.presets import preset_names
 from arrivals.measurement_models.arrays.sensor_array import SensorArray
-from arrivals.measurements import real_numbers
+from arrivals.messages import nearest, shown
 from arrivals.tables import TableLine, table_lines
-from arrivals.validation import count
 
-MAX_SENSORS = 100_000
-KEYS = {
-    "ula": ("n_sensors", "spacing"),
-    "uca": ("n_sensors", "radius"),
-    "symmetric": ("distances",),
-    "positions": ("positions",),
-}
+TABLES = (".csv", ".tsv", ".txt", ".xyz")
 
 
-def from_toml(path: str | Path) -> SensorArray:
-    """Read an array file.
+def from_file(source: str | PathLike[str]) -> SensorArray:
+    """Read an array file, or the preset of a name.
+
+    Parameters
+    ----------
+    source : str or path
+        Name of a preset in `arrivals list`; or a file: JSON (suffix .json), a table of positions in
+        metres (.csv, .tsv, .txt, .xyz), which has no wave speed, else TOML.
+
+    Returns
+    -------
+    SensorArray
+
+    Raises
+    ------
+    ValueError
+        If there is neither such a preset nor such a file, or the file is invalid; the message
+        starts with the file's name.
+    OSError
+        If the file cannot be read.
+
+    Examples
+    --------
+    >>> from_file("respeaker-usb-v2").channels
+    (1, 2, 3, 4)
+    >>> from_file("kraken5")
+    Traceback (most recent call last):
+    ValueError: there is no array file or preset 'kraken5': did you mean kraken-5?
+    """
+    name, path = fspath(source), Path(source)
+    if not path.suffix and path.name == name and not path.exists():
+        if name not in preset_names():
+            hint = nearest(name, preset_names())
+            raise ValueError(f"there is no array file or preset {name!r}: {hint}")
+        try:
+            return from_description({"kind": name})
+        except ValueError as error:  # a preset may leave keys open
+            raise ValueError(f"{error}: write an array file with kind = {name!r}") from None
+    if path.suffix.lower() in TABLES:
+        return from_csv(path)
+    return _described(path, json.loads if path.suffix.lower() == ".json" else tomllib.loads)
+
+
+def given_array(array: Any) -> SensorArray | None:
+    """Return the array of an argument: a SensorArray, a file, a preset's name, or None.
+
+    Raises
+    ------
+    TypeError
+        If the argument is something else.
+
+    Examples
+    --------
+    >>> given_array("respeaker-4mic").n_sensors
+    4
+    """
+    if array is None or isinstance(array, SensorArray):
+        return array
+    if not isinstance(array, str | PathLike):
+        raise TypeError(
+            f"array must be an array file, a preset or a SensorArray; got {type(array).__name__}"
+        )
+    return from_file(array)
+
+
+def from_toml(path: str | PathLike[str]) -> SensorArray:
+    """Read an array file in TOML.
 
     Raises
     ------
@@ -49,72 +95,23 @@ def from_toml(path: str | Path) -> SensorArray:
         If the file is not TOML, lacks a key or has one that its kind does not have, or if its
         numbers make no array; the message starts with the file's name.
     """
+    return _described(path, tomllib.loads)
+
+
+def _described(path: str | PathLike[str], parse: Callable[[str], Any]) -> SensorArray:
     with open_input(path) as file:
         data = file.read()
     try:
-        return from_description(tomllib.loads(data.decode("utf-8-sig").replace("\r\n", "\n")))
+        if b"\0" in data:
+            raise ValueError("an array file must be text in TOML, JSON or CSV; got binary data")
+        description = parse(data.decode("utf-8-sig").replace("\r\n", "\n"))
+        if not isinstance(description, Mapping):
+            raise ValueError(f"the file must have keys, such as 'kind'; got {shown(description)}")
+        return from_description(description)
     except (ValueError, TypeError) as error:
         raise file_error(path, error) from None
     except (RecursionError, MemoryError):
-        raise ValueError(f"{path}: the values are nested too deeply") from None
-
-
-def from_description(description: dict[str, Any]) -> SensorArray:
-    """Make the array that the keys of an array file describe.
-
-    Examples
-    --------
-    >>> from_description({"kind": "ula", "n_sensors": 3, "spacing": 0.1, "missing": [2]}).channels
-    (0, 2)
-    >>> from_description({"kind": "uca", "n_sensors": 8})
-    Traceback (most recent call last):
-    ValueError: an array of kind 'uca' needs the key 'radius'
-    """
-    keys = dict(description)
-    kind = keys.pop("kind", None)
-    if kind is None:
-        raise ValueError(f"the key 'kind' is missing; it is one of {', '.join(KEYS)}")
-    if not isinstance(kind, str) or kind not in KEYS:
-        raise ValueError(f"kind must be one of {', '.join(KEYS)}; got {kind!r}")
-    common = {name: keys.pop(name, None) for name in ("speed", "missing", "channels")}
-    for name in KEYS[kind]:
-        if name not in keys:
-            raise ValueError(f"an array of kind {kind!r} needs the key {name!r}")
-    n = keys.get("n_sensors")
-    if isinstance(n, int) and n > MAX_SENSORS:
-        raise ValueError(f"n_sensors must be at most {MAX_SENSORS}; got {n}")
-    unknown = sorted(set(keys) - set(KEYS[kind]))
-    if unknown:
-        raise ValueError(f"an array of kind {kind!r} has no key {unknown[0]!r}")
-    array = (
-        _positions(keys["positions"]) if kind == "positions" else getattr(SensorArray, kind)(**keys)
-    )
-    return _wired(
-        SensorArray(array.positions, common["speed"]), common["missing"], common["channels"]
-    )
-
-
-def _positions(rows: Any) -> SensorArray:
-    return SensorArray(real_numbers("positions", rows))
-
-
-def _wired(array: SensorArray, missing: Any, channels: Any) -> SensorArray:
-    """Return the array without its missing elements, its channels renumbered from 0."""
-    for name, value in (("missing", missing), ("channels", channels)):
-        if value is not None and not isinstance(value, list):
-            raise ValueError(f"{name} must be a list of numbers; got {value!r}")
-    gone = [count("missing", element) - 1 for element in missing or []]
-    if max(gone, default=0) >= array.n_sensors:
-        raise ValueError(f"missing names element {max(gone) + 1} of {array.n_sensors}")
-    whole = array.without(gone)
-    if channels is None:
-        return whole
-    wires = tuple(count("channels", channel) - 1 for channel in channels)
-    if len(set(wires)) != len(wires):
-        raise ValueError(f"channels must differ from each other; got {channels}")
-    if len(wires) == array.n_sensors:
-        return SensorArray(array.positions, array.speed, wires).without(gone)
-    return SensorArray(whole.positions, whole.speed, wires)
+        raise ValueError(f"{fspath(path)}: the values are nested too deeply") from None
 
 
 def from_csv(path: str | Path, *, speed: float | None = None) -> SensorArray:

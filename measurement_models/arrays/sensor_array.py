@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from arrivals.measurement_models.arrays.positions import check_distinct
 from arrivals.measurement_models.arrays.uniform_grid import grid_spacing
 from arrivals.messages import shown
 from arrivals.parameters import FrozenModel
@@ -121,7 +123,7 @@ class SensorArray(FrozenModel):
         if not (np.abs(positions) < LARGEST).all():
             bad = int(np.argmin(np.isfinite(positions).all(axis=1)))
             raise ValueError(f"positions must be finite; sensor {bad} is at {positions[bad]}")
-        _distinct(positions)
+        check_distinct(positions)
         positions.setflags(write=False)
         object.__setattr__(self, "positions", positions)
         if self.speed is not None:
@@ -227,8 +229,12 @@ class SensorArray(FrozenModel):
             """Read positions, one sensor a row, columns x, y, z in metres."""
 
         @staticmethod
-        def from_toml(path: str | Path) -> SensorArray:
-            """Read an array file; see `arrays.files` for its keys."""
+        def from_file(source: str | PathLike[str]) -> SensorArray:
+            """Read an array file (TOML, JSON, CSV), or the preset of a name."""
+
+        @staticmethod
+        def from_toml(path: str | PathLike[str]) -> SensorArray:
+            """Read an array file; see `arrays.description` for its keys."""
 
     def without(self, sensors: Iterable[int]) -> SensorArray:
         """Return the array without some sensors, named by index; the others keep their channels."""
@@ -281,18 +287,10 @@ class SensorArray(FrozenModel):
             return samples
         other = f"at least {max(channels) + 1}" if wanted is None else str(wanted)
         others = "" if wanted == self.n_sensors else f" or {other}"
+        cure = "channels = [...], the channel of each element"
+        if n_channels < self.n_sensors:
+            cure = "missing = [...], the elements without a channel"
         raise ValueError(
-            f"the recording must have {self.n_sensors}{others} channels; got {n_channels}"
+            f"the recording must have {self.n_sensors}{others} channels; got {n_channels}: "
+            f"add {cure}, to the array file"
         )
-
-
-def _distinct(positions: Float) -> None:
-    """Raise a ValueError if two sensors share a position."""
-    order = np.lexsort(positions.T)
-    same = (np.diff(positions[order], axis=0) == 0).all(axis=1)
-    if same.any():
-        first = int(np.argmax(same))
-        one, other = sorted(order[first : first + 2].tolist())
-        place = ", ".join(f"{x:g}" for x in positions[one])
-        which = f"numbers {one + 1} and {other + 1} of {len(positions)}"
-        raise ValueError(f"two sensors share the position ({place}) m: {which}")

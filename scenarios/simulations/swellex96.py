@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from arrivals.measurement_models import ArraySnapshot, SensorArray
-from arrivals.measurement_models.arrays.files import from_description
+from arrivals.measurement_models.arrays.description import from_description
 from arrivals.motion_models import BernoulliVonMises
 from arrivals.scenarios.base import Scenario, Trial
 from arrivals.scenarios.ocean_acoustics.eigenrays import eigenrays

@@ -1,6 +1,8 @@
 """Values in messages."""
 
+import difflib
 import reprlib
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -39,6 +41,19 @@ def in_line(error: Exception) -> str:
     """
     text = " ".join(str(error).split())
     return text if len(text) <= 2 * LONGEST else f"{text[: 2 * LONGEST - 3]}..."
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Return a hint about an unknown name: up to three similar names, or all if none is similar.
+
+    Examples
+    --------
+    >>> nearest("kapa", ["kappa", "mu"]), nearest("x", ["kappa", "mu"])
+    ('did you mean kappa?', 'known: kappa, mu')
+    """
+    names = sorted(set(known))
+    near = difflib.get_close_matches(name, names, n=3, cutoff=0.6)
+    return f"did you mean {' or '.join(near)}?" if near else f"known: {', '.join(names) or 'none'}"
 
 
 def with_article(noun: str) -> str:

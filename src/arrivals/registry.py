@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Generic, TypeVar
 
-from arrivals.messages import shown, with_article
+from arrivals.messages import nearest, shown, with_article
 
 Base = TypeVar("Base")
 Kind = TypeVar("Kind", bound=type)
@@ -129,7 +128,7 @@ class Registry(Generic[Base]):
         >>> _ = registry.register("tidy")(dict)
         >>> registry.find("plain")
         Traceback (most recent call last):
-        ValueError: there is no mapping 'plain'; known: tidy
+        ValueError: there is no mapping 'plain': known: tidy
         """
         if not isinstance(name, str):
             raise TypeError(
@@ -148,13 +147,7 @@ class Registry(Generic[Base]):
             return ours
         if points:
             return self.register(name)(self._load(points[0]))
-        near = difflib.get_close_matches(name, self.available(), n=3, cutoff=0.5)
-        hint = (
-            f"did you mean {' or '.join(near)}?"
-            if near
-            else f"known: {', '.join(self.available())}"
-        )
-        raise ValueError(f"there is no {self.noun} {name!r}; {hint}")
+        raise ValueError(f"there is no {self.noun} {name!r}: {nearest(name, self.available())}")
 
     def _load(self, point: EntryPoint) -> type[Base]:
         """Import the class of an entry point; any error becomes a ValueError with its name."""

@@ -86,7 +86,8 @@ def _add_track(commands: Any) -> None:
     )
     option = add.add_argument
     option("file", metavar="FILE", help="recording; - for raw samples from standard input")
-    option("--array", required=True, metavar="TOML", help="array file")
+    option("--array", required=True, metavar="ARRAY",
+           help="array file (TOML, JSON), or the name of a preset in `arrivals list`")  # fmt: skip
     option("--frequency", type=float, metavar="HZ", help="frequency of narrowband sources")
     option(
         "--frequencies",

@@ -30,7 +30,7 @@ def track(arguments: argparse.Namespace, bar: Bar) -> None:
     """
     from threadpoolctl import threadpool_limits
 
-    array = SensorArray.from_toml(arguments.array)
+    array = SensorArray.from_file(arguments.array)
     check_outputs(arguments)
     with threadpool_limits(1, "blas"):  # matrices are small: more threads only wait
         if separates(arguments):

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models import SensorArray
+from arrivals.measurement_models.arrays.files import given_array
 from arrivals.recordings.choice import Choice, MeanSpectrum, TrackOptions, choose
 from arrivals.recordings.choice.assembly import assembled, make_tracker, takes_samples
 from arrivals.recordings.framing import FramedSnapshots, frame_recording
@@ -48,7 +48,7 @@ def track(
     recording : str, path, Recording or array_like
         File (as in `read`), recording, or samples (n_samples, n_channels), which require `rate`.
     array : str, path or SensorArray, optional
-        Array file, or array; that of the recording if None.
+        Array file, preset, or array; that of the recording if None.
     tracker : str, optional
         Registered name; see `arrivals.trackers.available()`.
     frequencies : float or sequence of float, optional
@@ -214,14 +214,12 @@ class RecordedSteps:
 
 def _recording(recording: Any, array: Any, reading: dict[str, Any]) -> Recording:
     """Return a recording of the sensors of an array."""
-    if not isinstance(array, SensorArray | str | PathLike | None):
-        got = type(array).__name__
-        raise TypeError(f"array must be an array file or a SensorArray; got {got}")
-    if array is not None and not isinstance(array, SensorArray):
-        array = SensorArray.from_toml(Path(array))
+    array = given_array(array)
     if not isinstance(recording, Recording):
         if array is None:
-            raise ValueError("array must be an array file or a SensorArray; got None")
+            raise ValueError(
+                "array must be an array file, a preset's name or a SensorArray; got None"
+            )
         return read(recording, array=array, rate_required=True, **reading)
     if reading:
         raise TypeError(f"{', '.join(reading)} must be left out for a Recording, which has its own")

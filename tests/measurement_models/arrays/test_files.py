@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from arrivals.measurement_models import SensorArray
-from arrivals.measurement_models.arrays.files import from_description
+from arrivals.measurement_models.arrays.description import from_description
 
 
 def toml(path: Path, text: str) -> Path:

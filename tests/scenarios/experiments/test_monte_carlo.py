@@ -100,9 +100,9 @@ def test_failed_batch_is_run_singly_and_failed_draws_are_recorded() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"scenario": "svalse_fig44"}, "there is no scenario 'svalse_fig44'; did you mean"),
+        ({"scenario": "svalse_fig44"}, "there is no scenario 'svalse_fig44': did you mean"),
         ({"scenario": {}}, "scenario must have at least one case"),
-        ({"trackers": ["svlase"]}, "there is no tracker 'svlase'; did you mean svalse"),
+        ({"trackers": ["svlase"]}, "there is no tracker 'svlase': did you mean svalse"),
         ({"trackers": []}, "trackers must have at least one entry"),
         ({"trackers": ["cbf", "cbf"]}, "labels of methods must be unique; got 'cbf' twice"),
         ({"metrics": ["gopsa"]}, "metrics must be one of 'gospa'.*; got 'gopsa'"),
