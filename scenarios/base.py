@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -99,6 +99,8 @@ class Scenario(FrozenModel, ABC):
     >>> isinstance(scenario, Scenario), scenario.replace(snr_db=10.0).snr_db
     (True, 10.0)
     """
+
+    truth_unit: ClassVar[str] = "degrees"  # of errors; m where the truth has positions
 
     @abstractmethod
     def sample(self, rng: np.random.Generator) -> Trial:

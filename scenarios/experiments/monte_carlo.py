@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import arrivals
+from arrivals.messages import shown
 from arrivals.parameters import to_plain
 from arrivals.scenarios.base import Scenario
 from arrivals.scenarios.experiments.batch import ERROR, Row, RunBatch
@@ -18,9 +19,10 @@ from arrivals.scenarios.experiments.study import Study
 from arrivals.scenarios.experiments.workers import report_worker_failure
 from arrivals.scenarios.metrics.registry import CPU, METRICS, Metric
 from arrivals.scenarios.registry import create
-from arrivals.validation import count, one_of
+from arrivals.validation import count, instance, items, one_of
 
 Metrics = Sequence[str] | Mapping[str, Metric]
+Scenarios = str | Scenario | Sequence[str | Scenario] | Mapping[str, str | Scenario]
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,7 @@ class StudySettings:
 
 
 def monte_carlo(
-    scenario: str | Scenario | Mapping[str, Scenario],
+    scenario: Scenarios,
     trackers: Sequence[str | Method],
     runs: int = 100,
     seed: int = 0,
@@ -56,8 +58,9 @@ def monte_carlo(
 
     Parameters
     ----------
-    scenario : str, Scenario, or mapping of str to Scenario
-        Registered name, scenario, or scenarios by the names of their cases.
+    scenario : str, Scenario, sequence of them, or mapping of str to them
+        Registered name or scenario; several, whose cases are named by class and by the parameters
+        that differ; or scenarios by the names of their cases.
     trackers : sequence of str or Method
         Registered names, and trackers with settings; see `grid` for grids of settings.
     runs : int
@@ -104,13 +107,15 @@ def monte_carlo(
     (['PairsInTurn'], ['cbf', 'sbl'], [0, 1, 2])
     >>> study.mean("gospa", "sbl") < study.mean("gospa", "cbf")
     True
+    >>> monte_carlo([scenario, scenario.replace(snr_db=5.0)], ["cbf"], runs=1).cases
+    ['PairsInTurn(snr_db=20.0)', 'PairsInTurn(snr_db=5.0)']
     """
     settings = StudySettings(metrics, out, n_jobs=n_jobs, progress=progress)
     return compute_study(scenario, trackers, runs, seed, settings)
 
 
 def compute_study(
-    scenario: str | Scenario | Mapping[str, Scenario],
+    scenario: Scenarios,
     trackers: Sequence[str | Method],
     runs: int,
     seed: int,
@@ -156,14 +161,33 @@ def _pending(
                 yield name, unfinished
 
 
-def _cases(scenario: str | Scenario | Mapping[str, Scenario]) -> dict[str, Scenario]:
-    if isinstance(scenario, Mapping):
-        if not scenario:
-            raise ValueError("scenario must have at least one case; got an empty mapping")
-        return dict(scenario)
+def _cases(scenario: Scenarios) -> dict[str, Scenario]:
     if isinstance(scenario, str):
         return {scenario: create(scenario)}
-    return {type(scenario).__name__: scenario}
+    if isinstance(scenario, Scenario):
+        return {type(scenario).__name__: scenario}
+    several = scenario.values() if isinstance(scenario, Mapping) else items("scenario", scenario)
+    made = [create(one) if isinstance(one, str) else one for one in several]
+    if not made:
+        raise ValueError("scenario must have at least one case; got none")
+    for one in made:
+        instance("scenario", one, Scenario)
+    return dict(zip(scenario, made, strict=True)) if isinstance(scenario, Mapping) else _named(made)
+
+
+def _named(scenarios: Sequence[Scenario]) -> dict[str, Scenario]:
+    """Return scenarios by class, with the parameters in which those of a class differ."""
+    cases: dict[str, Scenario] = {}
+    for one in scenarios:
+        params = [other.get_params(deep=False) for other in scenarios if type(other) is type(one)]
+        own = one.get_params(deep=False)
+        differ = [name for name in own if len({str(to_plain(each[name])) for each in params}) > 1]
+        settings = ", ".join(f"{name}={shown(own[name])}" for name in differ)
+        label = type(one).__name__ + (f"({settings})" if settings else "")
+        if label in cases:
+            raise ValueError(f"scenario must have different cases; got {label} twice")
+        cases[label] = one
+    return cases
 
 
 def _metrics(metrics: Metrics | None) -> dict[str, Metric]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -10,6 +11,8 @@ from typing import Any
 import numpy as np
 
 from arrivals.files import atomic_write
+from arrivals.messages import nearest
+from arrivals.scenarios.base import Scenario
 from arrivals.scenarios.experiments.batch import ERROR, Row
 from arrivals.scenarios.experiments.results_file import Results, read_config
 from arrivals.scenarios.experiments.statistics import (
@@ -90,9 +93,19 @@ class Study:
         """Numbers of the runs with results."""
         return sorted({row.run for row in self._rows()})
 
+    @property
+    def unit(self) -> str:
+        """Unit of errors, "degrees" or "m"; empty if scenarios differ or are not installed."""
+        try:
+            cases = map(Scenario.from_dict, self.config["scenarios"].values())
+            (unit,) = {one.truth_unit for one in cases}
+            return unit
+        except (ValueError, TypeError):
+            return ""
+
     def _rows(self) -> Iterator[Row]:
-        rows = self._results.rows()
-        return (row for row in rows if self._runs is None or row.run in self._runs)
+        rows, runs = self._results.rows(), self._runs
+        return (row for row in rows if runs is None or row.run in runs)
 
     def rows(self) -> list[Row]:
         """Return all rows, sorted by case, run and method.
@@ -102,9 +115,8 @@ class Study:
         list of Row
             Fields `case`, `run`, `method`, `metric`, `value` and `note`.
         """
-        case = {name: n for n, name in enumerate(self.cases)}
-        method = {name: n for n, name in enumerate(self.methods)}
-        return sorted(self._rows(), key=lambda row: (case[row.case], row.run, method[row.method]))
+        case, method = self.cases.index, self.methods.index
+        return sorted(self._rows(), key=lambda row: (case(row.case), row.run, method(row.method)))
 
     def failures(self) -> list[Row]:
         """Return the rows of failed runs; their notes have error and seed.
@@ -147,8 +159,8 @@ class Study:
             failed = [r for r in self.failures() if r.method == method and r.case == case]
             if failed:
                 raise ValueError(f"all runs of {method!r} failed; the first: {failed[0].note}")
-            names = ", ".join([*self.config["metrics"], "cpu_ms"])
-            raise ValueError(f"no run of {method!r} has the metric {metric!r}; known: {names}")
+            hint = nearest(metric, [*self.config["metrics"], "cpu_ms"])
+            raise ValueError(f"no run of {method!r} has the metric {metric!r}: {hint}")
         return {row.run: row.value for row in sorted(rows) if row.value == row.value}
 
     def _one(self, noun: str, name: str | None, names: list[str]) -> str:
@@ -282,8 +294,6 @@ class Study:
         path : path
             The file.
         """
-        import csv
-
         with atomic_write(path) as file:
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow(Row._fields)

@@ -82,6 +82,7 @@ class RSSScenario(Scenario):
         Noise, and mean and standard deviation of the sources' powers, dB.
     """
 
+    truth_unit = "m"
     n_sources: int = 3
     n_sensors: int = 100
     radius: float | None = None

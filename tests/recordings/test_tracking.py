@@ -170,7 +170,11 @@ def test_error_of_a_recording_without_a_valid_step_is_the_only_line(
 @pytest.mark.parametrize(
     ("arguments", "more", "message"),
     [
-        ((np.zeros((99, 6)),), {"rate": 8000}, "array must be an array file, a preset or a SensorArray"),
+        (
+            (np.zeros((99, 6)),),
+            {"rate": 8000},
+            "array must be an array file, a preset or a SensorArray",
+        ),
         ((Recording(np.ones((99, 6)), 8000.0),), {}, "the recording has no array: pass array"),
         ((np.ones((99, 6)), ARRAY), {}, "the rate is unknown"),
         ((np.ones((9999, 6)), ARRAY), {"rate": 8000, "wndow": 3}, "wndow"),

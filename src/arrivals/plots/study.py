@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from arrivals.messages import nearest
 from arrivals.plots.bearing_time import NEUTRAL, PALETTE
+from arrivals.plots.labels import metric_label, parameter_label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -61,10 +63,10 @@ def plot_metric(
     Examples
     --------
     >>> from arrivals.scenarios import create, monte_carlo
-    >>> cases = {f"{snr}": create("svalse_fig6", n_steps=5, snr_db=snr) for snr in (10.0, 20.0)}
+    >>> cases = [create("svalse_fig6", n_steps=5, snr_db=snr) for snr in (10.0, 20.0)]
     >>> ax = plot_metric(monte_carlo(cases, ["cbf"], runs=2), "gospa", x="snr_db")
     >>> ax.get_xlabel(), ax.get_ylabel()
-    ('snr_db', 'gospa')
+    ('SNR, dB', 'GOSPA, degrees')
     """
     from arrivals.plots.bearing_time import new_axes
 
@@ -85,7 +87,7 @@ def plot_metric(
                 markersize=18, label="bound")  # fmt: skip
     if x is None:
         ax.set_xticks(list(positions.values()), list(positions))
-    ax.set(xlabel=x or "", ylabel=metric)
+    ax.set(xlabel="" if x is None else parameter_label(x), ylabel=metric_label(metric, study.unit))
     ax.grid(color="0.92")
     ax.set_axisbelow(True)
     ax.legend(fontsize=8)
@@ -96,11 +98,10 @@ def _positions(study: Study, x: str | None) -> dict[str, float]:
     if x is None:
         return {case: float(n) for n, case in enumerate(study.cases)}
     scenarios = study.config["scenarios"]
-    without = [case for case in study.cases if x not in scenarios[case]]
-    if without:
-        raise ValueError(
-            f"x must be a parameter of every scenario; got {x!r}, missing in {without[0]}"
-        )
+    for case in study.cases:
+        if x not in scenarios[case]:
+            hint = nearest(x, set(scenarios[case]) - {"type"})
+            raise ValueError(f"x must be a parameter of every case; {case} has no {x!r}: {hint}")
     return {case: float(scenarios[case][x]) for case in study.cases}
 
 

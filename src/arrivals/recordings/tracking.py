@@ -217,9 +217,7 @@ def _recording(recording: Any, array: Any, reading: dict[str, Any]) -> Recording
     array = given_array(array)
     if not isinstance(recording, Recording):
         if array is None:
-            raise ValueError(
-                "array must be an array file, a preset's name or a SensorArray; got None"
-            )
+            raise ValueError("array must be an array file, a preset or a SensorArray; got None")
         return read(recording, array=array, rate_required=True, **reading)
     if reading:
         raise TypeError(f"{', '.join(reading)} must be left out for a Recording, which has its own")

@@ -102,6 +102,8 @@ def test_failed_batch_is_run_singly_and_failed_draws_are_recorded() -> None:
     [
         ({"scenario": "svalse_fig44"}, "there is no scenario 'svalse_fig44': did you mean"),
         ({"scenario": {}}, "scenario must have at least one case"),
+        ({"scenario": []}, "scenario must have at least one case"),
+        ({"scenario": ["svalse_fig6"] * 2}, "must have different cases; got PairsInTurn twice"),
         ({"trackers": ["svlase"]}, "there is no tracker 'svlase': did you mean svalse"),
         ({"trackers": []}, "trackers must have at least one entry"),
         ({"trackers": ["cbf", "cbf"]}, "labels of methods must be unique; got 'cbf' twice"),
@@ -114,6 +116,25 @@ def test_monte_carlo_invalid_argument_is_rejected(change: dict[str, Any], messag
     given: dict[str, Any] = {"scenario": "svalse_fig6", "trackers": ["cbf"], "runs": 1}
     with pytest.raises(ValueError, match=message):
         monte_carlo(**given | change)
+
+
+def test_list_of_scenarios_equals_mapping_and_names_what_differs() -> None:
+    scenarios = [PairsInTurn(n_steps=2, snr_db=snr) for snr in (5.0, 20.0)]
+    study = monte_carlo([*scenarios, "walk"], ["cbf"], 2, seed=3, metrics=["gospa"])
+    names = ["PairsInTurn(snr_db=5.0)", "PairsInTurn(snr_db=20.0)", "RandomWalks"]
+    assert study.cases == names
+    named = monte_carlo(dict(zip("ab", scenarios, strict=True)), ["cbf"], 2, 3, metrics=["gospa"])
+    for case, name in zip("ab", names, strict=False):
+        assert study.values("gospa", "cbf", name) == named.values("gospa", "cbf", case)
+    with pytest.raises(TypeError, match="scenario must be a Scenario; got 3, an int"):
+        monte_carlo([3], ["cbf"])  # type: ignore[list-item]
+
+
+def test_study_unit_is_that_of_the_truth() -> None:
+    rss, doa = create("rss_table1_k3", n_sensors=10), PairsInTurn(n_steps=2)
+    assert monte_carlo(rss, ["rss_ml"], 1, metrics=["missed"]).unit == "m"
+    assert monte_carlo(doa, ["cbf"], 1, metrics=["missed"]).unit == "degrees"
+    assert monte_carlo([rss, doa], ["cbf"], 1, metrics=["missed"]).unit == ""
 
 
 def test_method_unknown_parameter_is_rejected() -> None:

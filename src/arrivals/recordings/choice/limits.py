@@ -77,7 +77,7 @@ class BandLimits:
             raise ValueError(
                 f"no frequency is usable: the array, of alias limit speed / (2 spacing) = "
                 f"{alias:.4g} Hz, needs at least {low:.4g} Hz, and the rate, {rate:g} Hz, has "
-                f"less than {high:.4g} Hz: pass a band or a frequency"
+                f"less than {high:.4g} Hz: pass a band or a frequency, or correct unit"
             )
         return cls(low, high)
 

@@ -12,6 +12,7 @@ import numpy as np
 from arrivals.measurement_models import SensorArray
 from arrivals.recordings.choice.limits import SPEECH_STEP_S, BandLimits, power_of_two
 from arrivals.recordings.choice.options import Choice, TrackOptions
+from arrivals.recordings.choice.plausibility import implausible_size
 from arrivals.recordings.choice.spectrum import MeanSpectrum
 from arrivals.recordings.framing import frequencies_in
 from arrivals.recordings.narrowband import default_window
@@ -83,6 +84,11 @@ def choose(
     """
     options = TrackOptions() if options is None else options
     choice = _choice(array, rate, spectrum, options, n_samples)
+    limits = None
+    if rate is not None and spectrum is not None and not options.has_frequencies:
+        limits = BandLimits.of(array, rate)
+    if size := implausible_size(array, choice.frequencies, limits, rate, spectrum):
+        warnings.warn(size, stacklevel=2)
     n_bins = len(choice.frequencies)
     if choice.tracker == WIDEBAND and n_bins < LEAST_BINS:
         warnings.warn(
