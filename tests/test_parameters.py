@@ -73,9 +73,11 @@ def test_set_params_reaches_a_nested_tracker() -> None:
         (
             {"kappa": 1.0},
             ValueError,
-            "SVALSE has no parameter 'kappa'; it has: carry_existence, engine, meas",
+            "SVALSE has no parameter 'kappa': did you mean motion__kappa",
         ),
-        ({"motion__kapa": 1.0}, ValueError, "BernoulliVonMises has no parameter 'kapa'"),
+        ({"motion__kapa": 1.0}, ValueError, "has no parameter 'kapa': did you mean motion__kappa"),
+        ({"motion.kappa": 1.0}, ValueError, "no parameter 'motion.kappa': did you mean motion__k"),
+        ({"zzz": 1.0}, ValueError, "SVALSE has no parameter 'zzz': known: carry_existence, "),
         ({"memory__x": 1.0}, ValueError, "memory of SVALSE has no parameters of its own"),
         ({"motion__kappa": -1.0}, ValueError, "kappa must be finite and positive; got -1"),
         ({"motion": VonMisesWalk(1.0)}, TypeError, "motion must be a BernoulliVonMises; got Von"),
@@ -97,7 +99,7 @@ def test_replace_returns_a_new_model() -> None:
     assert walk.replace(kappa=3.0) == BernoulliVonMises(kappa=3.0)
     assert walk == BernoulliVonMises()
     assert SNAPSHOTS.replace(array__speed=2.0).array.speed == 2.0
-    with pytest.raises(ValueError, match="VonMisesWalk has no parameter 'mu'; it has: kappa"):
+    with pytest.raises(ValueError, match="VonMisesWalk has no parameter 'mu': known: kappa"):
         VonMisesWalk(1.0).replace(mu=2.0)
     with pytest.raises(dataclasses.FrozenInstanceError):
         walk.kappa = 1.0  # type: ignore[misc]

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from arrivals.messages import nearest
 from arrivals.parameters import to_plain
 from arrivals.scenarios.base import Trial
 from arrivals.trackers import Tracker, find
@@ -50,8 +51,8 @@ class Method:
         for name in self.params:
             if name.partition("__")[0] not in parameters:
                 raise ValueError(
-                    f"the tracker {self.tracker!r} has no parameter {name!r}; it has: "
-                    f"{', '.join(parameters)}"
+                    f"the tracker {self.tracker!r} has no parameter {name!r}: "
+                    f"{nearest(name, parameters)}"
                 )
         settings = ", ".join(f"{name}={value}" for name, value in self.params.items())
         default = f"{self.tracker}({settings})" if settings else self.tracker

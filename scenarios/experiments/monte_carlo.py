@@ -19,7 +19,7 @@ from arrivals.scenarios.experiments.study import Study
 from arrivals.scenarios.experiments.workers import report_worker_failure
 from arrivals.scenarios.metrics.registry import CPU, METRICS, Metric
 from arrivals.scenarios.registry import create
-from arrivals.validation import count, instance, items, one_of
+from arrivals.validation import count, items, one_of
 
 Metrics = Sequence[str] | Mapping[str, Metric]
 Scenarios = str | Scenario | Sequence[str | Scenario] | Mapping[str, str | Scenario]
@@ -171,7 +171,8 @@ def _cases(scenario: Scenarios) -> dict[str, Scenario]:
     if not made:
         raise ValueError("scenario must have at least one case; got none")
     for one in made:
-        instance("scenario", one, Scenario)
+        if not isinstance(one, Scenario):
+            raise TypeError(f"scenario must be a Scenario or a registered name; got {shown(one)}")
     return dict(zip(scenario, made, strict=True)) if isinstance(scenario, Mapping) else _named(made)
 
 

@@ -81,13 +81,27 @@ def message(error: Exception) -> str:
     text = " ".join(str(error).split()) or "not enough memory"
     if isinstance(error, OSError) and (error.filename or error.strerror):
         name = error.filename or "standard input or output"  # all other files have names
-        text = " ".join(f"{name}: {error.strerror or text}".split())
+        text = " ".join(f"{name}: {error.strerror or text}{_similar_file(error)}".split())
     if len(text) > MAX_MESSAGE_LENGTH:
         text = f"{text[:MAX_MESSAGE_LENGTH]} ..."
     if isinstance(error, ValueError | TypeError | OSError | MemoryError | Warning):
         return text
     name = type(error).__name__
     return f"internal error: {name}: {text}; set ARRIVALS_DEBUG=1 for the traceback"
+
+
+def _similar_file(error: OSError) -> str:
+    """Return a hint about a file that does not exist, empty if its folder has none like it."""
+    if not isinstance(error, FileNotFoundError) or not isinstance(error.filename, str):
+        return ""
+    from arrivals.messages import similar
+
+    folder, name = os.path.split(error.filename)
+    try:
+        hint = similar(name, os.listdir(folder or os.curdir))
+    except OSError:
+        return ""
+    return hint
 
 
 def _report(error: Exception) -> None:

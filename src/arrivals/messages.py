@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 LONGEST = 200  # characters
+LEAST_SIMILARITY, SAME = 0.65, 0.05  # of names in a hint; less than the best by this at most
 REPR = reprlib.Repr()
 REPR.maxlist = REPR.maxtuple = 12
 REPR.maxstring = REPR.maxother = REPR.maxlong = LONGEST
@@ -48,12 +49,42 @@ def nearest(name: str, known: Iterable[str]) -> str:
 
     Examples
     --------
-    >>> nearest("kapa", ["kappa", "mu"]), nearest("x", ["kappa", "mu"])
-    ('did you mean kappa?', 'known: kappa, mu')
+    >>> nearest("kapa", ["motion__kappa", "memory"]), nearest("x", ["kappa", "mu"])
+    ('did you mean motion__kappa?', 'known: kappa, mu')
     """
     names = sorted(set(known))
-    near = difflib.get_close_matches(name, names, n=3, cutoff=0.6)
-    return f"did you mean {' or '.join(near)}?" if near else f"known: {', '.join(names) or 'none'}"
+    return similar(name, names).removeprefix(": ") or f"known: {', '.join(names) or 'none'}"
+
+
+def similar(name: object, known: Iterable[object]) -> str:
+    """Return the end of a message about an unknown name, empty if no name is similar.
+
+    The last part of a nested name counts as a name, and so does a part of 3 characters or more.
+
+    Examples
+    --------
+    >>> similar("svasle", ["svalse", "cbf"]), similar("fig6", ["svalse-fig6"]), similar("x", ["y"])
+    (': did you mean svalse?', ': did you mean svalse-fig6?', '')
+    """
+    if not isinstance(name, str):
+        return ""
+    scores = {each: _similarity(name, each) for each in known if isinstance(each, str)}
+    best = max(scores.values(), default=0.0)
+    near = [each for each in scores if scores[each] >= max(LEAST_SIMILARITY, best - SAME)]
+    near = sorted(near, key=lambda each: -scores[each])[:3]
+    return f": did you mean {' or '.join(near)}?" if near else ""
+
+
+def _similarity(one: str, other: str) -> float:
+    """Return a number from 0 to 1; capitals, and what joins words, do not count."""
+    is_nested = "__" in other
+    joint = "__" if is_nested else "."
+    one, other = (each.lower().replace("-", "_").replace(".", joint) for each in (one, other))
+    pairs = [(one, other)]
+    if is_nested:
+        pairs.append((one.rpartition("__")[2], other.rpartition("__")[2]))
+    ratio = max(difflib.SequenceMatcher(None, *pair).ratio() for pair in pairs)
+    return max(ratio, LEAST_SIMILARITY if len(one) >= 3 and one in other else 0.0)
 
 
 def with_article(noun: str) -> str:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
-from arrivals.messages import shown
+from arrivals.messages import nearest, shown
 
 FINDERS: list[Callable[[str], type]] = []  # functions from registered names to classes
 NAMERS: list[Callable[[type], str | None]] = []  # functions from classes to registered names
@@ -99,17 +99,18 @@ class Configurable:
         if deep:
             for name, part in list(params.items()):
                 if isinstance(part, Configurable):
-                    nested = part.get_params(deep=True)
-                    params.update({f"{name}__{key}": value for key, value in nested.items()})
+                    params |= {f"{name}__{key}": each for key, each in part.get_params().items()}
         return params
 
-    def changed_params(self, changes: Mapping[str, Any]) -> dict[str, Any]:
+    def changed_params(self, changes: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
         """Return the constructor's arguments after changes by (nested) names.
 
         Parameters
         ----------
         changes : mapping of str to object
             New values by name.
+        prefix : str
+            Start of the names of a part in messages.
 
         Returns
         -------
@@ -126,9 +127,9 @@ class Configurable:
         for key, value in changes.items():
             name, deeper, rest = key.partition("__")
             if name not in params:
-                known = f"it has: {', '.join(sorted(params)) or 'none'}"
-                unknown = f"{type(self).__name__} has no parameter {name!r}; {known}"
-                raise ValueError(self.renaming(name) or unknown)
+                hint = nearest(prefix + key, (prefix + each for each in self.get_params()))
+                message = f"{type(self).__name__} has no parameter {name!r}: {hint}"
+                raise ValueError(self.renaming(name) or message)
             if deeper:
                 nested.setdefault(name, {})[rest] = value
             else:
@@ -137,7 +138,7 @@ class Configurable:
             part = params[name]
             if not isinstance(part, Configurable):
                 raise ValueError(f"{name} of {type(self).__name__} has no parameters of its own")
-            params[name] = type(part)(**part.changed_params(inner))
+            params[name] = type(part)(**part.changed_params(inner, f"{prefix}{name}__"))
         return params
 
     @classmethod
@@ -194,7 +195,8 @@ class Configurable:
         if not (inspect.isclass(kind) and issubclass(kind, cls)):
             raise TypeError(f"{name} is not a {cls.__name__}")
         for key in sorted(set(config) - {"type", *kind.param_names()}, key=str):
-            raise ValueError(kind.renaming(key) or f"{name} has no parameter {key!r}")
+            unknown = f"{name} has no parameter {key!r}: {nearest(key, kind.param_names())}"
+            raise ValueError(kind.renaming(key) or unknown)
         params = {key: _built(value) for key, value in config.items() if key != "type"}
         try:
             return kind(**params)

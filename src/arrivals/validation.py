@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from arrivals.messages import shown, with_article
+from arrivals.messages import shown, similar, with_article
 from arrivals.typing import Float
 
 T = TypeVar("T")
@@ -142,14 +142,14 @@ def one_of(name: str, value: T, choices: tuple[T, ...]) -> T:
 
     Examples
     --------
-    >>> one_of("reference", "last", ("first", "middle"))
+    >>> one_of("reference", "last", ("start", "middle"))
     Traceback (most recent call last):
-    ValueError: reference must be one of 'first', 'middle'; got 'last'
+    ValueError: reference must be one of 'start', 'middle'; got 'last'
     """
     plain = value is None or isinstance(value, str | int | float | np.bool_)
     if not plain or value not in choices:
-        listed = ", ".join(map(repr, choices))
-        raise ValueError(f"{name} must be one of {listed}; got {shown(value)}")
+        got = f"{shown(value)}{similar(value, choices)}"
+        raise ValueError(f"{name} must be one of {', '.join(map(repr, choices))}; got {got}")
     return value
 
 

@@ -29,8 +29,9 @@ OUT = ("--out", "tracks.csv", "--plot", "tracks.png")
         (("--frequency", "-5"), ("frequency must be finite and positive",)),
         (("--frequency", "high"), ("invalid float value: 'high'",)),
         (("--tracker", "svlase"), ("no tracker 'svlase'", "did you mean svalse")),
-        (("--set", "kapa=3"), ("no parameter 'kapa'",)),
-        (("--set", "motion__kapa=3"), ("no parameter 'kapa'",)),
+        (("--set", "kapa=3"), ("no parameter 'kapa'", "did you mean motion__kappa?")),
+        (("--set", "motion__kapa=3"), ("no parameter 'kapa'", "did you mean motion__kappa?")),
+        (("--set", "motion.kappa=3"), ("did you mean motion__kappa?",)),
         (("--set", "motion=3"), ("motion must be a BernoulliVonMises; got 3",)),
         (("--set", "merge"), ("NAME=VALUE",)),
         (("--set", "solver__tolerance=small"), ("tolerance must be a number; got 'small'",)),
@@ -44,6 +45,10 @@ OUT = ("--out", "tracks.csv", "--plot", "tracks.png")
         (("--variable", "z"), ("variable must be None except for npz and mat",)),
         (("--dtype", "int16"), ("--dtype requires samples from standard input",)),
         (("--frobnicate",), ("unrecognized arguments",)),
+        (
+            ("--frequncy", "1000"),
+            ("unrecognized", "did you mean --frequency?", "arrivals track -h"),
+        ),
     ],
 )
 def test_track_invalid_argument_prints_one_line(
@@ -143,7 +148,7 @@ def test_track_without_finite_samples_of_the_array_is_refused(
         (np.full((300, 8), np.nan, "<f4").tobytes(), ("--dtype", "float32"), ("finite",)),
         (b"", ("--dtype", "complex64"), ("ended after 0 frames",)),
         (b"", ("--dtype", "complex64", "--hop", "5"), ("window and hop must be None",)),
-        (b"", ("--dtype", "int24"), ("invalid choice: 'int24'",)),
+        (b"", ("--dtype", "int24"), ("must be one of int16, ", "got 'int24': did you mean int")),
         (b"", ("--rate", "1500"), ("750 Hz", "got 1000 Hz")),
         (b"", ("--channels", "7"), ("must have 8 channels; got 7",)),
         (b"", ("--channels", "0"), ("channels must be at least 1",)),
@@ -223,4 +228,4 @@ def test_output_equal_to_an_input_is_refused(
         assert main([*job, *more]) == 2
         assert "must be different files" in capsys.readouterr().err
     assert main([*job, "--set", "measurement__wavelength=9"]) == 2
-    assert "comes from --array and --frequency" in capsys.readouterr().err
+    assert "comes from array (--array) and frequencies" in capsys.readouterr().err

@@ -89,7 +89,7 @@ def test_locate_prints_without_an_output_file(
         (["--missing", "100", "readings.csv"], "must be numbers; got 'readings.csv': write"),
         (["--group-by", "floor"], "group_by must be a column; got 'floor': found time_s, s0"),
         (["--window", "-1"], "window must be finite and positive"),
-        (["--tracker", "svalse"], "invalid choice"),
+        (["--tracker", "svalse"], "must be one of "),
     ],
 )
 def test_locate_invalid_argument_prints_one_line(

@@ -158,11 +158,12 @@ def test_mixture_at_given_frequencies_gets_its_windows_and_steps() -> None:
 
 def test_complex_snapshots_of_a_high_rate_are_tracked_several_a_step() -> None:
     options = TrackOptions(frequencies=433.92e6)
-    choice = choose(CIRCLE, 240e3, None, options, n_samples=24_000)
+    antennas = SensorArray.uca(5, radius=0.35, speed=3e8)
+    choice = choose(antennas, 240e3, None, options, n_samples=24_000)
     assert (choice.tracker, choice.n_snapshots) == ("svalse", 1200)
     for rate, tracker in ((None, None), (4.0, None), (240e3, "svalse")):
         options = TrackOptions(tracker, frequencies=433.92e6)
-        assert choose(CIRCLE, rate, None, options).n_snapshots == 1
+        assert choose(antennas, rate, None, options).n_snapshots == 1
 
 
 @pytest.mark.parametrize(

@@ -9,14 +9,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from arrivals.cli.main import run as run_cli
-from arrivals.measurement_models import SensorArray
+from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.recordings.choice import MeanSpectrum, TrackOptions, choose
 from arrivals.recordings.choice.plausibility import implausible_size
 from arrivals.scenarios import create
 
 NOISE = np.random.default_rng(3).standard_normal((16000, 8))
 LIGHT = 299792458.0
-USUAL = {  # array, rate of real samples or frequencies
+USUAL: dict[
+    str, tuple[SensorArray, float | list[float]]
+] = {  # array, rate of real samples or frequencies
     "microphones": (SensorArray.uca(8, 0.046, speed=343.0), 16000.0),
     "at 48 kHz": (SensorArray.uca(8, 0.046, speed=343.0), 48000.0),
     "wide line": (SensorArray.ula(8, 0.4, speed=343.0), 16000.0),
@@ -62,7 +64,9 @@ def test_verdict_depends_on_wavelengths_alone(size: float, scale: float) -> None
 
 def test_room_gets_no_warning() -> None:
     scenario = create("room", duration=1.0)
-    array = scenario.sample(np.random.default_rng(0)).measurement.array
+    model = scenario.sample(np.random.default_rng(0)).measurement
+    assert isinstance(model, ArraySnapshot)
+    array = model.array
     assert message(array, 16000.0) is None
 
 

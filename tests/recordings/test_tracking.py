@@ -196,7 +196,7 @@ def test_track_of_incomplete_arguments_is_refused(
 def test_tracker_of_real_samples_requires_a_band() -> None:
     line = SensorArray.ula(6, spacing=0.04, speed=343.0)
     x = np.random.default_rng(0).standard_normal((2000, 6))
-    with pytest.raises(ValueError, match="takes real samples of a band: pass --band"):
+    with pytest.raises(ValueError, match=r"takes real samples of a band: pass band \(--band\)"):
         arrivals.track(x, line, rate=RATE, tracker="interpolation_ekf")
     sampled: dict[str, Any] = {"tracker": "interpolation_ekf", "band": (500.0, 2000.0), "hop": 100}
     run = arrivals.track(x, line, rate=RATE, **sampled)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import ast
 import inspect
+import re
 import sys
 import warnings
 from collections.abc import Callable, Sequence
@@ -15,6 +16,7 @@ import arrivals
 from arrivals import scenarios
 from arrivals.cli.locate import add_locate
 from arrivals.cli.track import track
+from arrivals.messages import shown, similar
 from arrivals.recordings.stream import DTYPES
 from arrivals.scenarios.demos.infrasound import infrasound
 from arrivals.scenarios.demos.swellex96 import demo
@@ -48,10 +50,25 @@ def run(argv: Sequence[str] | None = None) -> None:
 
 
 class _Parser(argparse.ArgumentParser):
-    """Argument parser that raises errors as ValueError."""
+    """Argument parser that raises errors as ValueError, with similar names."""
 
     def error(self, message: str) -> NoReturn:
         raise ValueError(f"{message} (see {self.prog} -h)")
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Refuse unknown arguments where the options are known."""
+        parsed, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            options = re.findall(r"--[a-z-]+", self.format_usage())
+            hint = similar(unknown[0].partition("=")[0], options)
+            self.error(f"unrecognized arguments: {' '.join(unknown)}{hint}")
+        return parsed, unknown
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        choices = [] if action.choices is None else list(action.choices)
+        if choices and value not in choices:
+            listed = f"must be one of {', '.join(map(str, choices))}; got {shown(value)}"
+            raise argparse.ArgumentError(action, listed + similar(value, choices))
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -126,7 +126,7 @@ def test_list_of_scenarios_equals_mapping_and_names_what_differs() -> None:
     named = monte_carlo(dict(zip("ab", scenarios, strict=True)), ["cbf"], 2, 3, metrics=["gospa"])
     for case, name in zip("ab", names, strict=False):
         assert study.values("gospa", "cbf", name) == named.values("gospa", "cbf", case)
-    with pytest.raises(TypeError, match="scenario must be a Scenario; got 3, an int"):
+    with pytest.raises(TypeError, match="scenario must be a Scenario or a registered name; got 3"):
         monte_carlo([3], ["cbf"])  # type: ignore[list-item]
 
 

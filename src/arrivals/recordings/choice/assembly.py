@@ -45,7 +45,7 @@ def measurement_at(
         raise ValueError(
             "frequency must not exceed the array's alias limit, "
             f"{array.wavelength(1.0) / limit:g} Hz, at which its grid spacing is half the "
-            f"wavelength; got {frequencies[0]:g} Hz. Several --frequencies may go beyond it"
+            f"wavelength; got {frequencies[0]:g} Hz. Several, frequencies (--frequencies), may"
         )
     return ArraySnapshot(array, wavelengths, n_snapshots=n_snapshots)
 
@@ -113,7 +113,9 @@ def make_tracker(
         )
     for setting in settings:
         if setting.partition("__")[0] == "measurement":
-            raise ValueError(f"{setting}: the measurement comes from --array and --frequency")
+            raise ValueError(
+                f"{setting}: the measurement comes from array (--array) and frequencies"
+            )
     required = [key for key, value in parameters.items() if value.default is value.empty]
     if required != ["measurement"]:
         raise ValueError(
@@ -154,7 +156,7 @@ def assembled(
     """
     if takes_samples(choice.tracker):
         raise ValueError(
-            f"the tracker {choice.tracker!r} takes real samples of a band: pass --band"
+            f"the tracker {choice.tracker!r} takes real samples of a band: pass band (--band)"
         )
     measurement = measurement_at(array, choice.frequencies, choice.n_snapshots)
     settings = dict(choice.settings)

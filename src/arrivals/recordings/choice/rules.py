@@ -137,7 +137,9 @@ def _of_snapshots(rate: float | None, options: TrackOptions, n_samples: int | No
     if options.band is not None:
         raise ValueError("a band requires real samples; got complex snapshots: pass a frequency")
     if options.frequencies is None:
-        raise ValueError("complex snapshots require their frequency, Hz: pass --frequency")
+        raise ValueError(
+            "complex snapshots require their frequency, Hz: pass frequencies (--frequency)"
+        )
     if options.window is not None or options.hop is not None:
         raise ValueError("window and hop must be None for complex snapshots")
     if options.tracker is not None:
