@@ -3,7 +3,8 @@
 The classes of the scenes are in `arrivals.scenarios.simulations`; `create` makes them by name.
 """
 
-from arrivals.plots.bearing_time import plot_array, plot_bearing_time
+from arrivals.plots.arrays import plot_array
+from arrivals.plots.bearing_time import plot_bearing_time
 from arrivals.recordings.readers import read
 from arrivals.recordings.readings import Network, calibrate, read_network
 from arrivals.recordings.recording import Recording

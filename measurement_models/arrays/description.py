@@ -8,7 +8,8 @@ kind         keys
 ula          `n_sensors`, `spacing`
 uca          `n_sensors`, `radius`: element 1 at 0 degrees
 symmetric    `distances`: of the sensors on either side of the centre
-positions    `positions`: a list of numbers, of [x, y] or of [x, y, z]; or
+positions    `positions`: a list of numbers, of [x, y] or of [x, y, z], or the
+             name of a table beside the file; or
              `latitude` and `longitude`, degrees, and, if known, `height`
 a preset     those that its file leaves open, such as `radius`
 ===========  ==============================================================

@@ -107,6 +107,9 @@ def _described(path: str | PathLike[str], parse: Callable[[str], Any]) -> Sensor
         description = parse(data.decode("utf-8-sig").replace("\r\n", "\n"))
         if not isinstance(description, Mapping):
             raise ValueError(f"the file must have keys, such as 'kind'; got {shown(description)}")
+        if isinstance(description.get("positions"), str):  # name of a table beside the file
+            table = from_csv(Path(path).parent / description["positions"])
+            description = {**description, "positions": table.positions.tolist()}
         return from_description(description)
     except (ValueError, TypeError) as error:
         raise file_error(path, error) from None

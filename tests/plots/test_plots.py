@@ -11,7 +11,9 @@ from matplotlib.collections import LineCollection, PathCollection, QuadMesh
 from matplotlib.figure import Figure
 
 from arrivals.measurement_models import ArraySnapshot, SensorArray
-from arrivals.plots.bearing_time import plot_array, plot_bearing_time, save
+from arrivals.measurement_models.arrays.description import from_description
+from arrivals.plots import plot_array, plot_bearing_time
+from arrivals.plots.bearing_time import save
 from arrivals.trackers import CBF, DirectionEstimate, PositionEstimate, Run
 from arrivals.trackers.run import RunRecorder
 from arrivals.typing import Complex
@@ -131,9 +133,23 @@ def test_runs_without_sources_and_few_steps_are_drawn(n_steps: int, tmp_path: Pa
     [SensorArray.ula(9, 0.5), SensorArray.uca(40, 2.0), SensorArray(np.eye(3))],
 )
 def test_array_of_any_dimension_is_drawn(array: SensorArray, tmp_path: Path) -> None:
-    ax = plot_array(array)
-    assert len(ax.texts) == (9 if array.dim == 1 else 0)
+    ax = plot_array(array, directions=False)
+    assert [text.get_text() for text in ax.texts] == list("123456789" if array.dim == 1 else "")
     save(ax, tmp_path / "array.png")
+
+
+@pytest.mark.parametrize("clockwise", [False, True])
+def test_array_picture_shows_element_1_and_0_degrees_where_directions_say(clockwise: bool) -> None:
+    keys = {"kind": "uca", "n_sensors": 6, "radius": 2.0, "clockwise": clockwise}
+    ax = plot_array(from_description(keys), clockwise=clockwise)
+    place = {text.get_text(): np.array(text.xy) for text in ax.texts if text.get_text()}  # type: ignore[attr-defined]
+    names = (ax.get_xlabel(), ax.get_ylabel())
+    assert names == (("east, m", "north, m") if clockwise else ("x, m", "y, m"))
+    ahead, aside = ([0, 1], [1, 0]) if clockwise else ([1, 0], [0, 1])
+    for name in ("1", "0°"):
+        np.testing.assert_allclose(place[name] / np.linalg.norm(place[name]), ahead, atol=1e-12)
+    for name in ("2", "40°"):
+        assert place[name] @ aside > 0
 
 
 def test_invalid_arguments_are_refused() -> None:
@@ -162,7 +178,7 @@ def test_failed_picture_leaves_no_file(tmp_path: Path) -> None:
 
 def test_plots_import_no_matplotlib_and_drawing_no_pyplot() -> None:
     code = (
-        "import sys, arrivals.plots.bearing_time as p; assert 'matplotlib' not in sys.modules;"
+        "import sys, arrivals.plots as p; assert 'matplotlib' not in sys.modules;"
         "from arrivals.measurement_models import SensorArray as A; p.plot_array(A.ula(3, 1.0));"
         "assert 'matplotlib.pyplot' not in sys.modules"
     )

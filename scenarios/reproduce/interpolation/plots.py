@@ -70,7 +70,7 @@ def draw_rmse(ax: Axes, x: Any, errors: Float, method: str) -> None:
 def draw_geometry(ax: Axes, model: ArraySamples, doa_deg: float) -> None:
     """Draw the sensors of a line, the fronts of a wave, and the delay of each sensor."""
     doa = np.deg2rad(doa_deg)
-    plot_array(model.array, ax=ax)
+    plot_array(model.array, first=0, directions=False, ax=ax)
     for number in list(ax.texts):
         number.remove()  # the paper's sensors are numbered in the order of the wave
     positions, delay = model.array.positions[:, 0], float(model.delay(doa))

@@ -16,6 +16,7 @@ import arrivals
 from arrivals import scenarios
 from arrivals.cli.locate import add_locate
 from arrivals.cli.track import track
+from arrivals.measurement_models.arrays.presets import preset_names, preset_summary
 from arrivals.messages import shown, similar
 from arrivals.recordings.stream import DTYPES
 from arrivals.scenarios.demos.infrasound import infrasound
@@ -84,7 +85,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_demo(commands)
     add_locate(commands, _bar)
     add_reproduce(commands)
-    listing = commands.add_parser("list", help="list trackers and scenarios")
+    listing = commands.add_parser("list", help="list trackers, arrays by name, and scenarios")
     listing.set_defaults(command=_list)
     return parser
 
@@ -211,15 +212,16 @@ def _is_quiet(arguments: argparse.Namespace) -> bool:
 
 
 def _list(arguments: argparse.Namespace) -> None:
-    kinds: list[tuple[str, list[str], Callable[[str], type]]] = [
-        ("trackers", available(), find),
-        ("scenarios", scenarios.available(), scenarios.find),
+    kinds: list[tuple[str, Sequence[str], Callable[[str], str]]] = [
+        ("trackers", available(), partial(_summary, find)),
+        ("arrays", preset_names(), preset_summary),
+        ("scenarios", scenarios.available(), partial(_summary, scenarios.find)),
     ]
-    for noun, names, find_kind in kinds:
+    for noun, names, summary in kinds:
         if names:
             print(noun)
         for name in names:
-            print(f"  {name:<{max(map(len, names))}}  {_summary(find_kind, name)}")
+            print(f"  {name:<{max(map(len, names))}}  {summary(name)}")
 
 
 def _summary(find_kind: Callable[[str], type], name: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import warnings
 from collections.abc import Iterator
@@ -11,6 +12,7 @@ from contextlib import contextmanager
 import numpy as np
 
 from arrivals.measurement_models import ArraySnapshot, SensorArray
+from arrivals.measurement_models.arrays.files import TABLES
 from arrivals.recordings.choice.assembly import measurement_at
 from arrivals.validation import count
 
@@ -26,9 +28,13 @@ def model_at(
 def require_speed(array: SensorArray, arguments: argparse.Namespace) -> None:
     """Raise a ValueError if the array file has no wave speed."""
     if array.speed is None:
+        cure = "add speed"
+        if arguments.array.lower().endswith(TABLES):
+            table = os.path.basename(arguments.array)
+            cure = f'write a file with kind = "positions", positions = "{table}" and speed'
         raise ValueError(
             f"{arguments.array}: the key 'speed' is missing: "
-            "a frequency requires the wave speed, m/s"
+            f"a frequency requires the wave speed, m/s: {cure}"
         )
 
 

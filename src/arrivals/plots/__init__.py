@@ -1,6 +1,7 @@
 """Plots of tracks, arrays, maps and studies."""
 
-from arrivals.plots.bearing_time import plot_array, plot_bearing_time
+from arrivals.plots.arrays import plot_array
+from arrivals.plots.bearing_time import plot_bearing_time
 from arrivals.plots.maps import plot_map
 from arrivals.plots.study import plot_metric
 

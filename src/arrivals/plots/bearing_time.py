@@ -1,4 +1,4 @@
-"""Plots of directions over time and of arrays; matplotlib is imported when a plot is drawn."""
+"""Plots of directions over time; matplotlib is imported when a plot is drawn."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.files import atomic_write
-from arrivals.measurement_models import ArraySnapshot, SensorArray
+from arrivals.measurement_models import ArraySnapshot
 from arrivals.trackers.beamforming.spectrum import bartlett_power, mean_beam_power, scan_directions
 from arrivals.trackers.run import Run
 from arrivals.typing import Bool, Float, Int
@@ -28,7 +28,6 @@ PALETTE = (
 NEUTRAL = "#202020"
 N_DIRECTIONS, N_COLUMNS = 361, 1500  # maximum size of the beam's image
 PICTURES = (".png", ".pdf", ".svg", ".jpg")
-N_NUMBERED = 32  # maximum number of sensors that are numbered
 
 
 def plot_bearing_time(
@@ -74,6 +73,7 @@ def plot_bearing_time(
 
     Examples
     --------
+    >>> from arrivals.measurement_models import SensorArray
     >>> from arrivals.trackers import SVALSE
     >>> model = ArraySnapshot(SensorArray.ula(8, spacing=0.5), wavelength=1.0, noise=0.01)
     >>> z = model.simulate([[0.50], [0.51], [0.52]], 1.0, np.random.default_rng(0))
@@ -196,56 +196,6 @@ def _colours(label: Int, existence: Float) -> Float:
     return np.asarray(colour)
 
 
-def plot_array(array: SensorArray, *, ax: Axes | None = None) -> Axes:
-    """Draw the sensors of an array, numbered from 0 if they are few.
-
-    Parameters
-    ----------
-    array : SensorArray
-        Array whose sensors are drawn.
-    ax : matplotlib Axes, optional
-        Axes of a new figure if None; sensors in space require the projection "3d".
-
-    Returns
-    -------
-    matplotlib Axes
-        Metres; a line lies along the horizontal axis.
-
-    Examples
-    --------
-    >>> plot_array(SensorArray.ula(8, spacing=0.5)).get_xlabel()
-    'position, m'
-    """
-    ax = new_axes((7.0, 1.6) if array.dim == 1 else (4.5, 4.5), array.dim) if ax is None else ax
-    positions = array.positions
-    if array.dim == 1:
-        positions = np.column_stack([positions, np.zeros(len(positions))])
-    cast(Any, ax).scatter(*positions.T, s=28, color=PALETTE[1], zorder=3)
-    if array.n_sensors <= N_NUMBERED and array.dim < 3:
-        for number, position in enumerate(positions):
-            ax.annotate(str(number), position, (0, 6), textcoords="offset points",
-                        ha="center", fontsize=8)  # fmt: skip
-    _finish_array(ax, array.dim)
-    return ax
-
-
-def _finish_array(ax: Axes, dim: int) -> None:
-    """Label the axes; a line has only one."""
-    if dim == 1:
-        ax.axhline(0, color="0.8", linewidth=1, zorder=1)
-        ax.set(xlabel="position, m", yticks=[], ylim=(-1, 1))
-        ax.spines[["left", "right", "top"]].set_visible(False)
-        return
-    ax.set(xlabel="x, m", ylabel="y, m")
-    ax.margins(0.12)
-    if dim == 3:
-        cast(Any, ax).set_zlabel("z, m")
-    else:
-        ax.set_aspect("equal")
-        ax.grid(color="0.92")
-        ax.set_axisbelow(True)
-
-
 def new_axes(size: tuple[float, float], dim: int = 2) -> Axes:
     """Return the axes of a new figure without a window."""
     from matplotlib.figure import Figure
@@ -267,7 +217,7 @@ def save(ax: Axes, path: str | PathLike[str], *, dpi: float = 150.0) -> None:
 
     Examples
     --------
-    >>> save(plot_array(SensorArray.ula(8, spacing=0.5)), "array.sketch")
+    >>> save(new_axes((3.0, 2.0)), "array.sketch")
     Traceback (most recent call last):
     ValueError: the suffix of a picture must be one of '.png', '.pdf', '.svg', '.jpg'; got '.sketch'
     """

@@ -101,6 +101,13 @@ def test_table_of_positions_is_an_array_file(tmp_path: Path) -> None:
     file.write_text("x,y\n0,0\n1,0\n0,1\n")
     assert SensorArray.from_file(file) == SensorArray(np.array([[0, 0], [1, 0], [0, 1]]))
     assert SensorArray.from_file(str(file)) == SensorArray.from_csv(file)
+    described = tmp_path / "array.toml"
+    described.write_text('kind = "positions"\npositions = "mics.csv"\nunit = "cm"\nspeed = 340')
+    array = SensorArray.from_file(described)
+    assert array == SensorArray(0.01 * SensorArray.from_csv(file).positions, 340.0)
+    described.write_text('kind = "positions"\npositions = "no.csv"')
+    with pytest.raises(FileNotFoundError, match="no.csv"):
+        SensorArray.from_file(described)
 
 
 GEO = {"kind": "positions", "latitude": [1.0, 2.0], "longitude": [3.0, 4.0]}
