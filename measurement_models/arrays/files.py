@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import re
 import tomllib
 from collections.abc import Callable, Mapping
 from os import PathLike, fspath
@@ -48,13 +50,13 @@ def from_file(source: str | PathLike[str]) -> SensorArray:
     (1, 2, 3, 4)
     >>> from_file("kraken5")
     Traceback (most recent call last):
-    ValueError: there is no array file or preset 'kraken5': did you mean kraken-5?
+    ValueError: array must be a file or a preset; got 'kraken5': did you mean kraken-5?
     """
     name, path = fspath(source), Path(source)
-    if not path.suffix and path.name == name and not path.exists():
+    if not path.suffix and path.name == name and not os.path.exists(name):
         if name not in preset_names():
             hint = nearest(name, preset_names())
-            raise ValueError(f"there is no array file or preset {name!r}: {hint}")
+            raise ValueError(f"array must be a file or a preset; got {name!r}: {hint}")
         try:
             return from_description({"kind": name})
         except ValueError as error:  # a preset may leave keys open
@@ -103,18 +105,29 @@ def _described(path: str | PathLike[str], parse: Callable[[str], Any]) -> Sensor
         data = file.read()
     try:
         if b"\0" in data:
-            raise ValueError("an array file must be text in TOML, JSON or CSV; got binary data")
-        description = parse(data.decode("utf-8-sig").replace("\r\n", "\n"))
+            raise ValueError("an array file must be text; got binary data: is it the recording?")
+        text = data.decode("utf-8-sig").replace("\r\n", "\n")
+        description = parse(text)
         if not isinstance(description, Mapping):
             raise ValueError(f"the file must have keys, such as 'kind'; got {shown(description)}")
         if isinstance(description.get("positions"), str):  # name of a table beside the file
             table = from_csv(Path(path).parent / description["positions"])
             description = {**description, "positions": table.positions.tolist()}
         return from_description(description)
+    except tomllib.TOMLDecodeError as error:
+        raise file_error(path, ValueError(f"{error}{_line_of(error, text)}")) from None
     except (ValueError, TypeError) as error:
         raise file_error(path, error) from None
     except (RecursionError, MemoryError):
         raise ValueError(f"{fspath(path)}: the values are nested too deeply") from None
+
+
+def _line_of(error: ValueError, text: str) -> str:
+    """Return the line of a TOML file that an error is about, and the rules of such lines."""
+    found, lines = re.search(r"at line (\d+)", str(error)), text.split("\n")
+    line = lines[int(found[1]) - 1] if found else ""
+    rules = "TOML has lines key = value, texts in quotes, and decimal points"
+    return f", {shown(line)}: {rules}" if found else f": {rules}"
 
 
 def from_csv(path: str | Path, *, speed: float | None = None) -> SensorArray:

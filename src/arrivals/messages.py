@@ -45,7 +45,7 @@ def in_line(error: Exception) -> str:
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """Return a hint about an unknown name: up to three similar names, or all if none is similar.
+    """Return a hint about an unknown name: up to three similar names, or all that are not nested.
 
     Examples
     --------
@@ -53,13 +53,15 @@ def nearest(name: str, known: Iterable[str]) -> str:
     ('did you mean motion__kappa?', 'known: kappa, mu')
     """
     names = sorted(set(known))
-    return similar(name, names).removeprefix(": ") or f"known: {', '.join(names) or 'none'}"
+    listed = [each for each in names if "__" not in each] or names
+    return similar(name, names).removeprefix(": ") or f"known: {', '.join(listed) or 'none'}"
 
 
 def similar(name: object, known: Iterable[object]) -> str:
     """Return the end of a message about an unknown name, empty if no name is similar.
 
-    The last part of a nested name counts as a name, and so does a part of 3 characters or more.
+    The last part of a nested name counts as a name. A name that is a part of another, or begins
+    with the same four letters, is similar.
 
     Examples
     --------
@@ -84,7 +86,9 @@ def _similarity(one: str, other: str) -> float:
     if is_nested:
         pairs.append((one.rpartition("__")[2], other.rpartition("__")[2]))
     ratio = max(difflib.SequenceMatcher(None, *pair).ratio() for pair in pairs)
-    return max(ratio, LEAST_SIMILARITY if len(one) >= 3 and one in other else 0.0)
+    is_part = min(len(one), len(other)) >= 3 and (one in other or other in one)
+    is_start = len(one) >= 4 and other.startswith(one[:4])
+    return max(ratio, LEAST_SIMILARITY if is_part or is_start else 0.0)
 
 
 def with_article(noun: str) -> str:

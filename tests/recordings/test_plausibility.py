@@ -74,7 +74,9 @@ def test_recording_with_no_power_in_the_usable_band_gets_a_warning() -> None:
     array = SensorArray.uca(8, 0.92, speed=343.0)  # alias limit 244 Hz
     high = NOISE[2:] - NOISE[:-2]
     high = high[2:] - 2 * high[1:-1] + high[:-2]  # little power below 366 Hz
-    with pytest.warns(UserWarning, match=r"0\.704 m apart, which leaves frequencies below 365 Hz"):
+    with pytest.warns(
+        UserWarning, match=r"0\.704 m apart, for frequencies below 365 Hz, of 8000 Hz"
+    ):
         choose(array, 16000.0, MeanSpectrum.of(high, 16000.0))
 
 

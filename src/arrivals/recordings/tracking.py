@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Iterator, Sequence
 from os import PathLike
 from typing import Any
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models import SensorArray
 from arrivals.measurement_models.arrays.files import given_array
+from arrivals.messages import similar
 from arrivals.recordings.choice import Choice, MeanSpectrum, TrackOptions, choose
 from arrivals.recordings.choice.assembly import assembled, make_tracker, takes_samples
 from arrivals.recordings.framing import FramedSnapshots, frame_recording
@@ -18,6 +20,7 @@ from arrivals.recordings.narrowband import check_frequency, default_window
 from arrivals.recordings.readers import read
 from arrivals.recordings.recording import Recording
 from arrivals.recordings.sample_stream import band_samples, track_samples
+from arrivals.trackers import find
 from arrivals.trackers.run import Run
 from arrivals.typing import Complex
 
@@ -91,11 +94,22 @@ def track(
     if band is not None and takes_samples(tracker):
         return _track_band(recording, options)
     choice = choice_for(recording, options)
+    _check_arguments(more, choice.tracker)
     _, made = assembled(_array_of(recording), choice, recording.rate)
     steps = RecordedSteps(recording, choice)
     with threadpool_limits(1, "blas"):  # matrices are small: more threads only wait
         run = made.run(steps)
     return run.at(steps.time) if np.isfinite(steps.time).all() else run
+
+
+def _check_arguments(more: dict[str, Any], tracker: str) -> None:
+    """Raise a TypeError for a misspelt argument of `track`."""
+    parameters = inspect.signature(find(tracker)).parameters
+    known = [*inspect.signature(track).parameters, *READING]
+    for name in more:
+        hint = similar(name, known)
+        if hint and name.partition("__")[0] not in parameters:
+            raise TypeError(f"track has no argument {name!r}{hint}")
 
 
 def _track_band(recording: Recording, options: TrackOptions) -> Run:

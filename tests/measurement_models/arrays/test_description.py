@@ -106,7 +106,7 @@ def test_table_of_positions_is_an_array_file(tmp_path: Path) -> None:
     array = SensorArray.from_file(described)
     assert array == SensorArray(0.01 * SensorArray.from_csv(file).positions, 340.0)
     described.write_text('kind = "positions"\npositions = "no.csv"')
-    with pytest.raises(FileNotFoundError, match="no.csv"):
+    with pytest.raises(FileNotFoundError, match=r"no\.csv"):
         SensorArray.from_file(described)
 
 
@@ -148,7 +148,13 @@ def test_invalid_key_is_refused_with_its_cure(keys: dict[str, Any], message: str
     [
         ("a.json", b"[1, 2]", "a.json: the file must have keys, such as 'kind'; got"),
         ("a.json", b"{", "a.json: Expecting property name"),
-        ("talk.wav", b"RIFF\0\0", "talk.wav: an array file must be text .*; got binary data"),
+        ("a.toml", b"kind = uca", "line 1, column 8.*'kind = uca': TOML has lines key = value, te"),
+        ("a.toml", b"kind = 'uca'\nradius = 0,5", "line 2, .*'radius = 0,5': .* decimal points"),
+        (
+            "talk.wav",
+            b"RIFF\0\0",
+            "talk.wav: an array file must be text; got binary data: is it the rec",
+        ),
     ],
 )
 def test_other_files_are_refused(tmp_path: Path, name: str, content: bytes, message: str) -> None:

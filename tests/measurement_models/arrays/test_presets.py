@@ -56,7 +56,7 @@ def test_preset_with_an_open_key_requires_it() -> None:
 
 def test_unknown_preset_is_refused_with_similar_names() -> None:
     with pytest.raises(
-        ValueError, match=r"file or preset 'respeaker4mic': did you mean respeaker-4"
+        ValueError, match=r"file or a preset; got 'respeaker4mic': did you mean respeaker-4"
     ):
         SensorArray.from_file("respeaker4mic")
 

@@ -69,7 +69,7 @@ def implausible_size(
     if limits is None or rate is None:
         return None
     if rate / (2 * alias) > MOST_ALIASES or _share(spectrum, limits) < LEAST_SHARE:
-        usable = f"which leaves frequencies below {limits.high:.3g} Hz of {rate / 2:g} Hz"
+        usable = f"for frequencies below {limits.high:.3g} Hz, of {rate / 2:g} Hz in the recording"
         return f"{neighbours}, {usable}: {CURE}"
     return None
 
