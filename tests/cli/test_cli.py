@@ -116,10 +116,10 @@ def test_track_leaves_out_a_sensor_without_finite_samples(
     np.testing.assert_allclose([float(row["doa_deg"]) for row in rows], 12.0, atol=0.5)
 
 
-def test_list_names_all_trackers_and_scenarios(capsys: pytest.CaptureFixture[str]) -> None:
+def test_list_names_all_trackers_arrays_and_scenarios(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["list"]) == 0
     listed = capsys.readouterr().out
-    assert all(f"  {name} " in listed for name in [*available(), "svalse_fig4"])
+    assert all(f"  {name} " in listed for name in [*available(), "uma-8", "svalse_fig4"])
     assert "Peaks of the conventional beamformer" in listed
 
 

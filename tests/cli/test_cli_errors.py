@@ -121,6 +121,17 @@ def test_track_invalid_recording_prints_one_line(
     assert_rejected(arguments, capsys, here, *words)
 
 
+def test_missing_file_is_reported_with_similar_names_of_its_folder(
+    scene: Path, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_wav(here / "talk.wav", np.zeros((1000, 8), "<i2"))
+    array = str(scene / "array.toml")
+    for file, names in (("talk.wva", "talk.wav"), ("./talk1.wav", "talk.wav")):
+        assert_rejected(track(here, *OUT, file=file, array=array), capsys, here, f"mean {names}?")
+    assert main(track(here, *OUT, file="nowhere/talk.wav", array=array)) == 2
+    assert "did you mean" not in capsys.readouterr().err
+
+
 def test_track_truncated_recording_prints_one_line(
     scene: Path, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -182,7 +182,7 @@ def test_error_of_a_recording_without_a_valid_step_is_the_only_line(
         (
             (np.ones((9999, 6)), "uma-9"),
             {"rate": 8000},
-            "a file or a preset; got 'uma-9': did you mean uma-",
+            "got 'uma-9': did you mean uma-",
         ),
         ((np.ones((9999, 5)), ARRAY), {"rate": 8000}, "must have 6 channels; got 5"),
         ((np.ones((9999, 6)), np.ones((6, 2))), {"rate": 8000}, "SensorArray; got ndarray"),
