@@ -229,7 +229,7 @@ def members() -> list[Any]:
 
 @pytest.mark.parametrize("tracker", members(), ids=lambda each: type(each).__name__)
 def test_misspelt_attribute_raises_with_a_suggestion(tracker: Any) -> None:
-    with pytest.raises(AttributeError, match="no attribute 'likelihod': did you mean 'likelihood'"):
+    with pytest.raises(AttributeError, match="no attribute 'likelihod': did you mean likelihood"):
         tracker.likelihod = 1.0
     with pytest.raises(AttributeError, match="no attribute 'zzzzz'"):
         tracker.zzzzz = 1.0
@@ -275,7 +275,7 @@ def test_subclass_may_have_attributes_of_its_own() -> None:
         saver.save()
     saver.to_array()
     assert tracker.n_steps == 1
-    with pytest.raises(AttributeError, match="did you mean 'n_steps'"):
+    with pytest.raises(AttributeError, match="did you mean n_steps"):
         tracker.n_stepz = 1
 
 
@@ -284,7 +284,7 @@ def tune(kf: Any) -> None:
 
 
 def test_function_of_a_user_is_not_a_method() -> None:
-    with pytest.raises(AttributeError, match="did you mean 'alpha'"):
+    with pytest.raises(AttributeError, match="did you mean alpha"):
         tune(plain())
 
 

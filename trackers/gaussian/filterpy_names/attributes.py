@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import difflib
 import inspect
 from typing import Any
+
+from arrivals.messages import similar
 
 UNDECLARED = object()
 
@@ -25,7 +26,7 @@ class DeclaredAttributes:
     >>> cup.fill = 0.5
     >>> cup.fil = 1.0
     Traceback (most recent call last):
-    AttributeError: Cup has no attribute 'fil': did you mean 'fill'?
+    AttributeError: Cup has no attribute 'fil': did you mean fill?
     """
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -97,8 +98,7 @@ def unknown_attribute(owner: DeclaredAttributes, name: str) -> str:
     kind = type(owner)
     message = f"{kind.__name__} has no attribute {name!r}"
     public = [each for each in {*dir(kind), *vars(owner)} if not each.startswith("_")]
-    close = difflib.get_close_matches(name, public, n=1)
-    return f"{message}: did you mean {close[0]!r}?" if close else message
+    return f"{message}{similar(name, public)}"
 
 
 def _cure(name: str) -> str:
