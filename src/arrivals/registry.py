@@ -81,14 +81,6 @@ class Registry(Generic[Base]):
 
         return enter
 
-    def _entry_points(self) -> dict[str, list[EntryPoint]]:
-        by_name: dict[str, list[EntryPoint]] = {}
-        for point in entry_points(group=self.group):
-            points = by_name.setdefault(point.name, [])
-            if point.value not in [other.value for other in points]:
-                points.append(point)
-        return by_name
-
     def available(self) -> list[str]:
         """Return the names of all classes, including installed entry points, in alphabetical order.
 
@@ -102,7 +94,7 @@ class Registry(Generic[Base]):
         >>> Registry(dict, "example.group", "mapping").available()
         []
         """
-        return sorted({*self._classes, *self._entry_points()})
+        return sorted({*self._classes, *installed(self.group)})
 
     def find(self, name: str) -> type[Base]:
         """Return the class of a name; import it if it belongs to another package.
@@ -134,7 +126,7 @@ class Registry(Generic[Base]):
             raise TypeError(
                 f"name of {with_article(self.noun)} must be a string; got {shown(name)}"
             )
-        points = self._entry_points().get(name, [])
+        points = installed(self.group).get(name, [])
         ours = self._classes.get(name)
         if ours is not None:  # an entry point may name the same class by another path
             points = [point for point in points if self._load(point) is not ours]
@@ -150,14 +142,8 @@ class Registry(Generic[Base]):
         raise ValueError(f"there is no {self.noun} {name!r}: {nearest(name, self.available())}")
 
     def _load(self, point: EntryPoint) -> type[Base]:
-        """Import the class of an entry point; any error becomes a ValueError with its name."""
-        try:
-            loaded: type[Base] = point.load()
-        except (Exception, SystemExit) as error:
-            raise ValueError(
-                f"the {self.noun} {point.name!r}, {point.value}, cannot be loaded: {error}"
-            ) from error
-        return loaded
+        kind: type[Base] = loaded(point, self.noun)
+        return kind
 
     def create(self, name: str, **params: Any) -> Base:
         """Make an object of the named class.
@@ -186,3 +172,57 @@ class Registry(Generic[Base]):
     def name_of(self, kind: type) -> str | None:
         """Return the registered name of a class, or None."""
         return next((name for name, existing in self._classes.items() if existing is kind), None)
+
+
+def installed(group: str) -> dict[str, list[EntryPoint]]:
+    """Return the entry points of a group by name, each only once.
+
+    Parameters
+    ----------
+    group : str
+        Group of entry points.
+
+    Returns
+    -------
+    dict of str to list of EntryPoint
+        Several of one name if several packages claim it.
+
+    Examples
+    --------
+    >>> installed("example.group")
+    {}
+    """
+    by_name: dict[str, list[EntryPoint]] = {}
+    for point in entry_points(group=group):
+        points = by_name.setdefault(point.name, [])
+        if point.value not in [other.value for other in points]:
+            points.append(point)
+    return by_name
+
+
+def loaded(point: EntryPoint, noun: str) -> Any:
+    """Import the object of an entry point; any error becomes a ValueError with its name.
+
+    Parameters
+    ----------
+    point : EntryPoint
+        The entry point.
+    noun : str
+        Noun for an entry in messages.
+
+    Returns
+    -------
+    object
+        What the entry point names.
+
+    Raises
+    ------
+    ValueError
+        If it cannot be imported.
+    """
+    try:
+        return point.load()
+    except (Exception, SystemExit) as error:
+        raise ValueError(
+            f"the {noun} {point.name!r}, {point.value}, cannot be loaded: {error}"
+        ) from error

@@ -96,7 +96,7 @@ def test_file_that_is_not_wav_is_refused(tmp_path: Path) -> None:
     assert_refused(tmp_path / "b.wav", "Unknown wave file format: MULAW")
     assert_refused(
         tmp_path / "b.wav",
-        "variable must be None except for npz and mat files; got 'x'",
+        "variable must be None without named arrays; got 'x' for a WAV file",
         variable="x",
     )
 

@@ -1,15 +1,16 @@
-"""Readers of recording files: WAV, NumPy, MATLAB and text."""
+"""Read a recording from a file of any known format, or take one from numbers."""
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
-from typing import BinaryIO, NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from arrivals.files import file_error, open_input
 from arrivals.measurement_models import SensorArray
@@ -17,18 +18,16 @@ from arrivals.measurements import numbers
 from arrivals.recordings.formats.file_contents import (
     MAX_BYTES,
     FileContents,
-    StoredArray,
+    ReadingOptions,
     check_size,
 )
-from arrivals.recordings.formats.matlab import matlab_arrays
-from arrivals.recordings.formats.numpy_files import numpy_arrays
-from arrivals.recordings.formats.text_table import read_text
-from arrivals.recordings.formats.wav import read_wav
+from arrivals.recordings.formats.registry import HEAD, reader_for
 from arrivals.recordings.recording import Recording
+from arrivals.recordings.stored_samples import StoredSamples
 from arrivals.typing import Float
 from arrivals.validation import positive
 
-RATES = ("rate", "fs", "Fs")  # names of a scalar with the rate
+LOADED_AT_ONCE = 2**26  # bytes of samples that are loaded from the file when it is read: 64 MB
 
 
 def read(
@@ -40,42 +39,47 @@ def read(
     array: SensorArray | None = None,
     max_bytes: float = MAX_BYTES,
     rate_required: bool = False,
+    format: str | None = None,  # noqa: A002  (the option's name)
 ) -> Recording:
     """Read a recording from a file, or take one from an array of numbers.
 
     Parameters
     ----------
     path : str, path or array_like
-        Samples (n_samples, n_channels), masked ones too, or a regular file, whose suffix selects
-        the format:
+        Samples (n_samples, n_channels), masked ones too, or a regular file. Its suffix selects the
+        format, or its content if the suffix is unknown or wrong:
 
-        - ``.wav``: any bit depth. Integers are scaled to [-1, 1).
-        - ``.npy``, ``.npz``, ``.mat`` (MATLAB up to version 7.2): unchanged numbers.
+        - ``.wav``: any bit depth, also RF64. Integers are scaled to [-1, 1).
+        - ``.npy``, ``.npz``, ``.mat`` (MATLAB): unchanged numbers.
         - ``.csv``, ``.txt``: one row per sample, separated by commas, semicolons, tabs or spaces;
           real or complex (``1+2j``, ``1+2i``); a cell that is empty, ``nan``, ``None`` or ``NA`` is
           missing. Comments (``#``, ``%``) and one line of headings may precede it; a first column
           ``time`` or ``t`` is in s.
 
-        In an npz or mat file the array may have the name ``samples`` or ``snapshots`` (complex),
-        with a number ``rate``, ``fs`` or ``Fs`` in Hz and an array ``time`` in s.
+        In a file of named arrays the array may have the name ``samples`` or ``snapshots``
+        (complex), with a number ``rate``, ``fs`` or ``Fs`` in Hz and an array ``time`` in s.
     rate : float, optional
         Samples per second, Hz; replaces that of the file.
     variable : str, optional
-        Name of the array in an npz or mat file, required if there are several.
+        Name of the array in a file of named arrays, required if there are several.
     transpose : bool
         True if the rows of the file are channels.
     array : SensorArray, optional
         Selects the channels of its sensors, in its order; `array` of the recording.
     max_bytes : float
-        Largest size of the stored numbers, decompressed; larger ones are refused unread.
+        Largest size of the numbers, decompressed, of a format that is not read in blocks; larger
+        ones are refused unread.
     rate_required : bool
         True to refuse real samples without a rate; arrays with a header are not loaded then.
+    format : str, optional
+        Format of a file without a header, such as cs16; it takes the place of the suffix.
 
     Returns
     -------
     Recording
         Real samples (float32 if the file has that precision, else float64), or complex
-        snapshots, each (n_samples, n_channels).
+        snapshots, each (n_samples, n_channels). Large ones stay in their file
+        (`StoredSamples`), which must not change.
 
     Raises
     ------
@@ -98,68 +102,93 @@ def read(
     """
     if rate is not None:
         positive("rate", rate)
-    demands = _Demands(variable, max_bytes, rate_required and rate is None)
+    options = ReadingOptions(variable, transpose, max_bytes, rate_required and rate is None, format)
     if not isinstance(path, str | PathLike):
         contents = FileContents(numbers("samples", path))
-        return _recording(contents, rate, transpose, demands, array)
+        return _recording(contents, rate, options, array)
     path = Path(path)
+    open_input(path).close()  # a regular file that can be read
+    stamp = _stamp(path)
+    try:
+        contents, notes = _contents(path, options)
+        if isinstance(contents.array, StoredSamples):
+            guarded = _UnchangedFile(path, stamp, contents.array.load)
+            contents = contents._replace(array=replace(contents.array, load=guarded))
+        recording = _recording(contents, rate, options, array)
+    except Exception as error:  # parsers raise all kinds of errors on damaged files
+        raise file_error(path, error) from error
+    for note in notes:
+        warnings.warn(f"{path}: {note}", stacklevel=2)
+    return recording
+
+
+def _contents(path: Path, options: ReadingOptions) -> tuple[FileContents, list[str]]:
+    """Return the contents of a file, and lines for the user."""
     with open_input(path) as file:
-        try:
-            return _recording(_contents(file, path, demands), rate, transpose, demands, array)
-        except Exception as error:  # parsers raise all kinds of errors on damaged files
-            raise file_error(path, error) from error
-
-
-class _Demands(NamedTuple):
-    """Selected variable, largest size, and whether real samples must have a rate in the file."""
-
-    variable: str | None
-    max_bytes: float
-    rate_required: bool
-
-    def check(self, n_bytes: int, is_real: bool, has_rate: bool) -> None:
-        """Refuse data that are too large or lack a rate."""
-        check_size(n_bytes, self.max_bytes)
-        if self.rate_required and is_real and not has_rate:
-            raise ValueError("the rate is unknown: pass rate= (--rate) in Hz")
-
-
-def _contents(file: BinaryIO, path: Path, demands: _Demands) -> FileContents:
-    suffix = path.suffix.lower()
-    if suffix not in READERS:
-        raise ValueError(f"suffix must be one of {', '.join(READERS)}; got {suffix!r}")
-    if file.seek(0, 2) == 0:
+        head = file.read(HEAD)
+    if not head:
         raise ValueError("the file is empty")
-    file.seek(0)
-    variable = demands.variable
-    if variable is not None and suffix not in (".npz", ".mat"):
-        raise ValueError(f"variable must be None except for npz and mat files; got {variable!r}")
+    reader, disagreement = reader_for(path, head, options.format)
+    if options.variable is not None and not reader.has_names:
+        got = f"{options.variable!r} for a {reader.name} file"
+        raise ValueError(f"variable must be None without named arrays; got {got}")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        return READERS[suffix](file, demands)
+        contents = reader.read(path, options)
+    return contents, [note for note in (disagreement, contents.note) if note]
+
+
+def _stamp(path: Path) -> tuple[int, int]:
+    status = path.stat()
+    return status.st_size, status.st_mtime_ns
+
+
+@dataclass(frozen=True)
+class _UnchangedFile:
+    """Loader of rows of a file that must not change after it was opened."""
+
+    path: Path
+    stamp: tuple[int, int]
+    load: Callable[[int, int], NDArray[Any]]
+
+    def __call__(self, start: int, stop: int) -> NDArray[Any]:
+        try:
+            rows = self.load(start, stop)
+            if _stamp(self.path) != self.stamp:
+                raise ValueError("the file changed while it was read")
+        except Exception as error:
+            changed = not self.path.exists() or _stamp(self.path) != self.stamp
+            reason = ValueError("the file changed while it was read") if changed else error
+            raise file_error(self.path, reason) from error
+        return rows
 
 
 def _recording(
-    contents: FileContents,
-    rate: float | None,
-    transpose: bool,
-    demands: _Demands,
-    array: SensorArray | None,
+    contents: FileContents, rate: float | None, options: ReadingOptions, array: SensorArray | None
 ) -> Recording:
-    samples = contents.array[:, None] if contents.array.ndim == 1 else contents.array
-    samples = samples.T if transpose else samples
+    samples = _in_memory(contents.array, options)
     rate = contents.rate if rate is None else rate
     is_real = samples.dtype.kind != "c"
     if is_real and rate is None and contents.time is not None:
         rate = _rate_of(contents.time)
-    demands.check(0, is_real, rate is not None)
-    recording = Recording(samples, rate, None if is_real else contents.time)
-    return recording if array is None else _with_array(recording, array)
+    options.check(0, is_real, rate is not None)
+    time = None if is_real else contents.time
+    frequency, names = contents.frequency, contents.names
+    recording = Recording(samples, rate, time, frequency=frequency, names=names)
+    return recording if array is None else recording.select(array)
 
 
-def _with_array(recording: Recording, array: SensorArray) -> Recording:
-    samples = array.select(recording.samples)
-    return Recording(samples, recording.rate, recording.time, array)
+def _in_memory(
+    samples: NDArray[Any] | StoredSamples, options: ReadingOptions
+) -> NDArray[Any] | StoredSamples:
+    """Return samples (n_samples, n_channels); few ones are loaded, and those to be transposed."""
+    if isinstance(samples, StoredSamples):
+        if not options.transpose and samples.n_bytes > LOADED_AT_ONCE:
+            return samples
+        check_size(samples.n_bytes, options.max_bytes)
+        samples = samples[:]
+    samples = samples[:, None] if samples.ndim == 1 else samples
+    return samples.T if options.transpose else samples
 
 
 def _rate_of(time: Float) -> float:
@@ -168,69 +197,3 @@ def _rate_of(time: Float) -> float:
     if step <= 0 or np.any(np.abs(time - time[0] - step * np.arange(len(time))) > 0.1 * step):
         raise ValueError("the times of the samples are not evenly spaced: pass rate= in Hz")
     return 1 / step
-
-
-def _numpy(file: BinaryIO, demands: _Demands) -> FileContents:
-    return _selected(numpy_arrays(file), demands)
-
-
-def _matlab(file: BinaryIO, demands: _Demands) -> FileContents:
-    return _selected(matlab_arrays(file), demands)
-
-
-def _selected(stored: Mapping[str, StoredArray], demands: _Demands) -> FileContents:
-    """Return the selected array of a file, with its rate and times."""
-    name = _choice(stored, demands.variable)
-    chosen, time = stored[name], stored.get("time")
-    rates = (stored[key] for key in RATES if key in stored)
-    one = next((each for each in rates if each.size == 1 and each.is_real), None)
-    has_times = time is not None and time.is_numeric and time.size > 1
-    if not chosen.is_numeric:
-        raise ValueError(f"samples must be numbers; got {chosen.dtype}")
-    is_real = chosen.is_real and name != "snapshots"
-    demands.check(chosen.n_bytes, is_real, one is not None or has_times)
-    array = chosen.load()
-    array = array.astype(complex) if name == "snapshots" else array
-    times = None
-    if time is not None and has_times:
-        check_size(time.n_bytes, demands.max_bytes)
-        times = np.ravel(time.load())
-    return FileContents(array, None if one is None else float(one.load().item()), times)
-
-
-def _choice(stored: Mapping[str, StoredArray], variable: str | None) -> str:
-    names = list(stored)
-    if names == [""]:  # of an npy file
-        return ""
-    if variable is not None:
-        if variable not in names:
-            raise ValueError(f"variable must be one of {_listed(names)}; got {variable!r}")
-        return variable
-    arrays = [name for name in names if stored[name].is_numeric and stored[name].size > 1]
-    standard = [name for name in arrays if name in ("samples", "snapshots")]
-    others = [name for name in arrays if name not in (*RATES, "time")]
-    candidates = standard or others
-    if len(candidates) != 1:
-        number = "several arrays" if candidates else "no array"
-        raise ValueError(f"the file has {number}: pass variable=, one of {_listed(names)}")
-    return candidates[0]
-
-
-def _listed(names: Sequence[str]) -> str:
-    return ", ".join(map(repr, names)) or "nothing"
-
-
-def _text(file: BinaryIO, demands: _Demands) -> FileContents:
-    check_size(file.seek(0, 2), demands.max_bytes)
-    file.seek(0)
-    return read_text(file)
-
-
-READERS: dict[str, Callable[[BinaryIO, _Demands], FileContents]] = {
-    ".wav": lambda file, demands: read_wav(file, demands.max_bytes),
-    ".npy": _numpy,
-    ".npz": _numpy,
-    ".mat": _matlab,
-    ".csv": _text,
-    ".txt": _text,
-}

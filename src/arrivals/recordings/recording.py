@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from arrivals.measurement_models import SensorArray
-from arrivals.measurements import LARGEST, numbers
+from arrivals.measurements import numbers
 from arrivals.recordings.narrowband import WindowedSpectrum, check_frequency, default_window
+from arrivals.recordings.stored_samples import StoredSamples, cleaned, row_type
 from arrivals.typing import Complex, Float
 from arrivals.validation import count, positive, shaped
 
@@ -47,12 +48,17 @@ class Recording:
         Real samples, stored as float32 if they are, else as float64; or complex ones (complex128),
         each row a narrowband snapshot. One channel may have the shape (n_samples,). Masked,
         infinite and missing samples become NaN, as in `arrivals.measurements.numbers`.
+        `StoredSamples` stay in their file: `samples[start:stop]` loads rows.
     rate : float, optional
         Rows per second, Hz.
     time : array_like, shape (n_samples,), optional
         Time of each snapshot, s; only for complex snapshots.
     array : SensorArray, optional
         Sensors of the channels, in the same order.
+    frequency : float, optional
+        Centre frequency of complex samples, Hz.
+    names : tuple of str, optional
+        Names of the channels.
 
     Raises
     ------
@@ -74,16 +80,24 @@ class Recording:
            [1., 2.]]), array([0.25, 0.75]))
     """
 
-    samples: Samples
+    samples: Samples | StoredSamples
     rate: float | None = None
     time: Float | None = None
     array: SensorArray | None = None
+    frequency: float | None = None
+    names: tuple[str, ...] | None = None
 
     def __post_init__(self) -> None:
         samples = _cleaned(self.samples)
         object.__setattr__(self, "samples", samples)
         if self.rate is not None:
             object.__setattr__(self, "rate", positive("rate", self.rate))
+        if self.frequency is not None:
+            object.__setattr__(self, "frequency", positive("frequency", self.frequency))
+        if self.names is not None and len(self.names) != samples.shape[1]:
+            raise ValueError(
+                f"names must have {samples.shape[1]} entries, one a channel; got {len(self.names)}"
+            )
         if self.time is not None:
             if not self.is_narrowband:
                 raise ValueError("time requires complex snapshots: real samples have a rate")
@@ -110,6 +124,37 @@ class Recording:
         if self.rate is not None:
             return len(self.samples) / self.rate
         return float(np.nan if self.time is None else self.time[-1] - self.time[0])
+
+    def select(self, array: SensorArray) -> Recording:
+        """Return the channels of an array's sensors, in its order, with the array.
+
+        Parameters
+        ----------
+        array : SensorArray
+            The array.
+
+        Returns
+        -------
+        Recording
+
+        Raises
+        ------
+        ValueError
+            If the recording has too few channels, or too many.
+
+        Examples
+        --------
+        >>> recording = Recording(np.ones((10, 4)), rate=8.0)
+        >>> recording.select(SensorArray.ula(4, spacing=0.5, missing=[1])).n_channels
+        3
+        """
+        channels = [int(channel) for channel in array.select(np.arange(self.n_channels))]
+        if isinstance(self.samples, StoredSamples):
+            samples: Samples | StoredSamples = self.samples.select(channels)
+        else:
+            samples = array.select(self.samples)
+        names = self.names and tuple(self.names[channel] for channel in channels)
+        return replace(self, samples=samples, array=array, names=names)
 
     def snapshots(
         self,
@@ -158,7 +203,7 @@ class Recording:
                 raise ValueError(f"start must be below {len(self.samples)}; got {start}")
             values = np.asarray(self.samples[start:stop], complex)
             known = given[0] if np.ndim(given) else given
-            return Snapshots(values, self._snapshot_times()[start:stop], known)
+            return Snapshots(values, self._snapshot_times(start, len(values)), known)
         if self.rate is None:
             raise ValueError("a frequency requires the rate of the recording: pass rate= in Hz")
         if frequency is None:
@@ -175,10 +220,10 @@ class Recording:
             return Snapshots(values, time, tuple(bins))
         return Snapshots(values[:, 0], time, bins[0])
 
-    def _snapshot_times(self) -> Float:
+    def _snapshot_times(self, start: int, n: int) -> Float:
         if self.time is not None:
-            return self.time
-        return np.arange(len(self.samples)) / np.float64(self.rate or np.nan)
+            return self.time[start : start + n]
+        return np.arange(start, start + n) / np.float64(self.rate or np.nan)
 
     def _check_length(self, window: int, start: int) -> None:
         n_samples, n_channels = self.samples.shape
@@ -191,19 +236,22 @@ class Recording:
             )
 
 
-def _cleaned(value: Any) -> Samples:
+def _cleaned(value: Any) -> Samples | StoredSamples:
     """Return samples (n_samples, n_channels) of type `Samples`, NaN where missing."""
+    if isinstance(value, StoredSamples):
+        _check_shape(value.shape)
+        return value
     is_plain = type(value) is np.ndarray and value.dtype.kind in "iufc"
     samples = value if is_plain else numbers("samples", value)
-    if samples.ndim not in (1, 2):
-        raise ValueError(f"samples must have shape (n_samples, n_channels); got {samples.shape}")
-    if samples.size == 0:
-        raise ValueError(f"the recording is empty; its shape is {samples.shape}")
-    single = samples.dtype.kind == "f" and samples.dtype.itemsize == 4
-    kind: Any = np.complex128 if samples.dtype.kind == "c" else np.float32 if single else np.float64
-    with np.errstate(over="ignore"):  # of extended precision
-        cleaned: NDArray[Any] = samples.reshape(len(samples), -1).astype(kind, copy=False)
-    valid = np.isfinite(cleaned) if single else np.abs(cleaned) < LARGEST
-    if not valid.any():
+    _check_shape(samples.shape)
+    rows = cleaned(samples.reshape(len(samples), -1), row_type(samples.dtype))
+    if not (np.isfinite(rows)).any():
         raise ValueError("no sample of the recording is finite")
-    return cleaned if valid.all() else np.where(valid, cleaned, kind(np.nan))
+    return rows
+
+
+def _check_shape(shape: tuple[int, ...]) -> None:
+    if len(shape) not in (1, 2):
+        raise ValueError(f"samples must have shape (n_samples, n_channels); got {shape}")
+    if 0 in shape:
+        raise ValueError(f"the recording is empty; its shape is {shape}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arrivals.measurements import LARGEST
+
+BLOCK = 2**20  # numbers of the rows that are loaded together when rows are iterated over
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,20 +48,48 @@ class StoredSamples:
     def __len__(self) -> int:
         return self.shape[0]
 
-    def __getitem__(self, rows: slice) -> NDArray[Any]:
+    def __getitem__(self, index: Any) -> NDArray[Any]:
+        rows, columns = index if isinstance(index, tuple) else (index, slice(None))
+        if not isinstance(rows, slice):
+            raise TypeError(f"rows of stored samples must be a slice; got {type(rows).__name__}")
         start, stop, step = rows.indices(len(self))
-        block = self.load(start, max(start, stop))
+        if step < 1:
+            raise ValueError(f"the step of rows must be positive; got {step}")
+        block = self.load(start, max(start, stop))[::step]
         block = block if self.channels is None else block[:, self.channels]
-        return cleaned(block[::step], self.dtype)
+        return cleaned(block[:, columns], self.dtype)
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
         return self[:] if dtype is None else self[:].astype(dtype, copy=False)
+
+    def __iter__(self) -> Iterator[NDArray[Any]]:
+        n = max(1, BLOCK // max(1, self.shape[1]))
+        for start in range(0, len(self), n):
+            yield from self[start : start + n]
+
+    @property
+    def n_bytes(self) -> int:
+        """Size of all rows in memory, bytes."""
+        return self.shape[0] * self.shape[1] * self.dtype.itemsize
 
     def select(self, channels: Sequence[int]) -> StoredSamples:
         """Return some of the channels, in the given order."""
         known = range(self.shape[1]) if self.channels is None else self.channels
         chosen = tuple(known[channel] for channel in channels)
         return replace(self, shape=(len(self), len(chosen)), channels=chosen)
+
+
+def row_type(dtype: np.dtype[Any]) -> np.dtype[Any]:
+    """Return the type of samples in memory: float32 if they are, else float64; or complex128.
+
+    Examples
+    --------
+    >>> [str(row_type(np.dtype(kind))) for kind in (">f4", "i2", "c8")]
+    ['float32', 'float64', 'complex128']
+    """
+    if dtype.kind == "c":
+        return np.dtype(np.complex128)
+    return np.dtype(np.float32 if dtype.kind == "f" and dtype.itemsize == 4 else np.float64)
 
 
 def cleaned(block: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:

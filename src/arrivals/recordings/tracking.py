@@ -25,7 +25,7 @@ from arrivals.trackers.run import Run
 from arrivals.typing import Complex
 
 BLOCK = 2**22  # complex numbers of the steps that are computed together: 64 MB
-READING = ("rate", "variable", "transpose", "max_bytes")  # arguments of `read`
+READING = ("rate", "variable", "transpose", "max_bytes", "format")  # arguments of `read`
 
 
 def track(
@@ -63,8 +63,8 @@ def track(
     snapshots : int, optional
         Windows in a step.
     **more : object
-        `rate`, `variable`, `transpose` and `max_bytes` of `read`; other names are parameters of the
-        tracker, as in `set_params`.
+        `rate`, `variable`, `transpose`, `max_bytes` and `format` of `read`; other names are
+        parameters of the tracker, as in `set_params`.
 
     Returns
     -------
@@ -237,8 +237,7 @@ def _recording(recording: Any, array: Any, reading: dict[str, Any]) -> Recording
         raise TypeError(f"{', '.join(reading)} must be left out for a Recording, which has its own")
     if array is None or array == recording.array:
         return recording
-    samples = array.select(recording.samples)
-    return Recording(samples, recording.rate, recording.time, array)
+    return recording.select(array)
 
 
 def _array_of(recording: Recording) -> SensorArray:

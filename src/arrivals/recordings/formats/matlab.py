@@ -15,12 +15,20 @@ import math
 import zlib
 from collections.abc import Callable, Iterator
 from functools import partial
+from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from arrivals.recordings.formats.file_contents import StoredArray, damage_refused
+from arrivals.files import open_input
+from arrivals.recordings.formats.file_contents import (
+    FileContents,
+    ReadingOptions,
+    StoredArray,
+    damage_refused,
+    selected,
+)
 
 MATRIX, COMPRESSED = 14, 15  # data types of elements
 NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8",
@@ -31,6 +39,17 @@ COMPLEX_FLAG, OPAQUE = 0x0800, 17
 LEVEL_4 = {0: "f8", 1: "f4", 2: "i4", 3: "i2", 4: "u2", 5: "u1"}
 MAX_HEADER = 4096  # bytes of a variable before its data
 KIND = "MATLAB file"
+
+
+def is_matlab(head: bytes) -> bool:
+    """Return True for the header of level 5."""
+    return head[126:128] in (b"IM", b"MI") and b"\x89HDF" not in head
+
+
+def read_matlab(path: Path, options: ReadingOptions) -> FileContents:
+    """Return the selected array of a MATLAB file."""
+    with open_input(path) as file:
+        return selected(matlab_arrays(file), options)
 
 
 def matlab_arrays(file: BinaryIO) -> dict[str, StoredArray]:

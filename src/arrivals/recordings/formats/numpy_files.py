@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import zipfile
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -16,10 +17,28 @@ from numpy.lib.format import (
 )
 from numpy.typing import NDArray
 
-from arrivals.recordings.formats.file_contents import StoredArray, damage_refused
+from arrivals.files import open_input
+from arrivals.recordings.formats.file_contents import (
+    FileContents,
+    ReadingOptions,
+    StoredArray,
+    damage_refused,
+    selected,
+)
 
 ZIP = b"PK"  # first bytes of a zip file
 KIND = "NumPy file of numbers"
+
+
+def is_numpy(head: bytes) -> bool:
+    """Return True for the first bytes of an npy or npz file."""
+    return head.startswith((b"\x93NUMPY", b"PK\x03\x04"))
+
+
+def read_numpy(path: Path, options: ReadingOptions) -> FileContents:
+    """Return the selected array of an npz file, or the array of an npy file."""
+    with open_input(path) as file:
+        return selected(numpy_arrays(file), options)
 
 
 def numpy_arrays(file: BinaryIO) -> dict[str, StoredArray]:

@@ -4,19 +4,27 @@ from __future__ import annotations
 
 import math
 import re
+from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from arrivals.recordings.formats.file_contents import FileContents
+from arrivals.files import open_input
+from arrivals.recordings.formats.file_contents import FileContents, ReadingOptions, check_size
 from arrivals.tables import MISSING, TableLine, plain, table_lines
 
 TIME_HEADINGS = ("time", "time_s", "t")  # of a first column with times
 
 
-def read_text(file: BinaryIO) -> FileContents:
+def read_text(path: Path, options: ReadingOptions) -> FileContents:
     """Return the table of a text file, and the times of a first column with that heading."""
+    check_size(path.stat().st_size, options.max_bytes)
+    with open_input(path) as file:
+        return _table(file)
+
+
+def _table(file: BinaryIO) -> FileContents:
     rows: list[NDArray[Any]] = []
     heading: list[str] | None = None
     for line in table_lines(file.read()):

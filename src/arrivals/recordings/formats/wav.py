@@ -4,20 +4,32 @@ from __future__ import annotations
 
 import io
 import struct
+from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from arrivals.recordings.formats.file_contents import MAX_BYTES, FileContents, check_size
+from arrivals.files import open_input
+from arrivals.recordings.formats.file_contents import FileContents, ReadingOptions, check_size
 from arrivals.validation import positive
 
 # sizes in the headers of ffmpeg, sox and arecord when they write to a pipe
 UNKNOWN_SIZES = (0, 0x7FFFF000, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF)
 
 
-def read_wav(file: BinaryIO, max_bytes: float = MAX_BYTES) -> FileContents:
+def is_wav(head: bytes) -> bool:
+    """Return True for the first bytes of a WAV file, of big and of 64-bit ones too."""
+    return head[:4] in (b"RIFF", b"RIFX", b"RF64") and head[8:12] == b"WAVE"
+
+
+def read_wav(path: Path, options: ReadingOptions) -> FileContents:
     """Return the samples of a WAV file, integers scaled to [-1, 1), and its rate."""
+    with open_input(path) as file:
+        return _contents(file, options.max_bytes)
+
+
+def _contents(file: BinaryIO, max_bytes: float) -> FileContents:
     from scipy.io import wavfile
 
     start, announced, frame, streamed = _wav_header(file)
