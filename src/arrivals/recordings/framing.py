@@ -171,7 +171,7 @@ def frame_stream(
     ndarray, shape (n_bins, n_snapshots, n_channels)
         Snapshots, without the first two axes where they have length one.
     """
-    if len(frequencies) > 1 and np.dtype(live.get("dtype", "int16")).kind == "c":
+    if len(frequencies) > 1 and live.get("dtype", "int16").startswith("complex"):
         raise ValueError("frequencies must be one for a stream of complex frames")
     blocks = live_snapshots(source, n_channels, frequency=list(frequencies),
                             n_snapshots=n_snapshots, **live)  # fmt: skip

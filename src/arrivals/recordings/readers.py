@@ -132,10 +132,14 @@ def _contents(path: Path, options: ReadingOptions) -> tuple[FileContents, list[s
     if options.variable is not None and not reader.has_names:
         got = f"{options.variable!r} for a {reader.name} file"
         raise ValueError(f"variable must be None without named arrays; got {got}")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        contents = reader.read(path, options)
-    return contents, [note for note in (disagreement, contents.note) if note]
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            contents = reader.read(path, options)
+    except Exception as error:
+        raise ValueError(f"{disagreement}: {error}") if disagreement else error from error
+    wrong = disagreement and f"{disagreement}: read as {reader.name}"
+    return contents, [note for note in (wrong, contents.note) if note]
 
 
 def _stamp(path: Path) -> tuple[int, int]:
@@ -183,9 +187,10 @@ def _in_memory(
 ) -> NDArray[Any] | StoredSamples:
     """Return samples (n_samples, n_channels); few ones are loaded, and those to be transposed."""
     if isinstance(samples, StoredSamples):
-        if not options.transpose and samples.n_bytes > LOADED_AT_ONCE:
+        if options.transpose:
+            check_size(samples.n_bytes, options.max_bytes)
+        elif samples.n_bytes > min(LOADED_AT_ONCE, options.max_bytes):
             return samples
-        check_size(samples.n_bytes, options.max_bytes)
         samples = samples[:]
     samples = samples[:, None] if samples.ndim == 1 else samples
     return samples.T if options.transpose else samples

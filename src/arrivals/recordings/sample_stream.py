@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models import ArraySamples, FlatBand, SensorArray
 from arrivals.measurement_models.delays.array_samples import checked_band
+from arrivals.recordings.raw_numbers import DTYPES, decoded, item_size
 from arrivals.trackers import Run, Tracker
 from arrivals.trackers.run import RunRecorder
 from arrivals.typing import Float
@@ -105,7 +106,7 @@ def live_samples(source: BinaryIO, n_channels: int, *, dtype: str = "int16") -> 
     n_channels : int
         Number of channels.
     dtype : str
-        int16 or int32 (scaled to [-1, 1)), float32, float64.
+        int16, int24 or int32 (scaled to [-1, 1)), float32, float64.
 
     Yields
     ------
@@ -118,9 +119,8 @@ def live_samples(source: BinaryIO, n_channels: int, *, dtype: str = "int16") -> 
     >>> [z.tolist() for z in live_samples(io.BytesIO(np.array([0, 16384], "<i2").tobytes()), 2)]
     [[0.0, 0.5]]
     """
-    kinds = ("int16", "int32", "float32", "float64")
-    kind = np.dtype(one_of("dtype", dtype, kinds)).newbyteorder("<")
-    size = kind.itemsize * count("n_channels", n_channels)
-    scale = 2.0 ** (1 - 8 * kind.itemsize) if kind.kind == "i" else 1.0
+    kinds = tuple(name for name in DTYPES if not name.startswith("complex"))
+    kind = DTYPES[one_of("dtype", dtype, kinds)]
+    size = item_size(kind) * count("n_channels", n_channels)
     while len(block := source.read(size)) == size:
-        yield scale * np.frombuffer(block, kind).astype(np.float64)
+        yield decoded(block, kind).astype(np.float64)

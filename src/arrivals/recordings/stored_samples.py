@@ -29,6 +29,8 @@ class StoredSamples:
         type.
     channels : tuple of int, optional
         Channels that are selected, in this order; all if None.
+    scale : float, optional
+        Factor of loaded integers; 1 if None.
 
     Examples
     --------
@@ -42,6 +44,7 @@ class StoredSamples:
     dtype: np.dtype[Any]
     load: Callable[[int, int], NDArray[Any]]
     channels: tuple[int, ...] | None = None
+    scale: float | None = None
 
     ndim = 2
 
@@ -57,7 +60,10 @@ class StoredSamples:
             raise ValueError(f"the step of rows must be positive; got {step}")
         block = self.load(start, max(start, stop))[::step]
         block = block if self.channels is None else block[:, self.channels]
-        return cleaned(block[:, columns], self.dtype)
+        block = block[:, columns]
+        if self.scale is not None and block.dtype.kind in "iu":  # finite
+            return np.asarray(np.multiply(block, self.dtype.type(self.scale), dtype=self.dtype))
+        return cleaned(block, self.dtype)
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
         return self[:] if dtype is None else self[:].astype(dtype, copy=False)

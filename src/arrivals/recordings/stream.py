@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from io import BytesIO
 from typing import Any, BinaryIO, cast
 
 import numpy as np
@@ -16,19 +15,11 @@ from arrivals.recordings.narrowband import (
     check_frequency,
     default_window,
 )
+from arrivals.recordings.raw_numbers import DTYPES, Replay, decoded, item_size
 from arrivals.trackers import Tracker
 from arrivals.trackers.run import header, text
 from arrivals.typing import Complex, Float
 from arrivals.validation import count, one_of, positive
-
-DTYPES = {
-    "int16": "<i2",
-    "int32": "<i4",
-    "float32": "<f4",
-    "float64": "<f8",
-    "complex64": "<c8",
-    "complex128": "<c16",
-}
 
 
 def live_snapshots(
@@ -51,8 +42,8 @@ def live_snapshots(
     n_channels : int
         Number of channels.
     dtype : str
-        int16 or int32 (scaled to [-1, 1)), float32, float64; or complex64, complex128: every frame
-        is a snapshot.
+        int16, int24 (of three bytes) or int32 (scaled to [-1, 1)), float32, float64; or complex64,
+        complex128: every frame is a snapshot.
     frequency : float or sequence of float, optional
         Frequencies, Hz; not for complex frames.
     rate : float, optional
@@ -86,9 +77,9 @@ def live_snapshots(
     >>> [(time, z.tolist()) for time, z in live_snapshots(source, 2, dtype="complex64")]
     [(0.0, [1j, (2+0j)]), (1.0, [(3+0j), 4j])]
     """
-    kind = np.dtype(DTYPES[one_of("dtype", dtype, tuple(DTYPES))])
-    frame = kind.itemsize * count("n_channels", n_channels)
-    if kind.kind == "c":
+    kind = DTYPES[one_of("dtype", dtype, tuple(DTYPES))]
+    frame = item_size(kind) * count("n_channels", n_channels)
+    if kind[1] == "c":
         if window is not None or hop is not None:
             raise ValueError("window and hop must be None for complex frames")
         bins: list[float] = []
@@ -107,12 +98,12 @@ def live_snapshots(
     spectrum = WindowedSpectrum(rate, bins, window) if bins else None
     any_finite, centre = False, ((n - 1) * hop / 2 + half) / rate
     for step, block in enumerate(_steps(source, frame, window, hop, n)):
-        samples = np.frombuffer(block, kind).reshape(-1, n_channels)
+        samples = decoded(block, kind).reshape(-1, n_channels)
         first = step * n * hop
         if spectrum is None:
             z = _complex_frames(samples)
         else:
-            z = spectrum.amplitudes(_scaled(samples), hop, first).swapaxes(0, 1)
+            z = spectrum.amplitudes(samples, hop, first).swapaxes(0, 1)
             z = z if isinstance(frequency, Sequence | np.ndarray) else z[0]
         any_finite = any_finite or bool(np.isfinite(z).any())
         yield first / rate + centre, z if n > 1 else z[..., 0, :]
@@ -148,11 +139,6 @@ def _complex_frames(frames: NDArray[Any]) -> Complex:
     return np.where(np.isfinite(z), z, complex(np.nan, np.nan))
 
 
-def _scaled(samples: NDArray[Any]) -> NDArray[Any]:
-    """Return integers as numbers in [-1, 1), others unchanged."""
-    return samples * 2.0 ** (1 - 8 * samples.itemsize) if samples.dtype.kind == "i" else samples
-
-
 def read_ahead(
     source: BinaryIO, n_channels: int, duration: float, *, dtype: str = "int16", rate: float
 ) -> tuple[Float, BinaryIO]:
@@ -185,26 +171,14 @@ def read_ahead(
     >>> samples.tolist(), source.read(100) == raw
     ([[0.0, 1.0], [2.0, 3.0]], True)
     """
-    kind = np.dtype(DTYPES[one_of("dtype", dtype, tuple(DTYPES))])
-    frame = kind.itemsize * count("n_channels", n_channels)
+    kind = DTYPES[one_of("dtype", dtype, tuple(DTYPES))]
+    frame = item_size(kind) * count("n_channels", n_channels)
     head = source.read(
         int(np.ceil(positive("duration", duration) * positive("rate", rate))) * frame
     )
     whole = len(head) // frame * frame
-    samples = _scaled(np.frombuffer(head[:whole], kind).reshape(-1, n_channels))
-    return samples.astype(np.float64), cast(BinaryIO, _Replay(head, source))
-
-
-class _Replay:
-    """Bytes that were read before, followed by the rest of their source."""
-
-    def __init__(self, head: bytes, source: BinaryIO) -> None:
-        self._head, self._source = BytesIO(head), source
-
-    def read(self, size: int) -> bytes:
-        """Return the next bytes."""
-        block = self._head.read(size)
-        return block if len(block) == size else block + self._source.read(size - len(block))
+    samples = decoded(head[:whole], kind).reshape(-1, n_channels)
+    return samples.astype(np.float64), cast(BinaryIO, Replay(head, source))
 
 
 def track_live(

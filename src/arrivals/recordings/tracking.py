@@ -24,7 +24,7 @@ from arrivals.trackers import find
 from arrivals.trackers.run import Run
 from arrivals.typing import Complex
 
-BLOCK = 2**22  # complex numbers of the steps that are computed together: 64 MB
+BLOCK = 2**20  # samples, or complex numbers of the steps, that are processed together: 16 MB
 READING = ("rate", "variable", "transpose", "max_bytes", "format")  # arguments of `read`
 
 
@@ -204,12 +204,13 @@ class RecordedSteps:
 
     def __iter__(self) -> Iterator[Complex]:
         any_finite = False
-        size = self._choice.n_snapshots * len(self._choice.frequencies)
+        size = max(self._step, self._choice.n_snapshots * len(self._choice.frequencies))
         n = max(1, BLOCK // (size * self._recording.n_channels))
         for first in range(0, self._n_steps, n):
             values = self._part(first, min(n, self._n_steps - first)).values
             any_finite = any_finite or bool(np.isfinite(values).any())
             yield from values
+            del values  # before the next ones are computed
         if not any_finite:
             raise ValueError("no sample of the array's channels is finite")
 

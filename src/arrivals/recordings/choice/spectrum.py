@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.recordings.narrowband import WindowedSpectrum
+from arrivals.recordings.stored_samples import StoredSamples
 from arrivals.typing import Float
 
 LONGEST, MOST_WINDOWS, MOST_CHANNELS = 4096, 256, 8
@@ -46,13 +47,13 @@ class MeanSpectrum:
     steady: Float
 
     @classmethod
-    def of(cls, samples: ArrayLike, rate: float) -> MeanSpectrum:
+    def of(cls, samples: ArrayLike | StoredSamples, rate: float) -> MeanSpectrum:
         """Return the spectrum of at most 256 windows of at most 8 channels.
 
         Parameters
         ----------
-        samples : array_like, shape (n_samples, n_channels)
-            Real samples.
+        samples : array_like or StoredSamples, shape (n_samples, n_channels)
+            Real samples, of which only the windows are loaded.
         rate : float
             Samples per second, Hz.
 
@@ -61,17 +62,21 @@ class MeanSpectrum:
         MeanSpectrum
             Empty for less than 16 samples.
         """
-        x = np.asarray(samples)
+        x = samples if isinstance(samples, StoredSamples) else np.asarray(samples)
         n = 2 ** int(np.log2(max(16, min(LONGEST, len(x) // 8))))
         if len(x) < n:
             return cls.empty()
         hop = max(n // 2, len(x) // MOST_WINDOWS)
         channels = np.unique(np.linspace(0, x.shape[1] - 1, MOST_CHANNELS).astype(int))
         frequency = np.arange(1, n // 2) * rate / n
-        y = WindowedSpectrum(rate, frequency.tolist(), n).amplitudes(x[:, channels], hop)
-        valid = ~np.isnan(y)
-        power = np.where(valid, y.real**2 + y.imag**2, 0.0).sum(axis=2)
-        power = power[valid.any(axis=(1, 2))] / max(1, len(channels))  # (n_windows, n_bins)
+        spectrum = WindowedSpectrum(rate, frequency.tolist(), n)
+        powers = []
+        for i in range(0, len(x) - n + 1, hop):
+            y = spectrum.amplitudes(x[i : i + n][:, channels], n, i)[0]  # (n_bins, n_channels)
+            valid = ~np.isnan(y)
+            if valid.any():
+                powers.append(np.where(valid, y.real**2 + y.imag**2, 0.0).sum(axis=1))
+        power = np.array(powers) / max(1, len(channels))  # (n_windows, n_bins)
         if not len(power):
             return cls.empty()
         return cls(frequency, np.asarray(power.mean(axis=0)), np.asarray(np.median(power, axis=0)))

@@ -38,12 +38,14 @@ CLASSES = {6: "f8", 7: "f4", 8: "i1", 9: "u1", 10: "i2", 11: "u2", 12: "i4", 13:
 COMPLEX_FLAG, OPAQUE = 0x0800, 17
 LEVEL_4 = {0: "f8", 1: "f4", 2: "i4", 3: "i2", 4: "u2", 5: "u1"}
 MAX_HEADER = 4096  # bytes of a variable before its data
+HDF5_VERSIONS = (b"\0\2IM", b"\2\0MI")  # versions and byte orders of 7.3
 KIND = "MATLAB file"
 
 
 def is_matlab(head: bytes) -> bool:
     """Return True for the header of level 5."""
-    return head[126:128] in (b"IM", b"MI") and b"\x89HDF" not in head
+    named = head.startswith(b"MATLAB") and head[126:128] in (b"IM", b"MI")
+    return named and head[124:128] not in HDF5_VERSIONS
 
 
 def read_matlab(path: Path, options: ReadingOptions) -> FileContents:
@@ -72,7 +74,7 @@ def matlab_arrays(file: BinaryIO) -> dict[str, StoredArray]:
     """
     file.seek(0)
     head = file.read(128)
-    if b"\x89HDF" in head[:8] or head[124:128] in (b"\0\2IM", b"\2\0MI"):
+    if b"\x89HDF" in head[:8] or head[124:128] in HDF5_VERSIONS:
         raise ValueError(
             "MATLAB v7.3 (HDF5) requires h5py, which is not supported: save it with -v7"
         )

@@ -7,6 +7,14 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from arrivals.recordings.formats.audio import (
+    is_aiff,
+    is_caf,
+    is_flac,
+    is_ogg,
+    is_w64,
+    read_audio,
+)
 from arrivals.recordings.formats.file_contents import FileContents, ReadingOptions
 from arrivals.recordings.formats.matlab import is_matlab, read_matlab
 from arrivals.recordings.formats.numpy_files import is_numpy, read_numpy
@@ -57,6 +65,11 @@ class Reader:
 
 READERS = (
     Reader("WAV", (".wav", ".wave", ".bwf", ".rf64"), read_wav, is_wav),
+    Reader("FLAC", (".flac",), read_audio, is_flac),
+    Reader("OGG", (".ogg", ".oga", ".opus"), read_audio, is_ogg),
+    Reader("AIFF", (".aif", ".aiff", ".aifc"), read_audio, is_aiff),
+    Reader("CAF", (".caf",), read_audio, is_caf),
+    Reader("W64", (".w64",), read_audio, is_w64),
     Reader("NumPy", (".npy", ".npz"), read_numpy, is_numpy, has_names=True),
     Reader("MATLAB", (".mat",), read_matlab, is_matlab, has_names=True),
     Reader("text", (".csv", ".txt"), read_text),
@@ -94,7 +107,7 @@ def reader_for(path: Path, head: bytes, form: str | None = None) -> tuple[Reader
     >>> reader_for(Path("a.wav"), b"RIFF....WAVEfmt ")[0].name
     'WAV'
     >>> reader_for(Path("a.csv"), b"RIFF....WAVEfmt ")[1]
-    'the suffix is .csv, the content is WAV: read as WAV'
+    'the suffix is .csv, the content is WAV'
     """
     suffix = path.suffix.lower() if form is None else f".{form.lower()}"
     by_suffix = _with_suffix(READERS, suffix)
@@ -112,7 +125,7 @@ def reader_for(path: Path, head: bytes, form: str | None = None) -> tuple[Reader
     if by_content is not None and form is None:
         name = by_content.name
         shown = f"the suffix is {suffix}" if suffix else "there is no suffix"
-        return by_content, f"{shown}, the content is {name}: read as {name}"
+        return by_content, f"{shown}, the content is {name}"
     if by_suffix:
         return by_suffix[0], None
     suffixes = [each for reader in (*READERS, *others) for each in reader.suffixes]
