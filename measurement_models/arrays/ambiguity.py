@@ -89,8 +89,8 @@ def _pair_of_plane(waves: PlaneWaves) -> tuple[float, float] | None:
 def _coherence(a: Complex) -> Float:
     """Mean |aᴴb|² / ‖a‖²‖b‖² over the bins, of responses (S, F, M, n), the largest of S: (n, n)."""
     a = a / np.maximum(np.linalg.norm(a, axis=2, keepdims=True), 1e-12)
-    products = np.swapaxes(a.conj(), 2, 3) @ a
-    return np.asarray((np.abs(products) ** 2).mean(axis=1).max(axis=0))
+    bins = (np.swapaxes(b.conj(), 1, 2) @ b for b in a.swapaxes(0, 1))  # one at a time: memory
+    return np.asarray((sum(np.abs(products) ** 2 for products in bins) / a.shape[1]).max(axis=0))
 
 
 def in_a_line(waves: PlaneWaves) -> float | None:

@@ -10,14 +10,13 @@ from typing import BinaryIO
 
 import numpy as np
 
-from arrivals.cli.models import n_stream_channels, printed_warnings, require_speed
+from arrivals.cli.models import n_stream_channels, printed_warnings, read_recording, require_speed
 from arrivals.cli.outputs import Bar, draw, live_output, refuse, write_table
 from arrivals.measurement_models import SensorArray
 from arrivals.measurements import is_missing
 from arrivals.recordings.choice import Choice, MeanSpectrum, TrackOptions, choose
 from arrivals.recordings.choice.assembly import assembled
 from arrivals.recordings.framing import frame_stream
-from arrivals.recordings.readers import read
 from arrivals.recordings.stream import read_ahead, track_live
 from arrivals.recordings.tracking import RecordedSteps, choice_for
 from arrivals.typing import Complex
@@ -48,9 +47,7 @@ def _track_file(
             warnings.simplefilter("ignore")
             rate = 4 * np.max(options.frequencies)  # any that has the frequencies
             assembled(array, choose(array, rate, MeanSpectrum.empty(), options), None)
-    refuse(arguments, ("dtype", "channels"), "requires samples from standard input")
-    recording = read(arguments.file, rate=arguments.rate, variable=arguments.variable,
-                     transpose=arguments.transpose, array=array, rate_required=True)  # fmt: skip
+    recording = read_recording(arguments, array)
     with printed_warnings():
         choice = choice_for(recording, options)
         measurement, tracker = assembled(array, choice, recording.rate)
@@ -60,9 +57,7 @@ def _track_file(
     result = tracker.run(bar(announced, desc=choice.tracker, total=len(steps)))
     result = result if time is None else result.at(time)
     write_table(result, arguments.out)
-    if arguments.plot:
-        snapshots = steps.framed().values
-        draw(arguments.plot, result, snapshots=snapshots, measurement=measurement, time=time)
+    draw(arguments.plot, result, snapshots=steps, measurement=measurement, time=time)
 
 
 def _announcement(choice: Choice, options: TrackOptions) -> Callable[[Complex], Complex]:
@@ -106,7 +101,7 @@ def _stream_choice(
     arguments: argparse.Namespace, array: SensorArray, options: TrackOptions, n_channels: int
 ) -> tuple[Choice, BinaryIO]:
     """Return the choice for a stream, from its first samples if necessary, and the stream."""
-    source, rate, dtype = sys.stdin.buffer, arguments.rate, arguments.dtype or "int16"
+    source, rate, dtype = arguments.source, arguments.rate, arguments.dtype or "int16"
     if dtype.startswith("complex"):
         return choose(array, rate, None, options), source
     spectrum = MeanSpectrum.empty()

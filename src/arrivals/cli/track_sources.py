@@ -6,7 +6,7 @@ import argparse
 
 import numpy as np
 
-from arrivals.cli.models import model_at
+from arrivals.cli.models import model_at, read_recording
 from arrivals.cli.outputs import Bar, draw, refuse, write_table
 from arrivals.cli.separated_signals import (
     analytic,
@@ -16,8 +16,9 @@ from arrivals.cli.separated_signals import (
     write_signals,
 )
 from arrivals.measurement_models import SensorArray
-from arrivals.recordings.readers import read
+from arrivals.recordings.formats.file_contents import MAX_BYTES
 from arrivals.recordings.recording import Recording
+from arrivals.recordings.stored_samples import StoredSamples
 from arrivals.trackers import ARKalmanQRDRLS, find
 from arrivals.typing import Complex, Float
 
@@ -53,15 +54,13 @@ def track_sources(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -
     bar : callable
         As in `track`.
     """
-    refuse(arguments, ("dtype", "channels"), "requires samples from standard input")
     if arguments.frequency is None and arguments.band:
         arguments.frequency = sum(arguments.band) / 2
     if arguments.frequency is None:
         raise ValueError("pass --frequency, or --band, of the separated sources")
     refuse(arguments, ("frequencies",), "requires another tracker: this one takes --frequency")
     model = model_at(array, arguments, [arguments.frequency])
-    recording = read(arguments.file, rate=arguments.rate, variable=arguments.variable,
-                     transpose=arguments.transpose, array=array, rate_required=True)  # fmt: skip
+    recording = read_recording(arguments, array)
     every_sample = not (recording.is_narrowband or arguments.window)
     z, time = _samples(recording, arguments) if every_sample else _snapshots(recording, arguments)
     tracker = separator(dict(arguments.set), z, model, every_sample)
@@ -83,6 +82,12 @@ def track_sources(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -
 def _samples(recording: Recording, arguments: argparse.Namespace) -> tuple[Complex, Float | None]:
     if recording.rate is None:
         raise ValueError(f"{arguments.file}: the rate is unknown: pass --rate")
+    if isinstance(recording.samples, StoredSamples) and recording.samples.n_bytes > MAX_BYTES:
+        limit, got = MAX_BYTES / 1e9, recording.samples.n_bytes / 1e9
+        raise ValueError(
+            f"{arguments.file}: separated sources require all samples in memory, at most {limit:g} "
+            f"GB; got {got:.3g} GB: cut the file, or pass --window"
+        )
     z = analytic(recording.samples, recording.rate, arguments.band)
     return z, np.arange(len(z)) / recording.rate
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -11,9 +12,9 @@ from numpy.typing import ArrayLike
 
 from arrivals.files import atomic_write
 from arrivals.measurement_models import ArraySnapshot
-from arrivals.trackers.beamforming.spectrum import bartlett_power, mean_beam_power, scan_directions
+from arrivals.plots.beam import draw_beam
 from arrivals.trackers.run import Run
-from arrivals.typing import Bool, Float, Int
+from arrivals.typing import Bool, Complex, Float, Int
 from arrivals.validation import one_of, positive, shaped
 
 if TYPE_CHECKING:
@@ -26,14 +27,14 @@ PALETTE = (
     "#e377c2", "#17becf", "#8c564b", "#b8a900", "#00429d",
 )  # fmt: skip
 NEUTRAL = "#202020"
-N_DIRECTIONS, N_COLUMNS = 361, 1500  # maximum size of the beam's image
+N_STEPS = 6000  # maximum number of steps that are drawn
 PICTURES = (".png", ".pdf", ".svg", ".jpg")
 
 
 def plot_bearing_time(
     run: Run,
     *,
-    snapshots: ArrayLike | None = None,
+    snapshots: ArrayLike | Iterable[Complex] | None = None,
     measurement: ArraySnapshot | None = None,
     time: ArrayLike | None = None,
     dynamic_range_db: float = 30.0,
@@ -42,14 +43,15 @@ def plot_bearing_time(
     """Draw directions over time, over the power of the conventional beamformer.
 
     Each label has a colour (they repeat), directions without a label are dark, and the opacity
-    is the existence; without existence, all are opaque.
+    is the existence; without existence, all are opaque. Of more than 6000 steps, every n-th is
+    drawn.
 
     Parameters
     ----------
     run : Run
         Run of a tracker of directions, n_steps long.
-    snapshots : array_like, shape (n_steps, *measurement.shape), optional
-        Measurements of the run; without them, the beam is not drawn.
+    snapshots : array_like or iterable, shape (n_steps, *measurement.shape), optional
+        Measurements of the run, iterated over once; without them, the beam is not drawn.
     measurement : ArraySnapshot, optional
         Array and wavelength, required with `snapshots`.
     time : array_like, shape (n_steps,), optional
@@ -89,7 +91,7 @@ def plot_bearing_time(
         if measurement is None:
             raise ValueError("measurement must be set with snapshots; got None")
         range_db = positive("dynamic_range_db", dynamic_range_db)
-        _draw_beam(ax, at, np.asarray(snapshots), measurement, range_db)
+        draw_beam(ax, at, snapshots, measurement, range_db)
     _draw_tracks(ax, at, run)
     line = bool((np.abs(run.doa) > np.pi / 2).sum() == 0)
     _name_axes(ax, line if measurement is None else measurement.array.dim == 1, time is None)
@@ -106,68 +108,17 @@ def _name_axes(ax: Axes, line: bool, steps: bool) -> None:
     ax.set_xlabel("step" if steps else "time, s")
 
 
-def _draw_beam(
-    ax: Axes, at: Float, snapshots: Any, measurement: ArraySnapshot, range_db: float
-) -> None:
-    """Draw the beam power in grey, light enough for the tracks to stand out."""
-    from matplotlib.colors import LinearSegmentedColormap
-
-    shape = (len(at), *measurement.shape)
-    if snapshots.shape != shape:
-        raise ValueError(f"snapshots must have shape {shape}; got {snapshots.shape}")
-    if not (np.isfinite(snapshots) & (snapshots != 0)).any():
-        return  # no power
-    doa = scan_directions(measurement.array, N_DIRECTIONS)
-    starts = np.arange(0, len(at), max(1, -(-len(at) // N_COLUMNS)))
-    blocks = np.split(snapshots, starts[1:])
-    power = np.array([_beam(measurement, doa, block) for block in blocks])
-    level = 10 * np.log10(np.maximum(power / power.max(), 1e-30))
-    light = LinearSegmentedColormap.from_list("light", ["#ffffff", "#c3c8cf", "#4d5560"])
-    image = ax.pcolormesh(
-        _edges(at[starts]), np.rad2deg(_edges(doa)), level.T,
-        cmap=light, vmin=-range_db, vmax=0, rasterized=True,
-    )  # fmt: skip
-    bar = ax.figure.colorbar(image, ax=ax, pad=0.015, aspect=25, extend="min")
-    bar.set_label("beam power, dB re maximum")
-    bar.outline.set_visible(False)
-
-
-def _beam(measurement: ArraySnapshot, doa: Float, block: Any) -> Float:
-    """Return the highest power in each direction of the steps of a block."""
-    isotropic = measurement.response is None
-    if measurement.is_single and isotropic and measurement.coherence is None:
-        A = measurement.steering_vector(doa)
-        return np.asarray(bartlett_power(A, block).max(axis=0))
-    steering = measurement.waves.steering(doa)
-    frames = block.reshape(len(block), measurement.n_bins, measurement.n_snapshots, -1)
-    pairs = (measurement.whitened(np.swapaxes(Y, 1, 2), steering) for Y in frames)
-    return np.asarray(np.max([mean_beam_power(A, Y) for Y, A in pairs], axis=0))
-
-
-def _edges(centres: Float) -> Float:
-    """Return the edges of cells about their centres: one more than there are centres.
-
-    Examples
-    --------
-    >>> _edges(np.array([0.0, 1.0, 3.0]))
-    array([-0.5,  0.5,  2. ,  4. ])
-    """
-    if len(centres) == 1:
-        return np.array([centres[0] - 0.5, centres[0] + 0.5])
-    middle = (centres[1:] + centres[:-1]) / 2
-    first, last = 2 * centres[0] - middle[0], 2 * centres[-1] - middle[-1]
-    return np.concatenate([[first], middle, [last]])
-
-
 def _draw_tracks(ax: Axes, at: Float, run: Run) -> None:
     """Draw each label as a line through successive steps, and isolated directions as dots."""
     from matplotlib.collections import LineCollection
 
-    step, slot = np.nonzero(~np.isnan(run.doa))
-    order = np.lexsort([step, run.label[step, slot]])
+    some = slice(None, None, max(1, -(-len(at) // N_STEPS)))
+    at, doas, labels, existence = at[some], run.doa[some], run.label[some], run.existence[some]
+    step, slot = np.nonzero(~np.isnan(doas))
+    order = np.lexsort([step, labels[step, slot]])
     step, slot = step[order], slot[order]
-    label, point = run.label[step, slot], np.stack([at[step], np.rad2deg(run.doa[step, slot])], 1)
-    colour = _colours(label, run.existence[step, slot])
+    label, point = labels[step, slot], np.stack([at[step], np.rad2deg(doas[step, slot])], 1)
+    colour = _colours(label, existence[step, slot])
     joined = _joined(step, label, point[:, 1])
     lines = list(np.stack([point[:-1][joined], point[1:][joined]], axis=1))
     for width, paint in ((3.4, "white"), (1.7, colour[1:][joined])):

@@ -1,0 +1,107 @@
+"""Image of the beam power over time, computed column by column."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import islice
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from arrivals.measurement_models import ArraySnapshot
+from arrivals.trackers.beamforming.spectrum import bartlett_power, mean_beam_power, scan_directions
+from arrivals.typing import Complex, Float, Int
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+N_DIRECTIONS, N_COLUMNS = 361, 1500  # maximum size of the image
+
+
+def draw_beam(
+    ax: Axes, at: Float, snapshots: Any, measurement: ArraySnapshot, range_db: float
+) -> None:
+    """Draw the beam power in grey, light enough for the tracks to stand out.
+
+    Parameters
+    ----------
+    ax : matplotlib Axes
+        Axes of directions over time.
+    at : ndarray, shape (n_steps,)
+        Times.
+    snapshots : array_like or iterable, shape (n_steps, *measurement.shape)
+        Snapshots, iterated over once.
+    measurement : ArraySnapshot
+        Array and wavelengths.
+    range_db : float
+        Power shown, down from the highest, dB.
+
+    Raises
+    ------
+    ValueError
+        If the shape of the snapshots does not fit.
+    """
+    from matplotlib.colors import LinearSegmentedColormap
+
+    doa = scan_directions(measurement.array, N_DIRECTIONS)
+    starts = np.arange(0, len(at), max(1, -(-len(at) // N_COLUMNS)))
+    powers, has_power = [], False
+    for block in _blocks(snapshots, np.diff(np.append(starts, len(at))), measurement.shape):
+        has_power = has_power or bool((np.isfinite(block) & (block != 0)).any())
+        powers.append(_beam(measurement, doa, block))
+    if not has_power:
+        return
+    power = np.array(powers)
+    level = 10 * np.log10(np.maximum(power / power.max(), 1e-30))
+    light = LinearSegmentedColormap.from_list("light", ["#ffffff", "#c3c8cf", "#4d5560"])
+    image = ax.pcolormesh(
+        _edges(at[starts]), np.rad2deg(_edges(doa)), level.T,
+        cmap=light, vmin=-range_db, vmax=0, rasterized=True,
+    )  # fmt: skip
+    bar = ax.figure.colorbar(image, ax=ax, pad=0.015, aspect=25, extend="min")
+    bar.set_label("beam power, dB re maximum")
+    bar.outline.set_visible(False)
+
+
+def _blocks(snapshots: Any, sizes: Int, shape: tuple[int, ...]) -> Iterator[Complex]:
+    """Yield so many snapshots of an array, or of another iterable, at a time."""
+    if hasattr(snapshots, "__array__") or isinstance(snapshots, Sequence):
+        snapshots = np.asarray(snapshots)
+    steps = iter(snapshots)
+    for size in sizes:
+        block = np.array(list(islice(steps, size)))
+        if block.shape != (size, *shape):
+            break
+        yield block
+    else:
+        if next(steps, None) is None:
+            return
+    got = getattr(snapshots, "shape", f"{len(snapshots)} of another shape")
+    raise ValueError(f"snapshots must have shape {(int(sizes.sum()), *shape)}; got {got}")
+
+
+def _beam(measurement: ArraySnapshot, doa: Float, block: Any) -> Float:
+    """Return the highest power in each direction of the steps of a block."""
+    isotropic = measurement.response is None
+    if measurement.is_single and isotropic and measurement.coherence is None:
+        A = measurement.steering_vector(doa)
+        return np.asarray(bartlett_power(A, block).max(axis=0))
+    steering = measurement.waves.steering(doa)
+    frames = block.reshape(len(block), measurement.n_bins, measurement.n_snapshots, -1)
+    pairs = (measurement.whitened(np.swapaxes(Y, 1, 2), steering) for Y in frames)
+    return np.asarray(np.max([mean_beam_power(A, Y) for Y, A in pairs], axis=0))
+
+
+def _edges(centres: Float) -> Float:
+    """Return the edges of cells about their centres: one more than there are centres.
+
+    Examples
+    --------
+    >>> _edges(np.array([0.0, 1.0, 3.0]))
+    array([-0.5,  0.5,  2. ,  4. ])
+    """
+    if len(centres) == 1:
+        return np.array([centres[0] - 0.5, centres[0] + 0.5])
+    middle = (centres[1:] + centres[:-1]) / 2
+    first, last = 2 * centres[0] - middle[0], 2 * centres[-1] - middle[-1]
+    return np.concatenate([[first], middle, [last]])
