@@ -42,7 +42,7 @@ OUT = ("--out", "tracks.csv", "--plot", "tracks.png")
         (("--plot", "nowhere/tracks.png"), ("nowhere: the folder does not exist",)),
         (("--plot", "tracks.xyz"), (".png", "'.xyz'")),
         (("--out", "."), ("this is a folder",)),
-        (("--variable", "z"), ("variable must be None except for npz and mat",)),
+        (("--variable", "z"), ("variable must be None without named arrays",)),
         (("--dtype", "int16"), ("--dtype requires samples from standard input",)),
         (("--frobnicate",), ("unrecognized arguments",)),
         (
@@ -106,7 +106,8 @@ def write_wav(path: Path, samples: Any) -> None:
         ("nan.wav", np.full((1000, 8), np.nan, "<f4"), ("no sample of the recording is finite",)),
         ("narrow.wav", np.zeros((1000, 3), "<i2"), ("must have 8 channels; got 3",)),
         ("absent.wav", None, ("absent.wav", "No such file")),
-        ("tow.ogg", b"OggS", ("suffix must be one of",)),
+        ("tow.xyz", b"abcd", ("suffix must be one of",)),
+        ("tow.ogg", b"OggS", ("tow.ogg: truncated, encrypted or damaged",)),
     ],
 )
 def test_track_invalid_recording_prints_one_line(
@@ -159,7 +160,7 @@ def test_track_without_finite_samples_of_the_array_is_refused(
         (np.full((300, 8), np.nan, "<f4").tobytes(), ("--dtype", "float32"), ("finite",)),
         (b"", ("--dtype", "complex64"), ("ended after 0 frames",)),
         (b"", ("--dtype", "complex64", "--hop", "5"), ("window and hop must be None",)),
-        (b"", ("--dtype", "int24"), ("must be one of int16, ", "got 'int24': did you mean int")),
+        (b"", ("--dtype", "int12"), ("must be one of int16, ", "got 'int12': did you mean int")),
         (b"", ("--rate", "1500"), ("750 Hz", "got 1000 Hz")),
         (b"", ("--channels", "7"), ("must have 8 channels; got 7",)),
         (b"", ("--channels", "0"), ("channels must be at least 1",)),
@@ -177,8 +178,9 @@ def test_track_invalid_stream_prints_one_line(
 
 
 def test_track_of_a_stream_requires_rate_and_channels(
-    scene: Path, here: Path, capsys: pytest.CaptureFixture[str]
+    scene: Path, here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(b"")))
     assert_rejected(track(scene, file="-"), capsys, here, "require a rate")
     (here / "array.toml").write_text(ARRAY + "channels = [1, 3, 5, 7, 9, 11, 13, 15]\n")
     live = track(here, "--rate", str(RATE), file="-")

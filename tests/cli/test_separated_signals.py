@@ -1,6 +1,7 @@
 """Separated sources from recordings, by the command line."""
 
 import csv
+import io
 from pathlib import Path
 from typing import Any
 
@@ -170,8 +171,9 @@ def test_signals_without_a_tracker_are_refused(
 
 
 def test_signals_of_zeros_streams_and_other_arrays_are_refused(
-    scene: Path, capsys: pytest.CaptureFixture[str]
+    scene: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(b"")))
     assert main(track(scene, "--frequency", "1000", file="zeros.wav")) == 2
     assert "the recording is zero" in capsys.readouterr().err
     stream = ["track", "-", *track(scene, "--frequency", "1000")[2:], "--signals", "o.wav"]

@@ -18,7 +18,7 @@ from arrivals.cli.locate import add_locate
 from arrivals.cli.track import track
 from arrivals.measurement_models.arrays.presets import preset_names, preset_summary
 from arrivals.messages import shown, similar
-from arrivals.recordings.stream import DTYPES
+from arrivals.recordings.raw_numbers import DTYPES
 from arrivals.scenarios.demos.infrasound import infrasound
 from arrivals.scenarios.demos.swellex96 import demo
 from arrivals.scenarios.reproduce.studies import add_reproduce
@@ -94,16 +94,16 @@ def _add_track(commands: Any) -> None:
     add = commands.add_parser(
         "track",
         help="track directions through a recording or a stream",
-        description="Track directions of arrival through a recording (WAV, npy, npz, MATLAB, "
-        "CSV), or through raw interleaved samples from standard input. Frequencies, windows and "
+        description="Track directions of arrival through a recording (WAV, FLAC and other audio, "
+        "npy, npz, MATLAB, CSV), or through a WAV stream or raw interleaved samples from standard "
+        "input. Frequencies, windows and "
         "tracker are chosen from array and recording (of a stream, its first 2 s) unless they are "
         "given; a line on standard error has the choice as options.",
-        epilog="live: arecord -t raw -f S16_LE -r 48000 -c 8 | "
-        "arrivals track - --array ARRAY.toml --rate 48000",
+        epilog="live: arecord -t wav -f S16_LE -r 48000 -c 8 | arrivals track - --array ARRAY.toml",
         allow_abbrev=False,
     )
     option = add.add_argument
-    option("file", metavar="FILE", help="recording; - for raw samples from standard input")
+    option("file", metavar="FILE", help="recording; - for samples from standard input")
     option("--array", required=True, metavar="ARRAY",
            help="array file (TOML, JSON), or the name of a preset in `arrivals list`")  # fmt: skip
     option("--frequency", type=float, metavar="HZ", help="frequency of narrowband sources")
@@ -148,7 +148,7 @@ def _add_track(commands: Any) -> None:
                 "samples (1)")  # fmt: skip
     option("--variable", metavar="NAME", help="name of the array in an npz or mat file")
     option("--transpose", action="store_true", help="rows of the file are channels")
-    option("--dtype", choices=tuple(DTYPES), help="sample type of standard input (int16)")
+    option("--dtype", choices=tuple(DTYPES), help="sample type of raw standard input (int16)")
     option(
         "--channels",
         type=int,

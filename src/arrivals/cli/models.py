@@ -11,9 +11,12 @@ from contextlib import contextmanager
 
 import numpy as np
 
+from arrivals.cli.outputs import refuse
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.measurement_models.arrays.files import TABLES
 from arrivals.recordings.choice.assembly import measurement_at
+from arrivals.recordings.readers import read
+from arrivals.recordings.recording import Recording
 from arrivals.validation import count
 
 
@@ -36,6 +39,14 @@ def require_speed(array: SensorArray, arguments: argparse.Namespace) -> None:
             f"{arguments.array}: the key 'speed' is missing: "
             f"a frequency requires the wave speed, m/s: {cure}"
         )
+
+
+def read_recording(arguments: argparse.Namespace, array: SensorArray) -> Recording:
+    """Return the recording of the file of the arguments; print warnings about it."""
+    refuse(arguments, ("dtype", "channels"), "requires samples from standard input")
+    with printed_warnings():
+        return read(arguments.file, rate=arguments.rate, variable=arguments.variable,
+                    transpose=arguments.transpose, array=array, rate_required=True)  # fmt: skip
 
 
 @contextmanager

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 
 from arrivals.cli.outputs import Bar, check_outputs
+from arrivals.cli.standard_input import standard_input
 from arrivals.cli.track_band import track_band
 from arrivals.cli.track_snapshots import track_snapshots
 from arrivals.cli.track_sources import separates, track_sources
@@ -32,7 +33,8 @@ def track(arguments: argparse.Namespace, bar: Bar) -> None:
 
     array = SensorArray.from_file(arguments.array)
     check_outputs(arguments)
-    with threadpool_limits(1, "blas"):  # matrices are small: more threads only wait
+    one_thread = threadpool_limits(1, "blas")  # matrices are small: more threads only wait
+    with one_thread, standard_input(arguments):
         if separates(arguments):
             track_sources(arguments, array, bar)
         elif arguments.band and takes_samples(arguments.tracker):

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import sys
 
-from arrivals.cli.models import n_stream_channels, printed_warnings
+from arrivals.cli.models import n_stream_channels, printed_warnings, read_recording
 from arrivals.cli.outputs import Bar, draw, live_output, refuse, write_table
 from arrivals.measurement_models import SensorArray
 from arrivals.recordings.choice.assembly import make_tracker
-from arrivals.recordings.readers import read
 from arrivals.recordings.sample_stream import band_samples, live_samples, track_samples
 from arrivals.recordings.stream import track_live
 from arrivals.trackers import Tracker
@@ -27,9 +25,7 @@ def track_band(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -> N
     if arguments.file == "-":
         _track_band_stream(arguments, array, bar)
         return
-    refuse(arguments, ("dtype", "channels"), "requires samples from standard input")
-    recording = read(arguments.file, rate=arguments.rate, variable=arguments.variable,
-                     transpose=arguments.transpose, array=array, rate_required=True)  # fmt: skip
+    recording = read_recording(arguments, array)
     if recording.is_narrowband:
         raise ValueError(f"{arguments.file}: --band requires real samples; got complex ones")
     tracker, rate = _band_tracker(arguments, array, recording.rate)
@@ -43,7 +39,7 @@ def _track_band_stream(arguments: argparse.Namespace, array: SensorArray, bar: B
     refuse(arguments, ("plot", "variable", "transpose"), "requires a file, not a stream")
     tracker, rate = _band_tracker(arguments, array, arguments.rate)
     n_channels = n_stream_channels(arguments.channels, array)
-    frames = live_samples(sys.stdin.buffer, n_channels, dtype=arguments.dtype or "int16")
+    frames = live_samples(arguments.source, n_channels, dtype=arguments.dtype or "int16")
     steps = ((k / rate, array.select(z)) for k, z in enumerate(frames))
     with live_output(arguments.out) as write:
         bars = bar(steps, desc=arguments.tracker)

@@ -1,0 +1,96 @@
+"""Recordings on standard input: raw samples, live WAV, other formats by a temporary file."""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, BinaryIO, cast
+
+from arrivals.cli.outputs import refuse
+from arrivals.recordings.formats.registry import READERS
+from arrivals.recordings.formats.wav import is_wav, wav_header
+from arrivals.recordings.raw_numbers import DTYPES, Replay
+
+HEAD = 16  # bytes by which a format is recognised
+NAME = "standard input"
+
+
+@contextmanager
+def standard_input(arguments: argparse.Namespace) -> Iterator[None]:
+    """Set the source of arguments with `-` for the file, while the command runs.
+
+    The header of a WAV stream sets `rate`, `channels` and `dtype`; `source` begins with the
+    samples. Other formats are copied to a temporary file, whose name replaces `-`. Anything else
+    is raw samples.
+
+    Parameters
+    ----------
+    arguments : argparse.Namespace
+        Arguments of `arrivals track`; gets `source`, None for files.
+
+    Raises
+    ------
+    ValueError
+        If arguments contradict the header.
+    """
+    arguments.source = None
+    if arguments.file != "-":
+        yield
+        return
+    head = sys.stdin.buffer.read(HEAD)
+    source = cast(BinaryIO, Replay(head, sys.stdin.buffer))
+    known = next((reader.name for reader in READERS if reader.takes(head)), None)
+    if known is None:
+        arguments.source = source
+        yield
+        return
+    seen = _Recorder(source)
+    if is_wav(head) and _takes_header(arguments, seen):
+        yield
+        return
+    refuse(arguments, ("dtype", "channels"), f"must be left out: {NAME} is a {known} file")
+    with tempfile.NamedTemporaryFile(suffix=f".{known.lower()}") as copy:
+        shutil.copyfileobj(cast(BinaryIO, Replay(seen.bytes, source)), copy)
+        copy.flush()
+        arguments.file = copy.name
+        try:
+            yield
+        except (ValueError, OSError) as error:
+            raise ValueError(str(error).replace(copy.name, NAME)) from error
+
+
+class _Recorder:
+    """Source that keeps the bytes that were read."""
+
+    def __init__(self, source: BinaryIO) -> None:
+        self.source, self.bytes = source, b""
+
+    def read(self, size: int) -> bytes:
+        """Return the next bytes."""
+        block = self.source.read(size)
+        self.bytes += block
+        return block
+
+
+def _takes_header(arguments: argparse.Namespace, source: Any) -> bool:
+    """Set rate, channels, type and source from a WAV header; False if they cannot be live."""
+    try:
+        form, _, size = wav_header(source)
+    except ValueError as error:
+        raise ValueError(f"{NAME}: {error}") from error
+    dtype = next((name for name, kind in DTYPES.items() if kind == form.kind), None)
+    if dtype is None:
+        return False
+    for name, value in {"rate": form.rate, "channels": form.n_channels, "dtype": dtype}.items():
+        given = getattr(arguments, name)
+        if given not in (None, value):
+            raise ValueError(
+                f"--{name} must be {value}, as in the header of {NAME}; got {given}: leave it out"
+            )
+        setattr(arguments, name, value)
+    arguments.source = Replay(b"", source.source, size)
+    return True

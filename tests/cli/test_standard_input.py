@@ -1,0 +1,109 @@
+"""Files with a header on standard input, through a pipe."""
+
+import io
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+import soundfile
+from command_line import RATE, SHELL, WINDOW, run_cli, track
+from scipy.io import wavfile
+
+from arrivals.__main__ import main
+
+CBF = ("--tracker", "cbf")
+
+
+@pytest.fixture
+def expected(scene: Path, capsys: pytest.CaptureFixture[str]) -> bytes:
+    """Return the tracks of the scene's file."""
+    assert main(track(scene, *CBF)) == 0
+    tracks = capsys.readouterr().out
+    assert len(tracks.splitlines()) > 10
+    return tracks.encode()
+
+
+def as_stream(scene: Path, content: bytes, *more: str) -> subprocess.CompletedProcess[bytes]:
+    return run_cli(track(scene, *CBF, *more, file="-"), input=content)
+
+
+def written(scene: Path, path: Path, form: str, subtype: str) -> Path:
+    """Write the scene in another format."""
+    samples, rate = soundfile.read(scene / "tow.wav")
+    soundfile.write(path, samples, rate, format=form, subtype=subtype)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("form", "subtype"),
+    [("WAV", "PCM_24"), ("RF64", "PCM_16"), ("WAV", "FLOAT"), ("FLAC", "PCM_16"),
+     ("AIFF", "PCM_16"), ("W64", "PCM_16")],
+)  # fmt: skip
+def test_header_on_standard_input_equals_the_file(
+    form: str, subtype: str, scene: Path, here: Path, expected: bytes
+) -> None:
+    done = as_stream(scene, written(scene, here / "a.bin", form, subtype).read_bytes())
+    assert (done.returncode, done.stdout) == (0, expected), done.stderr
+
+
+def test_wav_of_unknown_size_and_with_a_last_chunk_is_read(scene: Path, expected: bytes) -> None:
+    whole = (scene / "tow.wav").read_bytes()
+    last = b"LIST" + (400).to_bytes(4, "little") + bytes(range(200)) * 2
+    endless = whole[:40] + b"\xff\xff\xff\x7f" + whole[44:]
+    for content in (whole + last, endless):
+        done = as_stream(scene, content, "--rate", str(RATE), "--dtype", "int16")
+        assert (done.returncode, done.stdout) == (0, expected), done.stderr
+
+
+def test_header_that_contradicts_an_argument_is_refused(scene: Path, here: Path) -> None:
+    done = as_stream(scene, (scene / "tow.wav").read_bytes(), "--rate", "16000")
+    assert done.returncode == 2
+    assert b"--rate must be 8000, as in the header of standard input; got 16000" in done.stderr
+    flac = written(scene, here / "a.flac", "FLAC", "PCM_16").read_bytes()
+    done = as_stream(scene, flac, "--channels", "8")
+    assert done.returncode == 2
+    assert b"--channels must be left out: standard input is a FLAC file" in done.stderr
+
+
+@pytest.mark.parametrize("start", [b"fLaC", b"OggS", b"FORM1234AIFF", b"RIFF1234WAVE", b"caff\0\1"])
+def test_damaged_header_is_not_taken_for_samples(
+    start: bytes, scene: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    content = io.BytesIO(start + bytes(20_000))
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(content))
+    assert main(track(scene, *CBF, "--rate", str(RATE), file="-")) == 2
+    printed, message = capsys.readouterr()
+    assert printed == ""
+    assert message.startswith("arrivals: standard input: ")
+    assert message.count("\n") == 1
+
+
+def test_format_without_its_package_is_not_taken_for_samples(scene: Path) -> None:
+    blocked = [*SHELL[:-1], f"import sys; sys.modules['soundfile'] = None; {SHELL[-1]}"]
+    arguments = track(scene, *CBF, "--rate", str(RATE), file="-")
+    done = subprocess.run(
+        [*blocked, *arguments], input=b"fLaC" + bytes(20_000), capture_output=True, check=False
+    )
+    assert (done.returncode, done.stdout) == (2, b"")
+    assert b'requires soundfile: pip install "arrivals[io]"' in done.stderr
+
+
+def test_wav_stream_is_tracked_as_it_arrives(scene: Path) -> None:
+    """The pipe stays open: the first line does not wait for the end."""
+    content = (scene / "tow.wav").read_bytes()[: 44 + 3 * WINDOW * 16]
+    arguments = [*SHELL, *track(scene, *CBF, file="-")]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    with subprocess.Popen(arguments, **pipes) as process:  # type: ignore[call-overload]
+        process.stdin.write(content)
+        process.stdin.flush()
+        assert process.stdout.readline().startswith(b"step,time_s")
+        assert process.stdout.readline().startswith(b"0,0.016,")
+        process.kill()
+
+
+def test_channels_of_the_header_must_fit_the_array(scene: Path, here: Path) -> None:
+    wavfile.write(here / "a.wav", RATE, np.zeros((4000, 6), np.int16))
+    done = as_stream(scene, (here / "a.wav").read_bytes())
+    assert done.returncode == 2
+    assert b"must have 8 channels; got 6" in done.stderr
