@@ -1,4 +1,4 @@
-"""The tracker of CONTRIBUTING.md: size, imports, accuracy and the conformance checks."""
+"""The tracker of CONTRIBUTING.md: size, imports, accuracy, conformance checks; and the reader."""
 
 import re
 import subprocess
@@ -45,3 +45,8 @@ def test_tracker_of_contributing_passes_the_conformance_checks(tmp_path: Path) -
         check=False,
     )
     assert (done.stdout, done.returncode) == ("passed\n", 0), done.stderr
+
+
+def test_reader_of_contributing_is_that_of_the_plugin() -> None:
+    plugin = Path(__file__).parent / "plugin" / "counts_file.py"
+    assert f"```python\n{plugin.read_text(encoding='utf-8')}```" in TEXT

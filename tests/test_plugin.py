@@ -1,4 +1,4 @@
-"""A tracker of another package, installed separately, is found, created and checked."""
+"""A tracker and a reader of another package, installed separately, are found and checked."""
 
 import shutil
 import subprocess
@@ -107,3 +107,37 @@ except ValueError as error:
 """
     expected = "the tracker name 'svalse' is taken by arrivals.trackers.svalse.svalse.SVALSE\n"
     assert run(python, "-c", script, cwd=tmp_path) == expected
+
+
+def test_reader_of_a_plugin_is_imported_for_its_suffix_and_its_content(
+    python: Path, tmp_path: Path
+) -> None:
+    script = """
+import sys, warnings
+import numpy as np
+from arrivals.recordings import read
+
+counts = np.arange(-6, 6, dtype="<i4").reshape(4, 3)
+content = b"COUNTS 500 3\\n" + counts.tobytes()
+for name in ("a.counts", "a.dat", "cut.counts"):
+    with open(name, "wb") as file:
+        file.write(content[:-1] if name.startswith("cut") else content)
+np.save("b.npy", counts)
+assert read("b.npy").n_channels == 3
+assert "counts_file" not in sys.modules, "it must be imported on demand only"
+for name in ("a.counts", "a.dat"):
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        recording = read(name)
+    assert recording.rate == 500
+    assert np.array_equal(recording.samples, counts / 2**31)
+    lines = [str(each.message) for each in caught]
+    assert "the reader 'broken', counts_file:ABSENT, cannot be loaded" in lines[0], lines
+    assert len(lines) == (1 if name == "a.counts" else 2), lines
+try:
+    read("cut.counts")
+except ValueError as error:
+    print(error)
+"""
+    words = run(python, "-W", "ignore", "-c", script, cwd=tmp_path)
+    assert words == "cut.counts: truncated: 11 bytes after 3 samples\n"
