@@ -56,6 +56,17 @@ def test_wav_of_unknown_size_and_with_a_last_chunk_is_read(scene: Path, expected
         assert (done.returncode, done.stdout) == (0, expected), done.stderr
 
 
+def test_flac_from_an_encoder_that_writes_to_a_pipe_is_read(
+    scene: Path, here: Path, expected: bytes
+) -> None:
+    """Its header does not have the number of samples."""
+    whole = bytearray(written(scene, here / "a.flac", "FLAC", "PCM_16").read_bytes())
+    whole[21] &= 0xF0
+    whole[22:26] = bytes(4)
+    done = as_stream(scene, bytes(whole))
+    assert (done.returncode, done.stdout) == (0, expected), done.stderr
+
+
 def test_header_that_contradicts_an_argument_is_refused(scene: Path, here: Path) -> None:
     done = as_stream(scene, (scene / "tow.wav").read_bytes(), "--rate", "16000")
     assert done.returncode == 2

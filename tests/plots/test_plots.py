@@ -10,6 +10,7 @@ import pytest
 from matplotlib.collections import LineCollection, PathCollection, QuadMesh
 from matplotlib.figure import Figure
 
+import arrivals
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.measurement_models.arrays.description import from_description
 from arrivals.plots import plot_array, plot_bearing_time
@@ -106,6 +107,34 @@ def test_long_recording_has_a_bounded_number_of_columns() -> None:
     ax = plot_bearing_time(run_of([[]] * 4000), snapshots=z, measurement=LINE)
     (image,) = [c for c in ax.collections if isinstance(c, QuadMesh)]
     assert np.asarray(image.get_array()).shape[1] <= 1500
+
+
+def test_snapshots_of_an_iterable_are_drawn_as_those_of_an_array() -> None:
+    z = scene(CIRCLE, 3100)
+    run, images = run_of([[]] * 3100), []
+    for snapshots in (z, iter(z), list(z)):
+        ax = plot_bearing_time(run, snapshots=snapshots, measurement=CIRCLE)
+        (image,) = [c for c in ax.collections if isinstance(c, QuadMesh)]
+        images.append(np.asarray(image.get_array()))
+    np.testing.assert_array_equal(images[0], images[1])
+    np.testing.assert_array_equal(images[0], images[2])
+    for wrong in (iter(z[1:]), iter([*z, z[0]])):
+        with pytest.raises(ValueError, match="snapshots must have shape"):
+            plot_bearing_time(run, snapshots=wrong, measurement=CIRCLE)
+
+
+def test_long_track_has_a_bounded_number_of_segments_of_one_line() -> None:
+    _, tracks = lines(plot_bearing_time(run_of([[(5, 3, 1)]] * 13_000)))
+    at = np.array(tracks.get_segments())[:, :, 0]
+    assert len(at) == 13_000 // 3
+    np.testing.assert_array_equal(at[:, 1] - at[:, 0], 3)
+
+
+def test_plot_draws_directions_or_a_map() -> None:
+    ax = arrivals.plot(run_of([[(1, 0, 1)]] * 3), ax=Figure().add_subplot())
+    assert (ax.get_xlabel(), ax.get_xlim()) == ("time, s", (-0.5, 2.5))
+    positions = RunRecorder(PositionEstimate).run(1.0, 0.0)
+    assert arrivals.plot(positions).get_xlabel() == "x, m"
 
 
 def test_axis_shows_time_if_given() -> None:

@@ -100,6 +100,18 @@ def test_tracks_of_a_file_in_blocks_equal_those_in_memory(form: str, tmp_path: P
     assert np.nanmedian(run.doa) > 0.3
 
 
+def test_band_of_stored_samples_is_tracked_as_in_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("arrivals.recordings.stored_samples.BLOCK", 100)
+    array = SensorArray.ula(3, 0.1, speed=343.0)
+    arguments: Any = {"tracker": "interpolation_ekf", "band": (600, 1400), "hop": 50}
+    noise = np.random.default_rng(0).standard_normal((400, 3))
+    one, other = (
+        track(Recording(each, RATE, array=array), **arguments) for each in (noise, stored(noise))
+    )
+    assert_array_equal(one.doa, other.doa)
+    assert len(one) == 8
+
+
 @pytest.mark.usefixtures("nothing_at_once")
 @pytest.mark.parametrize("form", ["wav", "flac", "npy"])
 def test_file_that_changes_between_blocks_is_one_line(form: str, tmp_path: Path) -> None:

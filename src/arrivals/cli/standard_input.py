@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import shutil
 import sys
 import tempfile
@@ -53,14 +54,14 @@ def standard_input(arguments: argparse.Namespace) -> Iterator[None]:
         yield
         return
     refuse(arguments, ("dtype", "channels"), f"must be left out: {NAME} is a {known} file")
-    with tempfile.NamedTemporaryFile(suffix=f".{known.lower()}") as copy:
-        shutil.copyfileobj(cast(BinaryIO, Replay(seen.bytes, source)), copy)
-        copy.flush()
-        arguments.file = copy.name
+    with tempfile.TemporaryDirectory() as folder:
+        arguments.file = os.path.join(folder, f"input.{known.lower()}")
+        with open(arguments.file, "wb") as copy:
+            shutil.copyfileobj(cast(BinaryIO, Replay(seen.bytes, source)), copy)
         try:
             yield
         except (ValueError, OSError) as error:
-            raise ValueError(str(error).replace(copy.name, NAME)) from error
+            raise ValueError(str(error).replace(arguments.file, NAME)) from error
 
 
 class _Recorder:

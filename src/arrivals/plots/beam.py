@@ -76,7 +76,7 @@ def _blocks(snapshots: Any, sizes: Int, shape: tuple[int, ...]) -> Iterator[Comp
     else:
         if next(steps, None) is None:
             return
-    got = getattr(snapshots, "shape", f"{len(snapshots)} of another shape")
+    got = getattr(snapshots, "shape", "another number or shape")
     raise ValueError(f"snapshots must have shape {(int(sizes.sum()), *shape)}; got {got}")
 
 

@@ -14,6 +14,7 @@ from arrivals.files import open_input
 from arrivals.recordings.formats.file_contents import (
     FileContents,
     ReadingOptions,
+    check_length,
     check_size,
     import_reader_package,
 )
@@ -55,7 +56,9 @@ def read_audio(path: Path, options: ReadingOptions) -> FileContents:
     with open_input(path) as opened:
         expected = announced_size(opened.read(24))
     if expected > path.stat().st_size:
-        raise ValueError(f"truncated: expected {expected} bytes; got {path.stat().st_size}")
+        raise ValueError(
+            f"truncated: expected {expected} bytes; got {path.stat().st_size}: copy it again"
+        )
     try:
         with package.SoundFile(path) as file:
             shape, rate = (file.frames, file.channels), float(file.samplerate)
@@ -65,10 +68,18 @@ def read_audio(path: Path, options: ReadingOptions) -> FileContents:
             if file.frames:
                 file.seek(file.frames - 1)
             if file.frames and not len(file.read(1)):
-                raise ValueError(f"truncated: the last of {file.frames} samples is missing")
+                raise ValueError(
+                    f"truncated: the last of {file.frames} samples is missing: copy it again"
+                )
     except package.LibsndfileError as error:
-        raise ValueError(f"truncated, encrypted or damaged: {error.error_string}") from error
+        raise damaged(error) from error
     return FileContents(StoredSamples(shape, dtype, AudioRows(path, dtype)), rate)
+
+
+def damaged(error: Any) -> ValueError:
+    """Return the error of a file that libsndfile refused."""
+    reason = error.error_string.strip(" .\n")
+    return ValueError(f"truncated, encrypted or damaged: {reason}: copy or export it again")
 
 
 def announced_size(head: bytes) -> int:
@@ -124,7 +135,6 @@ class AudioRows:
                 file.seek(start)
                 rows: NDArray[Any] = file.read(stop - start, str(self.dtype), always_2d=True)
         except package.LibsndfileError as error:
-            raise ValueError(f"truncated or damaged: {error.error_string}") from error
-        if len(rows) < stop - start:
-            raise ValueError(f"truncated: expected {stop} samples; got {start + len(rows)}")
+            raise damaged(error) from error
+        check_length(stop, start + len(rows), "samples")
         return rows

@@ -178,6 +178,19 @@ def check_size(n_bytes: int, max_bytes: float) -> None:
         )
 
 
+def check_length(expected: int, present: int, noun: str = "bytes") -> None:
+    """Raise a ValueError if a file is shorter than its header says.
+
+    Examples
+    --------
+    >>> check_length(100, 90)
+    Traceback (most recent call last):
+    ValueError: truncated: expected 100 bytes; got 90: copy it again
+    """
+    if present < expected:
+        raise ValueError(f"truncated: expected {expected} {noun}; got {present}: copy it again")
+
+
 @contextmanager
 def damage_refused(kind: str) -> Iterator[None]:
     """Turn any error of a parser into a ValueError, as damaged files raise all kinds of errors."""

@@ -66,7 +66,9 @@ def read_wav(path: Path, options: ReadingOptions) -> FileContents:
         form, start, size = wav_header(file, length)
     rate, present = positive("rate", form.rate), length - start
     if size is not None and size > present:
-        raise ValueError(f"truncated: expected {size} bytes of samples; got {present}")
+        raise ValueError(
+            f"truncated: expected {size} bytes of samples; got {present}: copy it again"
+        )
     if form.kind is None:
         return read_audio(path, options)
     n_samples = (present if size is None else size) // form.frame
