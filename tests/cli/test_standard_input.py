@@ -67,6 +67,28 @@ def test_flac_from_an_encoder_that_writes_to_a_pipe_is_read(
     assert (done.returncode, done.stdout) == (0, expected), done.stderr
 
 
+def test_npz_file_on_standard_input_is_read_without_a_warning(
+    scene: Path, here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    np.savez(here / "a.npz", samples=wavfile.read(scene / "tow.wav")[1], rate=RATE)
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO((here / "a.npz").read_bytes())))
+    assert main(track(scene, *CBF, file="-")) == 0
+    printed, message = capsys.readouterr()
+    assert len(printed.splitlines()) > 10
+    assert message == ""
+
+
+def test_mislabelled_file_is_tracked_with_one_line(
+    scene: Path, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    written(scene, here / "a.wav", "FLAC", "PCM_16")
+    assert main(track(here, *CBF, file="a.wav", array=str(scene / "array.toml"))) == 0
+    message = capsys.readouterr().err
+    assert "arrivals: warning: " in message
+    assert message.endswith("the suffix is .wav, the content is FLAC: read as FLAC\n")
+    assert message.count("\n") == 1
+
+
 def test_header_that_contradicts_an_argument_is_refused(scene: Path, here: Path) -> None:
     done = as_stream(scene, (scene / "tow.wav").read_bytes(), "--rate", "16000")
     assert done.returncode == 2

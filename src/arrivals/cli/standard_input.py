@@ -44,7 +44,7 @@ def standard_input(arguments: argparse.Namespace) -> Iterator[None]:
         return
     head = sys.stdin.buffer.read(HEAD)
     source = cast(BinaryIO, Replay(head, sys.stdin.buffer))
-    known = next((reader.name for reader in READERS if reader.takes(head)), None)
+    known = next((reader for reader in READERS if reader.takes(head)), None)
     if known is None:
         arguments.source = source
         yield
@@ -53,9 +53,9 @@ def standard_input(arguments: argparse.Namespace) -> Iterator[None]:
     if is_wav(head) and _takes_header(arguments, seen):
         yield
         return
-    refuse(arguments, ("dtype", "channels"), f"must be left out: {NAME} is a {known} file")
+    refuse(arguments, ("dtype", "channels"), f"must be left out: {NAME} is a {known.name} file")
     with tempfile.TemporaryDirectory() as folder:
-        arguments.file = os.path.join(folder, f"input.{known.lower()}")
+        arguments.file = os.path.join(folder, f"input{known.suffixes[0]}")
         with open(arguments.file, "wb") as copy:
             shutil.copyfileobj(cast(BinaryIO, Replay(seen.bytes, source)), copy)
         try:

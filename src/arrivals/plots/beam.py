@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 N_DIRECTIONS, N_COLUMNS = 361, 1500  # maximum size of the image
+N_STEPS = 6000  # maximum number of steps that are drawn
 
 
 def draw_beam(
@@ -45,8 +46,10 @@ def draw_beam(
 
     doa = scan_directions(measurement.array, N_DIRECTIONS)
     starts = np.arange(0, len(at), max(1, -(-len(at) // N_COLUMNS)))
+    every = max(1, -(-len(at) // N_STEPS))
     powers, has_power = [], False
     for block in _blocks(snapshots, np.diff(np.append(starts, len(at))), measurement.shape):
+        block = block[::every]
         has_power = has_power or bool((np.isfinite(block) & (block != 0)).any())
         powers.append(_beam(measurement, doa, block))
     if not has_power:

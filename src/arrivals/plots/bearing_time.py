@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from arrivals.files import atomic_write
 from arrivals.measurement_models import ArraySnapshot
-from arrivals.plots.beam import draw_beam
+from arrivals.plots.beam import N_STEPS, draw_beam
 from arrivals.trackers.run import Run
 from arrivals.typing import Bool, Complex, Float, Int
 from arrivals.validation import one_of, positive, shaped
@@ -27,7 +27,6 @@ PALETTE = (
     "#e377c2", "#17becf", "#8c564b", "#b8a900", "#00429d",
 )  # fmt: skip
 NEUTRAL = "#202020"
-N_STEPS = 6000  # maximum number of steps that are drawn
 PICTURES = (".png", ".pdf", ".svg", ".jpg")
 
 

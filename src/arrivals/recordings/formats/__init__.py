@@ -1,1 +1,1 @@
-"""Formats of recording files: WAV, NumPy, MATLAB and text."""
+"""Formats of recording files: a module for each, and their registry."""
