@@ -185,12 +185,6 @@ def test_matlab_of_every_version_that_scipy_writes(
     assert read(tmp_path / "a.mat").rate == 12.0
 
 
-def test_matlab_of_version_7_3(tmp_path: Path) -> None:
-    header = b"MATLAB 7.3 MAT-file".ljust(116) + bytes(8) + b"\x00\x02IM"
-    (tmp_path / "a.mat").write_bytes(header + bytes(384) + b"\x89HDF\r\n\x1a\n" + bytes(500))
-    assert_refused(tmp_path / "a.mat", "v7.3 .* h5py, which is not supported: save it with -v7")
-
-
 def test_pickles_are_not_loaded(tmp_path: Path) -> None:
     np.save(tmp_path / "a.npy", np.array([{}, []], dtype=object), allow_pickle=True)
     assert_refused(tmp_path / "a.npy", "samples must be numbers; got object")

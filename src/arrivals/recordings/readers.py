@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
@@ -23,6 +23,7 @@ from arrivals.recordings.formats.file_contents import (
 )
 from arrivals.recordings.formats.registry import HEAD, reader_for
 from arrivals.recordings.recording import Recording
+from arrivals.recordings.several_files import file_names, joined, raw_layout
 from arrivals.recordings.stored_samples import StoredSamples
 from arrivals.typing import Float
 from arrivals.validation import positive
@@ -31,7 +32,7 @@ LOADED_AT_ONCE = 2**26  # bytes of samples that are loaded from the file when it
 
 
 def read(
-    path: str | PathLike[str] | ArrayLike,
+    path: str | PathLike[str] | Sequence[str | PathLike[str]] | ArrayLike,
     *,
     rate: float | None = None,
     variable: str | None = None,
@@ -45,12 +46,19 @@ def read(
 
     Parameters
     ----------
-    path : str, path or array_like
-        Samples (n_samples, n_channels), masked ones too, or a regular file. Its suffix selects the
-        format, or its content if the suffix is unknown or wrong:
+    path : str, path, sequence of them, or array_like
+        Samples (n_samples, n_channels), masked ones too, or a regular file, or several files of
+        equal length whose channels follow each other. The suffix selects the format, or the
+        content if the suffix is unknown or wrong:
 
         - ``.wav``: any bit depth, also RF64. Integers are scaled to [-1, 1).
         - ``.npy``, ``.npz``, ``.mat`` (MATLAB): unchanged numbers.
+        - ``.h5``, ``.hdf5`` and ``.mat`` of version 7.3: acoular's ``time_data``, or any dataset.
+        - ``.sigmf-meta``, ``.sigmf-data``, ``.sigmf``: with rate and centre frequency.
+        - ``.cf32``, ``.cs16``, ``.cs8``, ``.cu8`` and others: raw complex samples (IQ), channels
+          interleaved; ``.iq``, ``.bin``, ``.dat`` and ``.raw`` require `format`.
+        - ``.sio``: of the Scripps Institution of Oceanography, unchanged numbers.
+        - ``.mseed``: traces of one component, on a common grid of time, NaN in gaps.
         - ``.csv``, ``.txt``: one row per sample, separated by commas, semicolons, tabs or spaces;
           real or complex (``1+2j``, ``1+2i``); a cell that is empty, ``nan``, ``None`` or ``NA`` is
           missing. Comments (``#``, ``%``) and one line of headings may precede it; a first column
@@ -72,7 +80,9 @@ def read(
     rate_required : bool
         True to refuse real samples without a rate; arrays with a header are not loaded then.
     format : str, optional
-        Format of a file without a header, such as cs16; it takes the place of the suffix.
+        Format of a file without a header, such as cs16; it takes the place of the suffix. Its
+        number of channels is that of `array`, and one without, or one in each of several files;
+        ``cs16:5`` is another one.
 
     Returns
     -------
@@ -102,11 +112,28 @@ def read(
     """
     if rate is not None:
         positive("rate", rate)
-    options = ReadingOptions(variable, transpose, max_bytes, rate_required and rate is None, format)
-    if not isinstance(path, str | PathLike):
+    paths = file_names(path)
+    form, n_channels = raw_layout(format, array if len(paths) == 1 else None)
+    options = ReadingOptions(
+        variable, transpose, max_bytes, rate_required and rate is None, form, n_channels
+    )
+    if not paths:
         contents = FileContents(numbers("samples", path))
         return _recording(contents, rate, options, array)
-    path = Path(path)
+    several = [_opened(each, options) for each in paths]
+    try:
+        contents = joined([contents for contents, _ in several], paths, transpose=transpose)
+        recording = _recording(contents, rate, options, array)
+    except Exception as error:
+        raise file_error(paths[0], error) from error
+    for each, (_, notes) in zip(paths, several, strict=True):
+        for note in notes:
+            warnings.warn(f"{each}: {note}", stacklevel=2)
+    return recording
+
+
+def _opened(path: Path, options: ReadingOptions) -> tuple[FileContents, list[str]]:
+    """Return the contents of a regular file, which must not change, and lines for the user."""
     open_input(path).close()  # a regular file that can be read
     stamp = _stamp(path)
     try:
@@ -114,12 +141,9 @@ def read(
         if isinstance(contents.array, StoredSamples):
             guarded = _UnchangedFile(path, stamp, contents.array.load)
             contents = contents._replace(array=replace(contents.array, load=guarded))
-        recording = _recording(contents, rate, options, array)
     except Exception as error:  # parsers raise all kinds of errors on damaged files
         raise file_error(path, error) from error
-    for note in notes:
-        warnings.warn(f"{path}: {note}", stacklevel=2)
-    return recording
+    return contents, notes
 
 
 def _contents(path: Path, options: ReadingOptions) -> tuple[FileContents, list[str]]:

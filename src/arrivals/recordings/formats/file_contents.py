@@ -51,6 +51,8 @@ class ReadingOptions:
         True to refuse real samples without a rate.
     format : str, optional
         Format of a file without a header, such as cs16; it takes the place of the suffix.
+    n_channels : int, optional
+        Number of channels of a file without a header.
 
     Examples
     --------
@@ -64,6 +66,7 @@ class ReadingOptions:
     max_bytes: float = MAX_BYTES
     rate_required: bool = False
     format: str | None = None
+    n_channels: int | None = None
 
     def check(self, n_bytes: int, is_real: bool, has_rate: bool) -> None:
         """Refuse data that are too large or lack a rate."""

@@ -74,10 +74,6 @@ def matlab_arrays(file: BinaryIO) -> dict[str, StoredArray]:
     """
     file.seek(0)
     head = file.read(128)
-    if b"\x89HDF" in head[:8] or head[124:128] in HDF5_VERSIONS:
-        raise ValueError(
-            "MATLAB v7.3 (HDF5) requires h5py, which is not supported: save it with -v7"
-        )
     with damage_refused(KIND):
         if 0 in head[:4]:
             return dict(_level_4(file))

@@ -16,8 +16,13 @@ from arrivals.recordings.formats.audio import (
     read_audio,
 )
 from arrivals.recordings.formats.file_contents import FileContents, ReadingOptions
+from arrivals.recordings.formats.hdf5 import is_hdf5, read_hdf5
+from arrivals.recordings.formats.iq import SUFFIXES, read_iq
 from arrivals.recordings.formats.matlab import is_matlab, read_matlab
+from arrivals.recordings.formats.miniseed import is_miniseed, read_miniseed
 from arrivals.recordings.formats.numpy_files import is_numpy, read_numpy
+from arrivals.recordings.formats.sigmf import read_sigmf
+from arrivals.recordings.formats.sio import is_sio, read_sio
 from arrivals.recordings.formats.text_table import read_text
 from arrivals.recordings.formats.wav import is_wav, read_wav
 from arrivals.registry import installed, loaded
@@ -72,6 +77,17 @@ READERS = (
     Reader("W64", (".w64",), read_audio, is_w64),
     Reader("NumPy", (".npy", ".npz"), read_numpy, is_numpy, has_names=True),
     Reader("MATLAB", (".mat",), read_matlab, is_matlab, has_names=True),
+    Reader("HDF5", (".h5", ".hdf5", ".he5", ".hdf", ".mat"), read_hdf5, is_hdf5, has_names=True),
+    Reader("SigMF", (".sigmf-meta", ".sigmf-data", ".sigmf"), read_sigmf),
+    Reader("SIO", (".sio",), read_sio, is_sio),
+    Reader(
+        "miniSEED",
+        (".mseed", ".miniseed", ".ms", ".msd", ".seed"),
+        read_miniseed,
+        is_miniseed,
+        has_names=True,
+    ),
+    Reader("IQ", tuple(SUFFIXES), read_iq),
     Reader("text", (".csv", ".txt"), read_text),
 )
 

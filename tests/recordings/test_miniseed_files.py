@@ -1,0 +1,106 @@
+"""Seismic traces of miniSEED files."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pymseed
+import pytest
+from numpy.testing import assert_array_equal
+
+from arrivals.recordings import read
+from arrivals.recordings.formats.file_contents import ReadingOptions
+from arrivals.recordings.formats.miniseed import read_miniseed
+
+START = 1_500_000_000_000_000_000  # ns
+STEP = 50_000_000  # ns, of 20 Hz
+X = np.random.default_rng(0).integers(-1000, 1000, (2000, 3)).astype("i4")
+
+
+def write(path: Path, *traces: tuple[str, float, Any], rate: float = 20.0) -> Path:
+    """Write traces (name NET.STA.LOC.CHA, first sample, samples) in records of 512 bytes."""
+    file = pymseed.MS3TraceList()
+    for name, first, samples in traces:
+        source = pymseed.nslc2sourceid(*name.split("."))
+        kind = {"i": "i", "f": "f" if samples.dtype.itemsize == 4 else "d"}[samples.dtype.kind]
+        start = START + round(first * STEP)
+        file.add_data(source, samples, kind, rate, starttime=start)
+    file.to_file(path, max_record_length=512)
+    return path
+
+
+def test_traces_are_aligned_by_time_and_gaps_are_missing(tmp_path: Path) -> None:
+    path = write(
+        tmp_path / "a.mseed",
+        ("XX.C..SHZ", 30, X[30:, 2]), ("XX.A..SHZ", 0, X[:, 0]),
+        ("XX.B..SHZ", 0, X[:700, 1]), ("XX.B..SHZ", 900, X[900:1999, 1]),
+    )  # fmt: skip
+    expected = X.astype(float)
+    expected[:30, 2] = expected[700:900, 1] = expected[1999:, 1] = np.nan
+    contents = read_miniseed(path, ReadingOptions())
+    assert (contents.rate, contents.note) == (20.0, None)
+    assert contents.names == ("XX.A..SHZ", "XX.B..SHZ", "XX.C..SHZ")
+    assert_array_equal(contents.array[:], expected)
+    for start, stop in ((0, 1), (650, 950), (1990, 2000), (5, 5)):
+        assert_array_equal(contents.array[start:stop], expected[start:stop])
+    recording = read(path)
+    assert_array_equal(recording.samples, expected)
+    assert recording.names == contents.names
+
+
+@pytest.mark.parametrize("kind", ["f4", "f8"])
+def test_reals_are_unchanged(tmp_path: Path, kind: str) -> None:
+    x = np.random.default_rng(1).random(500).astype(kind)
+    path = write(tmp_path / "a.mseed", ("XX.A..SHZ", 0, x))
+    assert_array_equal(read(path).samples[:, 0], x)
+
+
+def test_small_clock_offset_is_noted(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.mseed", ("XX.A..SHZ", 0, X[:, 0]), ("XX.B..SHZ", 0.3, X[:, 1]))
+    contents = read_miniseed(path, ReadingOptions())
+    assert contents.note == "clocks differ by up to 0.30 of a sample, 15 ms"
+    assert_array_equal(contents.array[:], X[:, :2])
+    small = write(tmp_path / "b.mseed", ("XX.A..SHZ", 0, X[:, 0]), ("XX.B..SHZ", 0.02, X[:, 1]))
+    assert read_miniseed(small, ReadingOptions()).note is None
+
+
+def test_one_component_is_selected(tmp_path: Path) -> None:
+    path = write(
+        tmp_path / "a.mseed",
+        ("XX.A.00.SHZ", 0, X[:, 0]), ("XX.A.00.SHN", 0, X[:, 1]), ("XX.A.10.SHZ", 0, X[:, 2]),
+        ("XX.B..SHN", 0, X[:, 0]),
+    )  # fmt: skip
+    with pytest.raises(ValueError, match=r"several components: .* one of SHN, SHZ$"):
+        read(path)
+    assert read(path, variable="SHN").names == ("XX.A.00.SHN", "XX.B..SHN")
+    with pytest.raises(ValueError, match=r"a station has several traces: .* one of 00.SHZ, 10.SHZ"):
+        read(path, variable="SHZ")
+    assert_array_equal(read(path, variable="10.SHZ").samples[:, 0], X[:, 2])
+    with pytest.raises(ValueError, match=r"must be one of .*; got 'BHZ'"):
+        read(path, variable="BHZ")
+
+
+def test_different_rates_are_refused(tmp_path: Path) -> None:
+    write(tmp_path / "a.mseed", ("XX.A..SHZ", 0, X[:, 0]))
+    write(tmp_path / "b.mseed", ("XX.B..SHZ", 0, X[:, 0]), rate=40.0)
+    both = tmp_path / "c.mseed"
+    both.write_bytes((tmp_path / "a.mseed").read_bytes() + (tmp_path / "b.mseed").read_bytes())
+    with pytest.raises(ValueError, match="several rates, 20, 40 Hz: resample them"):
+        read(both)
+
+
+def test_damaged_file_is_refused(tmp_path: Path) -> None:
+    whole = write(tmp_path / "a.mseed", ("XX.A..SHZ", 0, X[:, 0])).read_bytes()
+    for content in (whole[:-100], whole[:100], b"abc" * 100, whole[:512] + b"abc" * 200):
+        (tmp_path / "b.mseed").write_bytes(content)
+        with pytest.raises(ValueError, match=r"b\.mseed: truncated, or not a miniSEED file: "):
+            read(tmp_path / "b.mseed")
+    (tmp_path / "b.mseed").write_bytes(whole[:200] + bytes(300) + whole[500:])
+    with pytest.raises(ValueError, match=r"b\.mseed: "):
+        read(tmp_path / "b.mseed")
+
+
+def test_wrong_suffix_is_read_by_its_content(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.dat", ("XX.A..SHZ", 0, X[:, 0]))
+    with pytest.warns(UserWarning, match="read as miniSEED"):
+        assert read(path).rate == 20.0
