@@ -11,6 +11,7 @@ symmetric    `distances`: of the sensors on either side of the centre
 positions    `positions`: a list of numbers, of [x, y] or of [x, y, z], or the
              name of a table beside the file; or
              `latitude` and `longitude`, degrees, and, if known, `height`
+stations     `stations`: a table or StationXML, see `arrays.stations`
 a preset     those that its file leaves open, such as `radius`
 ===========  ==============================================================
 

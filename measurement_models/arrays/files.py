@@ -17,6 +17,7 @@ from arrivals.files import file_error, open_input
 from arrivals.measurement_models.arrays.description import from_description
 from arrivals.measurement_models.arrays.presets import preset_names
 from arrivals.measurement_models.arrays.sensor_array import SensorArray
+from arrivals.measurement_models.arrays.stations import stations_array
 from arrivals.messages import nearest, shown
 from arrivals.tables import TableLine, table_lines
 
@@ -113,6 +114,8 @@ def _described(path: str | PathLike[str], parse: Callable[[str], Any]) -> Sensor
         if isinstance(description.get("positions"), str):  # name of a table beside the file
             table = from_csv(Path(path).parent / description["positions"])
             description = {**description, "positions": table.positions.tolist()}
+        if description.get("kind") == "stations":
+            return stations_array(description, Path(path).parent)
         return from_description(description)
     except tomllib.TOMLDecodeError as error:
         raise file_error(path, ValueError(f"{error}{_line_of(error, text)}")) from None

@@ -8,6 +8,7 @@ import pymseed
 import pytest
 from numpy.testing import assert_array_equal
 
+import arrivals
 from arrivals.recordings import read
 from arrivals.recordings.formats.file_contents import ReadingOptions
 from arrivals.recordings.formats.miniseed import read_miniseed
@@ -104,3 +105,27 @@ def test_wrong_suffix_is_read_by_its_content(tmp_path: Path) -> None:
     path = write(tmp_path / "a.dat", ("XX.A..SHZ", 0, X[:, 0]))
     with pytest.warns(UserWarning, match="read as miniSEED"):
         assert read(path).rate == 20.0
+
+
+def test_wave_across_stations_is_tracked_in_compass_bearings(tmp_path: Path) -> None:
+    rng = np.random.default_rng(2)
+    places = rng.uniform(-6e3, 6e3, (9, 2))
+    bearing, speed, t = np.deg2rad(305.0), 16e3, np.arange(1200)[:, None] / 20
+    ahead = places @ [np.sin(bearing), np.cos(bearing)] / speed  # s earlier than at the origin
+    phases = rng.uniform(0, 2 * np.pi, 60)
+    waves = [
+        np.cos(2 * np.pi * f * (t + ahead) + phase)
+        for f, phase in zip(np.linspace(0.5, 5, 60), phases, strict=True)
+    ]
+    counts = (100 * np.sum(waves, axis=0) + 20 * rng.standard_normal((1200, 9))).astype("i4")
+    names = [f"S{i}" for i in range(9)]
+    traces = [(f"XX.{n}..SHZ", 0, x) for n, x in zip(names, counts.T, strict=True)]
+    write(tmp_path / "a.mseed", *traces)
+    rows = "".join(f"{n},{x},{y}\n" for n, (x, y) in zip(names, places, strict=True))
+    (tmp_path / "s.csv").write_text("name,x_m,y_m\n" + rows)
+    keys = 'kind = "stations"\nstations = "s.csv"\nspeed = 16000.0\nclockwise = true\n'
+    (tmp_path / "a.toml").write_text(keys)
+    run = arrivals.track(tmp_path / "a.mseed", tmp_path / "a.toml")
+    bearings = np.rad2deg(run.doa[np.isfinite(run.doa)]) % 360
+    assert len(bearings) > 5
+    assert abs(np.median(bearings) - 305) < 2

@@ -50,7 +50,7 @@ def _track_file(
     recording = read_recording(arguments, array)
     with printed_warnings():
         choice = choice_for(recording, options)
-        measurement, tracker = assembled(array, choice, recording.rate)
+        measurement, tracker = assembled(recording.array or array, choice, recording.rate)
         steps = RecordedSteps(recording, choice)
     time = steps.time if np.isfinite(steps.time).all() else None
     announced = map(_announcement(choice, options), steps)

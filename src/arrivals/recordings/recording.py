@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arrivals.measurement_models import SensorArray
+from arrivals.measurement_models.arrays.stations import StationArray
 from arrivals.measurements import numbers
 from arrivals.recordings.narrowband import WindowedSpectrum, check_frequency, default_window
 from arrivals.recordings.stored_samples import StoredSamples, cleaned, row_type
@@ -131,7 +132,7 @@ class Recording:
         Parameters
         ----------
         array : SensorArray
-            The array.
+            The array; a `StationArray` is matched by the names of the channels.
 
         Returns
         -------
@@ -148,6 +149,8 @@ class Recording:
         >>> recording.select(SensorArray.ula(4, spacing=0.5, missing=[1])).n_channels
         3
         """
+        if isinstance(array, StationArray):
+            array = array.matched(self.names)
         channels = [int(channel) for channel in array.select(np.arange(self.n_channels))]
         if isinstance(self.samples, StoredSamples):
             samples: Samples | StoredSamples = self.samples.select(channels)
