@@ -7,7 +7,7 @@ import h5py
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
-from recording_files import NUMBERS
+from recording_files import NUMBERS, assert_refused
 
 from arrivals.recordings.formats.file_contents import ReadingOptions
 from arrivals.recordings.formats.hdf5 import read_hdf5
@@ -110,3 +110,14 @@ def test_damaged_file_is_refused(tmp_path: Path) -> None:
     (tmp_path / "c.h5").write_bytes(whole[:middle] + bytes(20_000) + whole[middle + 20_000 :])
     with pytest.raises(ValueError, match="truncated, or not a readable HDF5 file"):
         read_hdf5(tmp_path / "c.h5", ReadingOptions()).array[:]
+    assert_refused(tmp_path / "c.h5", r"c\.h5: truncated, or not a readable HDF5 file: [^/]*$")
+
+
+def test_groups_may_contain_themselves_and_outer_files(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["group/x"] = NUMBERS
+        file["group/again"] = file["group"]
+        file["group/soft"] = h5py.SoftLink("/group/x")
+        file["outer"] = h5py.ExternalLink("none.h5", "/x")
+    contents = read_hdf5(tmp_path / "a.h5", ReadingOptions())
+    assert_array_equal(contents.array[:], NUMBERS)

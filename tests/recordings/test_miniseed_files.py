@@ -90,6 +90,12 @@ def test_different_rates_are_refused(tmp_path: Path) -> None:
         read(both)
 
 
+def test_records_of_different_years_are_refused(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.mseed", ("XX.A..SHZ", 0, X[:, 0]), ("XX.A..SHZ", 1e9, X[:, 0]))
+    with pytest.raises(ValueError, match=r"too far apart: 4000 samples a trace in 5e.07 s"):
+        read(path)
+
+
 def test_damaged_file_is_refused(tmp_path: Path) -> None:
     whole = write(tmp_path / "a.mseed", ("XX.A..SHZ", 0, X[:, 0])).read_bytes()
     for content in (whole[:-100], whole[:100], b"abc" * 100, whole[:512] + b"abc" * 200):

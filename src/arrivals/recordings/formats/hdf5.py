@@ -24,7 +24,7 @@ RATES = ("rate", "fs", "Fs", "sample_freq", "sampling_rate", "sample_rate")
 TIMES = ("time", "t")
 STANDARD = ("time_data", "samples", "snapshots")  # names of datasets with samples
 CACHE = 2**26  # bytes of the chunks that are kept decompressed
-MOST_LISTED = 12
+MOST_LISTED, MAX_LINKS = 12, 100_000
 
 
 class _Dataset(NamedTuple):
@@ -121,24 +121,50 @@ def _datasets(file: Any) -> dict[str, _Dataset]:
     """Return the datasets of numbers, real or complex, by their path."""
     h5py = import_reader_package("h5py", "an HDF5 file")
     found: dict[str, _Dataset] = {}
-
-    def visit(name: str, item: Any) -> None:
-        if not isinstance(item, h5py.Dataset) or item.shape is None or name.startswith("#"):
-            return
-        kind, parts = item.dtype, item.dtype.names
-        is_pair = parts in (("real", "imag"), ("r", "i")) and all(
-            kind[part].kind in "iuf" for part in parts
-        )
-        is_text = _text(item.attrs.get("MATLAB_class", "")) in ("char", "cell")
-        if (kind.kind not in "iufc" and not is_pair) or is_text or "MATLAB_empty" in item.attrs:
-            return
-        is_matlab = "MATLAB_class" in item.attrs
-        shape = tuple(int(n) for n in (item.shape[::-1] if is_matlab else item.shape))
-        found[name] = _Dataset(name, shape, kind, is_matlab)
-
     with damage_refused("readable HDF5 file"):
-        file.visititems(visit)
+        for name, item in _items(h5py, file, "", set()):
+            dataset = _of_numbers(name, item)
+            if dataset is not None:
+                found[name] = dataset
     return found
+
+
+def _items(h5py: Any, group: Any, path: str, seen: set[Any]) -> Iterator[tuple[str, Any]]:
+    """Yield the datasets below a group by their path.
+
+    `visititems` of h5py does not end on some damaged files, the iteration over links does.
+    """
+    names: dict[bytes, None] = {}
+
+    def is_repeated(name: bytes) -> bool | None:
+        known = name in names or len(names) >= MAX_LINKS
+        names[name] = None
+        return True if known else None
+
+    stopped, _ = group.id.links.iterate(is_repeated)
+    if stopped:
+        raise ValueError(f"the group {path!r} has a name twice, or more than {MAX_LINKS}")
+    for name in (each.decode("utf-8") for each in names):
+        is_hard = isinstance(group.get(name, getlink=True), h5py.HardLink)
+        item = group[name] if is_hard and not name.startswith("#") else None
+        if isinstance(item, h5py.Dataset):
+            yield _joined(path, name), item
+        elif isinstance(item, h5py.Group) and item.id not in seen:
+            yield from _items(h5py, item, _joined(path, name), seen | {item.id})
+
+
+def _of_numbers(name: str, item: Any) -> _Dataset | None:
+    kind, parts = item.dtype, item.dtype.names
+    is_pair = parts in (("real", "imag"), ("r", "i")) and all(
+        kind[part].kind in "iuf" for part in parts
+    )
+    is_text = _text(item.attrs.get("MATLAB_class", "")) in ("char", "cell")
+    is_number = kind.kind in "iufc" or is_pair
+    if item.shape is None or not is_number or is_text or "MATLAB_empty" in item.attrs:
+        return None
+    is_matlab = "MATLAB_class" in item.attrs
+    shape = tuple(int(n) for n in (item.shape[::-1] if is_matlab else item.shape))
+    return _Dataset(name, shape, kind, is_matlab)
 
 
 def _text(value: Any) -> str:

@@ -19,7 +19,7 @@ from arrivals.recordings.formats.file_contents import (
 from arrivals.recordings.stored_samples import StoredSamples
 from arrivals.typing import Float, Int
 
-MAX_SAMPLES = 2**40  # of the common time of all traces
+MAX_GAPS, LEAST_SPAN = 1000, 2**24  # span over samples of a trace, above so many samples
 LARGEST_OFFSET = 0.1  # of a sample, between clocks, without a note
 
 
@@ -141,8 +141,11 @@ def _aligned(
     first = (np.round(origin) + np.round(exact - origin)).astype(np.int64)
     n_samples = np.array([each.n_samples for each in records])
     length = int((first + n_samples).max())
-    if length > MAX_SAMPLES:
-        raise ValueError(f"the traces must have at most {MAX_SAMPLES} samples; got {length}")
+    n_present = int(n_samples.sum()) // len(names)
+    if length > max(LEAST_SPAN, MAX_GAPS * n_present):
+        raise ValueError(
+            f"the records are too far apart: {n_present} samples a trace in {length / rate:.4g} s"
+        )
     place, size = np.array([(each.offset, each.size) for each in records]).T
     traces = _Traces(path, place, size, channel, first, n_samples, len(names))
     return traces, length, float(np.abs(exact - first).max())
