@@ -156,14 +156,30 @@ def test_mixture_at_given_frequencies_gets_its_windows_and_steps() -> None:
         choose(CIRCLE, None, None, few)
 
 
-def test_complex_snapshots_of_a_high_rate_are_tracked_several_a_step() -> None:
+ANTENNAS = SensorArray.uca(8, radius=0.35, speed=3e8)
+
+
+def test_complex_samples_of_a_radio_are_reduced_in_steps_of_20_ms() -> None:
     options = TrackOptions(frequencies=433.92e6)
-    antennas = SensorArray.uca(5, radius=0.35, speed=3e8)
-    choice = choose(antennas, 240e3, None, options, n_samples=24_000)
-    assert (choice.tracker, choice.n_snapshots) == ("svalse", 1200)
-    for rate, tracker in ((None, None), (4.0, None), (240e3, "svalse")):
-        options = TrackOptions(tracker, frequencies=433.92e6)
-        assert choose(antennas, rate, None, options).n_snapshots == 1
+    choice = choose(ANTENNAS, 240e3, None, options, n_samples=960_000)
+    assert (choice.tracker, choice.n_snapshots, choice.reduce) == ("svalse", 4800, True)
+    assert (choice.settings["solver__tempering"], choice.n_rows(8)) == (1.0, 8)
+    assert "--snapshots 4800 --reduce --set" in str(choice)
+    assert choose(ANTENNAS, 240e3, None, options, n_samples=24_000).n_snapshots == 1200
+    music = TrackOptions("music", frequencies=433.92e6)
+    assert (choose(ANTENNAS, 240e3, None, music).n_snapshots, dict(music.settings)) == (4800, {})
+    given = TrackOptions("music", frequencies=433.92e6, snapshots=100)
+    assert choose(ANTENNAS, 240e3, None, given).n_rows(8) == 100
+    given = TrackOptions(frequencies=433.92e6, snapshots=100, reduce=True)
+    assert choose(ANTENNAS, 240e3, None, given).n_rows(8) == 8
+
+
+@pytest.mark.parametrize(("rate", "n"), [(1000.0, 128), (4000.0, 200), (10_000.0, 200)])
+def test_complex_snapshots_of_a_low_rate_have_steps_of_up_to_128_ms(rate: float, n: int) -> None:
+    choice = choose(ANTENNAS, rate, None, TrackOptions(frequencies=433.92e6))
+    assert (choice.n_snapshots, choice.reduce) == (n, False)
+    for slow, tracker in ((None, None), (4.0, None), (rate, "svalse")):
+        assert choose(ANTENNAS, slow, None, TrackOptions(tracker, 433.92e6)).n_snapshots == 1
 
 
 @pytest.mark.parametrize(

@@ -1,18 +1,19 @@
 """One recording of several files, and files without a header whose array gives the channels."""
 
+import sys
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
-from recording_files import NUMBERS, RATE
+from recording_files import NUMBERS, RATE, assert_refused
 from scipy.io import wavfile
 
 from arrivals.measurement_models import SensorArray
 from arrivals.recordings import read
 from arrivals.recordings.formats.file_contents import FileContents
-from arrivals.recordings.several_files import joined
+from arrivals.recordings.formats.several_files import joined
 from arrivals.recordings.stored_samples import StoredSamples
 from arrivals.typing import Float
 
@@ -86,3 +87,32 @@ def test_stored_samples_are_joined_by_blocks() -> None:
     whole = joined([FileContents(each) for each in parts], [Path("a")] * 3).array
     assert isinstance(whole, StoredSamples)
     assert_array_equal(whole[7:20], NUMBERS[7:20])
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "package"),
+    [
+        ("a.h5", b"\x89HDF\r\n\x1a\n", "h5py"),
+        ("a.mat", b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM", "h5py"),
+        ("a.mseed", b"000001D ".ljust(512), "pymseed"),
+        ("a.sigmf-meta", b"{}", "sigmf"),
+    ],
+)
+def test_package_that_is_missing_is_named(
+    name: str, content: bytes, package: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / name).write_bytes(content)
+    monkeypatch.setitem(sys.modules, package, None)
+    assert_refused(tmp_path / name, rf'requires {package}: pip install "arrivals\[io\]"$')
+
+
+def test_sigmf_samples_without_metadata_are_read_by_format(tmp_path: Path) -> None:
+    Z.tofile(tmp_path / "a.sigmf-data")
+    assert_refused(tmp_path / "a.sigmf-data", r"a\.sigmf-meta is missing: .* --format and --rate")
+    assert_array_equal(read(tmp_path / "a.sigmf-data", format="cf32:3").samples, Z)
+
+
+@pytest.mark.parametrize("suffix", ["h5", "sigmf-meta", "sigmf", "cf32", "sio", "mseed"])
+def test_empty_file_of_any_format_is_refused(tmp_path: Path, suffix: str) -> None:
+    (tmp_path / f"a.{suffix}").touch()
+    assert_refused(tmp_path / f"a.{suffix}", "the file is empty")

@@ -2,36 +2,16 @@
 
 import struct
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
-from numpy.typing import NDArray
+from recording_files import sio_bytes
 
 from arrivals.recordings.formats.file_contents import ReadingOptions
 from arrivals.recordings.formats.sio import read_sio
-
-KINDS = {"i2": 0, "i4": 0, "f4": 1}
-
-
-def sio_bytes(
-    samples: NDArray[Any], order: str = ">", record: int = 128, pad: bool = True
-) -> bytes:
-    """Return an SIO file of samples (n_samples, n_channels), by loops over records."""
-    width, (n, channels) = samples.dtype.itemsize, samples.shape
-    per, kind = record // width, KINDS[samples.dtype.str[1:]]
-    rounds = -(-n // per)
-    words = (7, rounds * channels, record, channels, width, kind, n, 32677)
-    parts = [(struct.pack(order + "8I", *words) + b"name".ljust(96)).ljust(record, b"\0")]
-    for i in range(rounds):
-        for channel in range(channels):
-            block = samples[i * per : (i + 1) * per, channel].astype(order + samples.dtype.str[1:])
-            is_last = (i, channel) == (rounds - 1, channels - 1)
-            parts.append(block.tobytes() if is_last and not pad else block.tobytes().ljust(record))
-    return b"".join(parts)
 
 
 @given(

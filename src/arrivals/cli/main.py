@@ -18,6 +18,7 @@ from arrivals.cli.locate import add_locate
 from arrivals.cli.track import track
 from arrivals.measurement_models.arrays.presets import preset_names, preset_summary
 from arrivals.messages import shown, similar
+from arrivals.recordings.formats.iq import RAW_TYPES
 from arrivals.recordings.raw_numbers import DTYPES
 from arrivals.scenarios.demos.infrasound import infrasound
 from arrivals.scenarios.demos.swellex96 import demo
@@ -72,6 +73,15 @@ class _Parser(argparse.ArgumentParser):
             raise argparse.ArgumentError(action, listed + similar(value, choices))
 
 
+class _Files(argparse.Action):
+    """One file by its name, several by a list."""
+
+    def __call__(self, parser: Any, namespace: Any, values: Any, option: Any = None) -> None:
+        if len(values) > 1 and "-" in values:
+            raise ValueError("standard input (-) must be the only file")
+        setattr(namespace, self.dest, values[0] if len(values) == 1 else values)
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(
         prog="arrivals",
@@ -103,10 +113,18 @@ def _add_track(commands: Any) -> None:
         allow_abbrev=False,
     )
     option = add.add_argument
-    option("file", metavar="FILE", help="recording; - for samples from standard input")
+    option("file", metavar="FILE", nargs="+", action=_Files,
+           help="recording; several files have the channels of one; - for samples from "
+                "standard input")  # fmt: skip
     option("--array", required=True, metavar="ARRAY",
            help="array file (TOML, JSON), or the name of a preset in `arrivals list`")  # fmt: skip
     option("--frequency", type=float, metavar="HZ", help="frequency of narrowband sources")
+    option(
+        "--center",
+        type=float,
+        metavar="HZ",
+        help="centre frequency of complex samples (IQ), if the file does not contain it",
+    )
     option(
         "--frequencies",
         nargs="+",
@@ -119,6 +137,12 @@ def _add_track(commands: Any) -> None:
                 "samples")  # fmt: skip
     option("--snapshots", type=int, metavar="N",
            help="number of successive windows in one step (1 with --frequency)")  # fmt: skip
+    option("--follow", type=float, metavar="HZ",
+           help="largest shift of tones at --frequency, such as a Doppler shift: in each step "
+                "the strongest frequency within it is used")  # fmt: skip
+    option("--reduce", action="store_true",
+           help="replace the complex samples of a step by as many as channels, of the same "
+                "covariance")  # fmt: skip
     option(
         "--snr",
         type=float,
@@ -146,14 +170,17 @@ def _add_track(commands: Any) -> None:
     option("--hop", type=int, metavar="N",
            help="samples between windows (the window), or between output lines of real "
                 "samples (1)")  # fmt: skip
-    option("--variable", metavar="NAME", help="name of the array in an npz or mat file")
+    option("--variable", metavar="NAME", help="name of the array in a file of several")
     option("--transpose", action="store_true", help="rows of the file are channels")
-    option("--dtype", choices=tuple(DTYPES), help="sample type of raw standard input (int16)")
+    option("--format", metavar="NAME",
+           help="format of a file, in place of its suffix, such as cs16 of raw IQ")  # fmt: skip
+    option("--dtype", choices=(*DTYPES, *RAW_TYPES),
+           help="sample type of raw standard input (int16)")  # fmt: skip
     option(
         "--channels",
         type=int,
         metavar="N",
-        help="number of channels of standard input (those of the array)",
+        help="number of channels of standard input or a raw file (those of the array)",
     )
     option("--quiet", action="store_true", help="hide the progress bar")
     add.set_defaults(command=lambda arguments: track(arguments, _bar(_is_quiet(arguments))))

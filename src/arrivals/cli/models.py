@@ -42,11 +42,18 @@ def require_speed(array: SensorArray, arguments: argparse.Namespace) -> None:
 
 
 def read_recording(arguments: argparse.Namespace, array: SensorArray) -> Recording:
-    """Return the recording of the file of the arguments; print warnings about it."""
-    refuse(arguments, ("dtype", "channels"), "requires samples from standard input")
+    """Return the recording of the files of the arguments, for the sensors of the array."""
+    refuse(arguments, ("dtype",), "requires samples from standard input")
+    form = arguments.format
+    if arguments.channels is not None:
+        form = f"{form or ''}:{arguments.channels}"
     with printed_warnings():
-        return read(arguments.file, rate=arguments.rate, variable=arguments.variable,
-                    transpose=arguments.transpose, array=array, rate_required=True)  # fmt: skip
+        recording = read(arguments.file, rate=arguments.rate, variable=arguments.variable,
+                         transpose=arguments.transpose, array=array, rate_required=True,
+                         format=form)  # fmt: skip
+    if arguments.center is not None and not recording.is_narrowband:
+        raise ValueError("--center requires complex samples; got real ones: pass --frequency")
+    return recording
 
 
 @contextmanager

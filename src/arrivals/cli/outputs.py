@@ -24,13 +24,18 @@ def check_outputs(arguments: argparse.Namespace) -> None:
 
     outputs = arguments.out, arguments.plot, arguments.signals
     check_different("FILE, --array, --out, --plot and --signals",
-                    arguments.array, arguments.file, *outputs)  # fmt: skip
+                    arguments.array, *input_files(arguments), *outputs)  # fmt: skip
     for name in filter(None, outputs):
         check_output(name)
     if arguments.plot:
         picture_format(arguments.plot)
     if arguments.signals:
         check_suffix(arguments.signals)
+
+
+def input_files(arguments: argparse.Namespace) -> list[str]:
+    """Return the names of the recording's files."""
+    return [arguments.file] if isinstance(arguments.file, str) else list(arguments.file)
 
 
 def check_different(words: str, *names: str | None) -> None:

@@ -17,7 +17,7 @@ def track_band(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -> N
     """Track by a tracker of single real samples, from a recording or a stream."""
     refuse(
         arguments,
-        ("frequency", "frequencies", "window"),
+        ("frequency", "frequencies", "center", "reduce", "follow", "window"),
         "requires snapshots, not a tracker of real samples",
     )
     if arguments.snapshots not in (None, 1):
@@ -36,7 +36,7 @@ def track_band(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -> N
 
 
 def _track_band_stream(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -> None:
-    refuse(arguments, ("plot", "variable", "transpose"), "requires a file, not a stream")
+    refuse(arguments, ("plot", "variable", "transpose", "format"), "requires a file, not a stream")
     tracker, rate = _band_tracker(arguments, array, arguments.rate)
     n_channels = n_stream_channels(arguments.channels, array)
     frames = live_samples(arguments.source, n_channels, dtype=arguments.dtype or "int16")

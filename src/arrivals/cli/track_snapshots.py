@@ -16,9 +16,11 @@ from arrivals.measurement_models import SensorArray
 from arrivals.measurements import is_missing
 from arrivals.recordings.choice import Choice, MeanSpectrum, TrackOptions, choose
 from arrivals.recordings.choice.assembly import assembled
+from arrivals.recordings.formats.iq import complex_frames
 from arrivals.recordings.framing import frame_stream
+from arrivals.recordings.step_snapshots import reduced_snapshots, strongest_candidates
 from arrivals.recordings.stream import read_ahead, track_live
-from arrivals.recordings.tracking import RecordedSteps, choice_for
+from arrivals.recordings.tracking import RecordedSteps, choice_for, followed
 from arrivals.typing import Complex
 
 AHEAD_S = 2.0  # of a stream, on which the choice is based
@@ -27,13 +29,15 @@ AHEAD_S = 2.0  # of a stream, on which the choice is based
 def track_snapshots(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -> None:
     """Track the snapshots of a recording or a stream."""
     require_speed(array, arguments)
-    given = arguments.frequency, arguments.frequencies, arguments.band
+    names = ("frequency", "frequencies", "center", "band")
+    given = [getattr(arguments, name) for name in names]
     if sum(each is not None for each in given) > 1:
-        raise ValueError("pass only one of --frequency, --frequencies and --band")
-    frequencies = arguments.frequency if arguments.frequencies is None else arguments.frequencies
+        raise ValueError("pass only one of --frequency, --frequencies, --center and --band")
+    frequencies = next((each for each in given[:3] if each is not None), None)
     options = TrackOptions(
         arguments.tracker, frequencies, arguments.band, arguments.window, arguments.hop,
-        arguments.snapshots, dict(arguments.set),
+        arguments.snapshots, dict(arguments.set), arguments.reduce,
+        arguments.follow,
     )  # fmt: skip
     track = _track_stream if arguments.file == "-" else _track_file
     track(arguments, array, options, bar)
@@ -42,7 +46,8 @@ def track_snapshots(arguments: argparse.Namespace, array: SensorArray, bar: Bar)
 def _track_file(
     arguments: argparse.Namespace, array: SensorArray, options: TrackOptions, bar: Bar
 ) -> None:
-    if options.frequencies:  # refuse invalid arguments before the file is read
+    if options.frequencies and arguments.center is None:
+        # refuse invalid arguments before the file is read
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             rate = 4 * np.max(options.frequencies)  # any that has the frequencies
@@ -81,32 +86,42 @@ def _announcement(choice: Choice, options: TrackOptions) -> Callable[[Complex], 
 def _track_stream(
     arguments: argparse.Namespace, array: SensorArray, options: TrackOptions, bar: Bar
 ) -> None:
-    refuse(arguments, ("plot", "variable", "transpose"), "requires a file, not a stream")
+    refuse(arguments, ("plot", "variable", "transpose", "format"), "requires a file, not a stream")
     n_channels = n_stream_channels(arguments.channels, array)
+    source, dtype = complex_frames(arguments.source, arguments.dtype or "int16")
+    if arguments.center is not None and not dtype.startswith("complex"):
+        raise ValueError(f"--center requires complex samples: pass --dtype; got {dtype}")
     with printed_warnings():
-        choice, source = _stream_choice(arguments, array, options, n_channels)
+        choice, source = _stream_choice(source, dtype, arguments.rate, array, options, n_channels)
         _, tracker = assembled(array, choice, arguments.rate)
+    frequencies = followed(choice, arguments.rate, choice.window or 1)
     frames = frame_stream(
-        source, n_channels, choice.frequencies, n_snapshots=choice.n_snapshots,
-        dtype=arguments.dtype or "int16", rate=arguments.rate,
-        window=choice.window, hop=choice.hop,
+        source, n_channels, frequencies, n_snapshots=choice.n_snapshots, dtype=dtype,
+        rate=arguments.rate, window=choice.window, hop=choice.hop,
     )  # fmt: skip
     announce = _announcement(choice, options)
-    steps = ((time, announce(array.select(z))) for time, z in frames)
+    steps = ((time, announce(_completed(array.select(z), choice))) for time, z in frames)
     with live_output(arguments.out) as write:
         track_live(tracker, bar(steps, desc=choice.tracker), write)
 
 
+def _completed(z: Complex, choice: Choice) -> Complex:
+    """Return the snapshots of a step, reduced or of the followed frequencies."""
+    if choice.follow is not None:
+        return np.asarray(strongest_candidates(z[None], len(choice.frequencies))[0])
+    return reduced_snapshots(z) if choice.reduce else z
+
+
 def _stream_choice(
-    arguments: argparse.Namespace, array: SensorArray, options: TrackOptions, n_channels: int
-) -> tuple[Choice, BinaryIO]:
+    source: BinaryIO, dtype: str, rate: float | None, array: SensorArray,
+    options: TrackOptions, n_channels: int,
+) -> tuple[Choice, BinaryIO]:  # fmt: skip
     """Return the choice for a stream, from its first samples if necessary, and the stream."""
-    source, rate, dtype = arguments.source, arguments.rate, arguments.dtype or "int16"
     if dtype.startswith("complex"):
         return choose(array, rate, None, options), source
     spectrum = MeanSpectrum.empty()
     choice = choose(array, rate, spectrum, options)  # refuses before the first read
-    if options.has_frequencies:
+    if options.has_frequencies or rate is None:
         return choice, source
     samples, source = read_ahead(source, n_channels, AHEAD_S, dtype=dtype, rate=rate)
     if len(samples):

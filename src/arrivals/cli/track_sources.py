@@ -58,7 +58,11 @@ def track_sources(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -
         arguments.frequency = sum(arguments.band) / 2
     if arguments.frequency is None:
         raise ValueError("pass --frequency, or --band, of the separated sources")
-    refuse(arguments, ("frequencies",), "requires another tracker: this one takes --frequency")
+    refuse(
+        arguments,
+        ("frequencies", "center", "reduce", "follow"),
+        "requires another tracker: this one takes --frequency",
+    )
     model = model_at(array, arguments, [arguments.frequency])
     recording = read_recording(arguments, array)
     every_sample = not (recording.is_narrowband or arguments.window)

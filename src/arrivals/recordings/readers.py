@@ -22,8 +22,8 @@ from arrivals.recordings.formats.file_contents import (
     check_size,
 )
 from arrivals.recordings.formats.registry import HEAD, reader_for
+from arrivals.recordings.formats.several_files import file_names, joined, raw_layout
 from arrivals.recordings.recording import Recording
-from arrivals.recordings.several_files import file_names, joined, raw_layout
 from arrivals.recordings.stored_samples import StoredSamples
 from arrivals.typing import Float
 from arrivals.validation import positive
@@ -125,7 +125,8 @@ def read(
         contents = joined([contents for contents, _ in several], paths, transpose=transpose)
         recording = _recording(contents, rate, options, array)
     except Exception as error:
-        raise file_error(paths[0], error) from error
+        has_name = any(str(error).startswith(f"{each}: ") for each in paths)
+        raise error if has_name else file_error(paths[0], error) from error
     for each, (_, notes) in zip(paths, several, strict=True):
         for note in notes:
             warnings.warn(f"{each}: {note}", stacklevel=2)

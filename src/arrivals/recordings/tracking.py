@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from os import PathLike
 from typing import Any
 
@@ -20,6 +21,11 @@ from arrivals.recordings.narrowband import check_frequency, default_window
 from arrivals.recordings.readers import read
 from arrivals.recordings.recording import Recording
 from arrivals.recordings.sample_stream import band_samples, track_samples
+from arrivals.recordings.step_snapshots import (
+    candidate_frequencies,
+    reduced_snapshots,
+    strongest_candidates,
+)
 from arrivals.trackers import find
 from arrivals.trackers.run import Run
 from arrivals.typing import Complex
@@ -63,8 +69,8 @@ def track(
     snapshots : int, optional
         Windows in a step.
     **more : object
-        `rate`, `variable`, `transpose`, `max_bytes` and `format` of `read`; other names are
-        parameters of the tracker, as in `set_params`.
+        `rate`, `variable`, `transpose`, `max_bytes` and `format` of `read`; `reduce` and `follow`
+        as in `TrackOptions`; other names are parameters of the tracker, as in `set_params`.
 
     Returns
     -------
@@ -89,7 +95,8 @@ def track(
     from threadpoolctl import threadpool_limits
 
     reading = {name: more.pop(name) for name in READING if name in more}
-    options = TrackOptions(tracker, frequencies, band, window, hop, snapshots, more)
+    given = {name: more.pop(name) for name in ("reduce", "follow") if name in more}
+    options = TrackOptions(tracker, frequencies, band, window, hop, snapshots, more, **given)
     recording = _recording(recording, array, reading)
     if band is not None and takes_samples(tracker):
         return _track_band(recording, options)
@@ -152,11 +159,40 @@ def choice_for(recording: Recording, options: TrackOptions | None = None) -> Cho
     options = options or TrackOptions()
     if recording.is_narrowband:
         spectrum = None
+        if not options.has_frequencies and recording.frequency is not None:
+            options = replace(options, frequencies=recording.frequency)
     elif options.has_frequencies or rate is None:
         spectrum = MeanSpectrum.empty()
     else:
         spectrum = MeanSpectrum.of(recording.samples, rate)
     return choose(array, rate, spectrum, options, len(recording.samples))
+
+
+def followed(choice: Choice, rate: float | None, window: int) -> Sequence[float]:
+    """Return the frequencies of a choice, or the candidates of those that are followed.
+
+    Parameters
+    ----------
+    choice : Choice
+        The choice.
+    rate : float or None
+        Samples per second, Hz.
+    window : int
+        Length of a window, samples.
+
+    Returns
+    -------
+    sequence of float
+
+    Examples
+    --------
+    >>> choice = Choice("a tone", "svalse", (100.0,), window=500, follow=0.5)
+    >>> followed(choice, 1000.0, 500)
+    [99.5, 100.0, 100.5]
+    """
+    if choice.follow is None or rate is None:
+        return choice.frequencies
+    return candidate_frequencies(choice.frequencies, choice.follow, rate / window)
 
 
 class RecordedSteps:
@@ -189,12 +225,13 @@ class RecordedSteps:
             lowest = check_frequency(min(choice.frequencies), recording.rate)
             self._window = choice.window or default_window(recording.rate, lowest)
             self._hop = choice.hop or self._window
+        self._frequencies = followed(choice, recording.rate, self._window)
         self._step = self._hop * choice.n_snapshots
         n_windows = (len(recording.samples) - self._window) // self._hop + 1
         self._n_steps = max(0, n_windows // choice.n_snapshots)
         first = self._part(0, 1)  # refuses invalid arguments
         if recording.time is not None:
-            self.time = self.framed().time
+            self.time = self._part(0, max(1, self._n_steps)).time
         else:
             at = np.arange(self._n_steps) * (self._step / (recording.rate or 1.0))
             self.time = np.asarray(first.time[0] + at)  # NaN without a rate
@@ -204,10 +241,10 @@ class RecordedSteps:
 
     def __iter__(self) -> Iterator[Complex]:
         any_finite = False
-        size = max(self._step, self._choice.n_snapshots * len(self._choice.frequencies))
+        size = max(self._step, self._choice.n_snapshots * len(self._frequencies))
         n = max(1, BLOCK // (size * self._recording.n_channels))
         for first in range(0, self._n_steps, n):
-            values = self._part(first, min(n, self._n_steps - first)).values
+            values = self._reduced(self._part(first, min(n, self._n_steps - first)).values)
             any_finite = any_finite or bool(np.isfinite(values).any())
             yield from values
             del values  # before the next ones are computed
@@ -216,15 +253,24 @@ class RecordedSteps:
 
     def framed(self) -> FramedSnapshots:
         """Return all steps at once."""
+        if self._choice.reduce:
+            return FramedSnapshots(np.array(list(self)), self.time)
         return self._part(0, max(1, self._n_steps))
+
+    def _reduced(self, values: Complex) -> Complex:
+        return reduced_snapshots(values) if self._choice.reduce else values
 
     def _part(self, first: int, n_steps: int) -> FramedSnapshots:
         choice, start = self._choice, first * self._step
-        return frame_recording(
-            self._recording, choice.frequencies, window=choice.window, hop=choice.hop,
+        framed = frame_recording(
+            self._recording, self._frequencies, window=choice.window, hop=choice.hop,
             n_snapshots=choice.n_snapshots, start=start,
             stop=start + n_steps * self._step - self._hop + self._window,
         )  # fmt: skip
+        if choice.follow is None:
+            return framed
+        values = strongest_candidates(framed.values, len(choice.frequencies))
+        return FramedSnapshots(values, framed.time)
 
 
 def _recording(recording: Any, array: Any, reading: dict[str, Any]) -> Recording:

@@ -158,7 +158,8 @@ def assembled(
         raise ValueError(
             f"the tracker {choice.tracker!r} takes real samples of a band: pass band (--band)"
         )
-    measurement = measurement_at(array, choice.frequencies, choice.n_snapshots)
+    n_rows = choice.n_rows(array.n_sensors)
+    measurement = measurement_at(array, choice.frequencies, n_rows)
     settings = dict(choice.settings)
     hop = choice.hop or choice.window
     if hop and rate and "step_duration" in inspect.signature(find(choice.tracker)).parameters:

@@ -25,6 +25,12 @@ class TrackOptions:
         Samples of a window and between windows; windows in a step.
     settings : mapping of str to object
         Parameters of the tracker, as in `set_params`.
+    reduce : bool
+        True to replace the snapshots of a step by as many as there are channels, of the same
+        covariance; only for complex samples.
+    follow : float, optional
+        Largest shift, Hz, of tones at the given frequencies: in each step they are where the power
+        of all channels is largest.
 
     Examples
     --------
@@ -39,6 +45,8 @@ class TrackOptions:
     hop: int | None = None
     snapshots: int | None = None
     settings: Mapping[str, Any] = field(default_factory=dict)
+    reduce: bool = False
+    follow: float | None = None
 
     def __post_init__(self) -> None:
         if self.frequencies is not None and self.band is not None:
@@ -52,6 +60,10 @@ class TrackOptions:
             object.__setattr__(self, "frequencies", bins)
         if self.band is not None and len(items("band", self.band)) != 2:
             raise ValueError(f"band must have two edges, Hz; got {len(self.band)} numbers")
+        if self.follow is not None:
+            object.__setattr__(self, "follow", positive("follow", self.follow))
+            if self.frequencies is None:
+                raise ValueError("follow requires frequencies, of tones that are shifted")
         for name, least in (("window", 2), ("hop", 1), ("snapshots", 1)):
             if getattr(self, name) is not None:
                 count(name, getattr(self, name), least)
@@ -82,6 +94,10 @@ class Choice:
         Windows in a step.
     settings : mapping of str to object
         Parameters of the tracker.
+    reduce : bool
+        True if the snapshots of a step are replaced by as many as there are channels.
+    follow : float, optional
+        Largest shift of the frequencies, Hz, as in `TrackOptions`.
 
     Examples
     --------
@@ -98,6 +114,18 @@ class Choice:
     hop: int | None = None
     n_snapshots: int = 1
     settings: Mapping[str, Any] = field(default_factory=dict)
+    reduce: bool = False
+    follow: float | None = None
+
+    def n_rows(self, n_sensors: int) -> int:
+        """Return the number of snapshots that a tracker of an array gets in a step.
+
+        Examples
+        --------
+        >>> Choice("IQ", "svalse", (433e6,), n_snapshots=4800, reduce=True).n_rows(5)
+        5
+        """
+        return min(self.n_snapshots, n_sensors) if self.reduce else self.n_snapshots
 
     def __str__(self) -> str:
         words = [f"--tracker {self.tracker}"]
@@ -107,6 +135,8 @@ class Choice:
             words.append(f"--band {_numbers(self.band)}")
         framing = {"window": self.window, "hop": self.hop, "snapshots": self.n_snapshots}
         words += [f"--{name} {value}" for name, value in framing.items() if value is not None]
+        words += ["--reduce"] if self.reduce else []
+        words += [f"--follow {self.follow:g}"] if self.follow is not None else []
         words += [f"--set {name}={_text(value)}" for name, value in self.settings.items()]
         return f"{self.reason}: {' '.join(words)}"
 

@@ -24,6 +24,7 @@ LINE_SNAPSHOTS, LINE_WINDOWS = 2, 4  # in a step of lines; their length in defau
 NEIGHBOURS = 4  # bins of a Hann window that count as one
 LEAST_BINS = 8  # of a mixture over bins
 STEP_S, SHORTEST_STEP_S, STEPS = 0.128, 0.005, 20  # of complex snapshots
+RADIO_STEP_S, SHORTEST_RADIO = 0.020, 200  # of radios: s, and samples in a step of 20 ms at least
 POWER_FLOOR, MAX_SNR_DB = 3.0, 20.0  # of svalse on recorded data
 
 
@@ -133,27 +134,44 @@ def _choice(
 
 
 def _of_snapshots(rate: float | None, options: TrackOptions, n_samples: int | None) -> Choice:
-    """Choose the number of complex snapshots in a step: one, or several at a high rate."""
+    """Choose the number of complex samples in a step: one, or several at a high rate.
+
+    Steps of many samples, as of a radio, are reduced to their covariance.
+    """
     if options.band is not None:
         raise ValueError("a band requires real samples; got complex snapshots: pass a frequency")
     if options.frequencies is None:
         raise ValueError(
-            "complex snapshots require their frequency, Hz: pass frequencies (--frequency)"
+            "complex snapshots require their frequency, Hz: pass frequencies (--frequency, or "
+            "--center of a radio)"
         )
     if options.window is not None or options.hop is not None:
         raise ValueError("window and hop must be None for complex snapshots")
+    if options.follow is not None:
+        raise ValueError("follow must be None for complex snapshots")
+    n = options.snapshots or _snapshots_of_step(rate, n_samples)
+    is_radio = n > SHORTEST_RADIO and options.snapshots is None
+    if options.snapshots is not None or n < 2 or (options.tracker is not None and not is_radio):
+        n = options.snapshots or 1
+        reason = "" if options.tracker else f"complex snapshots, {n} a step"
+        return replace(_as_given(reason, options, _bins(options)), reduce=options.reduce)
+    reduce = is_radio or options.reduce
+    choice = Choice(f"complex snapshots, {n} a step", options.tracker or NARROWBAND, _bins(options),
+                    n_snapshots=n, settings=dict(options.settings), reduce=reduce)  # fmt: skip
     if options.tracker is not None:
-        return _as_given("", options, _bins(options))
-    if options.snapshots is not None or rate is None:
-        reason = f"complex snapshots, {options.snapshots or 1} a step"
-        return _as_given(reason, options, _bins(options))
-    step = STEP_S if n_samples is None else min(STEP_S, n_samples / rate / STEPS)
-    n = int(max(step, SHORTEST_STEP_S) * rate)
-    if n < 2:
-        return _as_given("complex snapshots, 1 a step", options, _bins(options))
-    settings = _recorded(n) | dict(options.settings)
-    return Choice(f"complex snapshots, {n} a step", NARROWBAND, _bins(options), n_snapshots=n,
-                  settings=settings)  # fmt: skip
+        return choice
+    # the few snapshots that stand for a reduced step are not tempered any further
+    settings = _recorded(1 if reduce else n) | dict(options.settings)
+    return replace(choice, settings=settings)
+
+
+def _snapshots_of_step(rate: float | None, n_samples: int | None) -> int:
+    """Return the number of complex samples in a step of 20 ms, or of 200 up to 128 ms."""
+    if rate is None:
+        return 1
+    step = float(np.clip(SHORTEST_RADIO / rate, RADIO_STEP_S, STEP_S))
+    step = step if n_samples is None else min(step, n_samples / rate / STEPS)
+    return int(max(step, SHORTEST_STEP_S) * rate)
 
 
 def _bins(options: TrackOptions) -> tuple[float, ...]:
@@ -164,6 +182,8 @@ def _of_frequencies(rate: float, options: TrackOptions) -> Choice:
     """Take frequencies as they are given; for the mixture, in steps of speech."""
     n = len(_bins(options))
     if options.tracker == WIDEBAND:
+        if options.follow is not None:
+            raise ValueError(f"follow requires a tracker of tones; got {WIDEBAND}")
         limits = BandLimits(min(_bins(options)), max(_bins(options)))
         frames = _frames(limits, rate, options, WIDEBAND)
         reason = "wideband sources at given frequencies"
@@ -172,7 +192,11 @@ def _of_frequencies(rate: float, options: TrackOptions) -> Choice:
     noun = "this frequency" if n == 1 else f"these {n} frequencies"
     reason = f"narrowband sources, {noun} alone (wideband ones, such as speech, need none)"
     reason = "" if options.tracker else reason
-    return _as_given(reason, options, _bins(options))
+    if options.follow is None:
+        return _as_given(reason, options, _bins(options))
+    window = options.window or power_of_two(rate / options.follow)
+    followed = replace(options, window=window)
+    return replace(_as_given(reason, followed, _bins(options)), follow=options.follow)
 
 
 def _of_given_band(rate: float, options: TrackOptions) -> Choice:

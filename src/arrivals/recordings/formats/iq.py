@@ -1,10 +1,10 @@
-"""Raw complex samples (IQ) of interleaved channels, without a header."""
+"""Raw complex samples (IQ) of interleaved channels, without a header: files and streams."""
 
 from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, BinaryIO, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,12 +24,21 @@ class RawType(NamedTuple):
     zero: float = 0.0
     full_scale: float = 1.0
 
-    def samples(self, numbers: NDArray[Any], n_channels: int) -> NDArray[np.complexfloating[Any]]:
-        """Return interleaved parts as complex samples (n_samples, n_channels), full scale 1."""
-        kind = np.float64 if numbers.dtype.itemsize > 2 else np.float32
-        parts = np.ascontiguousarray((numbers - kind(self.zero)) * kind(1 / self.full_scale))
-        pairs: NDArray[np.complexfloating[Any]] = parts.view(np.result_type(parts, np.complex64))
-        return pairs.reshape(-1, n_channels)
+    @property
+    def pair_type(self) -> np.dtype[Any]:
+        """complex64 for parts of up to 16 bits and float32, else complex128."""
+        is_single = self.dtype.itemsize <= 2 or self.dtype.str == "<f4"
+        return np.dtype("<c8" if is_single else "<c16")
+
+    def decoded(self, raw: bytes | NDArray[Any]) -> NDArray[np.complexfloating[Any]]:
+        """Return pairs of parts as complex numbers, full scale 1."""
+        numbers = np.frombuffer(raw, self.dtype)
+        real = np.dtype(f"<f{self.pair_type.itemsize // 2}").type
+        parts = numbers.astype(real)
+        if numbers.dtype.kind != "f":
+            parts -= real(self.zero)
+            parts *= real(1 / self.full_scale)
+        return np.asarray(parts.view(self.pair_type))
 
 
 RAW_TYPES = {
@@ -106,7 +115,7 @@ def _rows(
     numbers = np.fromfile(
         path, kind.dtype, (stop - start) * n, offset=start * n * kind.dtype.itemsize
     )
-    return kind.samples(numbers, n_channels)
+    return kind.decoded(numbers).reshape(-1, n_channels)
 
 
 def _check_plausible(path: Path, name: str, kind: RawType) -> None:
@@ -122,3 +131,44 @@ def _check_plausible(path: Path, name: str, kind: RawType) -> None:
             f"the samples are not {name}: {implausible.mean():.0%} of the numbers are below "
             f"{SMALLEST:g} or above {LARGEST_REAL:g}: pass another format (--format cs16)"
         )
+
+
+def complex_frames(source: BinaryIO, dtype: str) -> tuple[BinaryIO, str]:
+    """Return a source whose type is in `DTYPES`, and its type.
+
+    Parameters
+    ----------
+    source : binary file
+        As in `live_snapshots`.
+    dtype : str
+        One of `DTYPES` or of `RAW_TYPES`; integers such as cs16 are converted to complex64.
+
+    Returns
+    -------
+    source : binary file
+    dtype : str
+
+    Examples
+    --------
+    >>> import io, numpy as np
+    >>> source, dtype = complex_frames(io.BytesIO(bytes([64, 0, 0, 64])), "cs8")
+    >>> dtype, np.frombuffer(source.read(16), dtype).tolist()
+    ('complex64', [(0.5+0j), 0.5j])
+    """
+    if dtype not in RAW_TYPES:
+        return source, dtype
+    kind = RAW_TYPES[dtype]
+    return cast(BinaryIO, _Converted(source, kind)), kind.pair_type.name
+
+
+class _Converted:
+    """Complex numbers of a source of pairs of another type."""
+
+    def __init__(self, source: BinaryIO, kind: RawType) -> None:
+        self._source, self._kind = source, kind
+
+    def read(self, size: int) -> bytes:
+        """Return the next bytes of complex64, or complex128 for pairs of 32 bits and more."""
+        pair = 2 * self._kind.dtype.itemsize
+        block = self._source.read(size // self._kind.pair_type.itemsize * pair)
+        return self._kind.decoded(block[: len(block) // pair * pair]).tobytes()
