@@ -43,7 +43,7 @@ def with_word(place: int, value: int) -> bytes:
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (b"", "truncated: expected 128 bytes of a header; got 0"),
+        (b"", "truncated: expected 128 bytes of a header; got 0: copy it again"),
         (WHOLE[:100], "truncated: expected 128 bytes"),
         (b"RIFF" * 100, "not an SIO file"),
         (WHOLE[:-128], "truncated: expected"),

@@ -114,6 +114,21 @@ def test_swellex_file_is_tracked_by_one_command(
     assert_allclose([float(row["doa_deg"]) for row in strongest], -15.0, atol=0.3)
 
 
+def test_swellex_file_on_standard_input_is_no_raw_stream(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    array = SensorArray.from_file("swellex96-vla-21")
+    samples = drifting_tone(-15.0, array, 3 * 4096, amplitude=3000.0)
+    content = sio_bytes(samples.round().astype("i2"), record=4096)
+    (tmp_path / "a.sio").write_bytes(content)
+    more = ["--array", "swellex96-vla-21", "--rate", "1500", "--frequency", "198"]
+    assert main(["track", str(tmp_path / "a.sio"), *more]) == 0
+    expected = capsys.readouterr().out
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(content)))
+    assert main(["track", "-", *more]) == 0
+    assert capsys.readouterr().out == expected
+
+
 def test_stream_follows_as_the_file_does(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import arrivals
 from arrivals.__main__ import main
+from arrivals.cli.standard_input import HEAD
 from arrivals.measurement_models import SensorArray
 from arrivals.recordings import Recording, read, tracking
 from arrivals.recordings.choice import Choice
@@ -141,8 +142,8 @@ def test_stream_without_a_rate_is_refused_after_its_first_bytes(
 ) -> None:
     class Unread(io.BytesIO):
         def read(self, size: int | None = -1) -> bytes:
-            assert size == 16, "more than the first bytes were read"
-            return bytes(16)
+            assert size == HEAD, "more than the first bytes were read"
+            return bytes(HEAD)
 
     (tmp_path / "a.toml").write_text(TOML)
     monkeypatch.setattr("sys.stdin", io.TextIOWrapper(Unread()))

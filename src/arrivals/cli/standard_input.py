@@ -16,7 +16,7 @@ from arrivals.recordings.formats.registry import READERS
 from arrivals.recordings.formats.wav import is_wav, wav_header
 from arrivals.recordings.raw_numbers import DTYPES, Replay
 
-HEAD = 16  # bytes by which a format is recognised
+HEAD = 32  # bytes by which a format is recognised
 NAME = "standard input"
 
 

@@ -20,6 +20,7 @@ from arrivals.recordings.stored_samples import StoredSamples
 from arrivals.typing import Float, Int
 
 MAX_GAPS, LEAST_SPAN = 1000, 2**24  # span over samples of a trace, above so many samples
+SECOND = (b"D ", b"R ", b"Q ", b"M ", b"D\0", b"R\0", b"Q\0", b"M\0")  # after the number, version 2
 LARGEST_OFFSET = 0.1  # of a sample, between clocks, without a note
 
 
@@ -67,9 +68,8 @@ class _Traces:
 
 def is_miniseed(head: bytes) -> bool:
     """Return True for the first bytes of a miniSEED file of version 2 or 3."""
-    number = head[:6].replace(b" ", b"0").replace(b"\0", b"0")
-    is_second = number.isdigit() and head[6:7] in (b"D", b"R", b"Q", b"M") and len(head) >= 48
-    return head.startswith(b"MS\x03") or (is_second and head[7:8] in (b" ", b"\0"))
+    is_numbered = head[:6].replace(b" ", b"0").isdigit()
+    return head.startswith(b"MS\x03") or (is_numbered and head[6:8] in SECOND)
 
 
 def read_miniseed(path: Path, options: ReadingOptions) -> FileContents:

@@ -108,7 +108,7 @@ def _check(recording: Any, n_bytes: int) -> None:
     if n_bytes % frame or n_bytes // frame < least:
         raise ValueError(
             f"expected at least {least} samples of {n_channels} channels, {datatype} ({frame} "
-            f"bytes); got {n_bytes / frame:.8g}"
+            f"bytes); got {n_bytes / frame:.8g}: copy the samples again"
         )
 
 

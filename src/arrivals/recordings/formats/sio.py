@@ -16,7 +16,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from arrivals.recordings.formats.file_contents import FileContents, ReadingOptions
+from arrivals.recordings.formats.file_contents import (
+    FileContents,
+    ReadingOptions,
+    check_length,
+)
 from arrivals.recordings.stored_samples import StoredSamples
 
 CHECK, HEADER = 32677, 128  # the check word; bytes of the header
@@ -40,8 +44,7 @@ class SIOHeader(NamedTuple):
     @classmethod
     def parse(cls, head: bytes) -> SIOHeader:
         """Return the layout in the first bytes of a file, of either byte order."""
-        if len(head) < HEADER:
-            raise ValueError(f"truncated: expected {HEADER} bytes of a header; got {len(head)}")
+        check_length(HEADER, len(head), "bytes of a header")
         order = next((o for o in "><" if struct.unpack_from(o + "8I", head)[7] == CHECK), None)
         if order is None:
             raise ValueError(f"not an SIO file: its eighth word must be {CHECK}")
@@ -89,8 +92,7 @@ def read_sio(path: Path, options: ReadingOptions) -> FileContents:
     # the last record need not be filled up
     whole = header.record_bytes * (n_rounds + 1) * header.n_channels
     least = whole + (rest + 1) * header.dtype.itemsize
-    if present < least:
-        raise ValueError(f"truncated: expected {least} bytes; got {present}")
+    check_length(least, present)
     is_single = header.dtype.itemsize == 2 or header.dtype.kind == "f"
     samples = StoredSamples(
         (header.n_samples, header.n_channels),
