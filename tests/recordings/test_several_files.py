@@ -47,6 +47,9 @@ def test_missing_element_of_a_raw_file_has_a_channel(tmp_path: Path) -> None:
 def test_format_has_the_number_of_channels(tmp_path: Path) -> None:
     Z.tofile(tmp_path / "all.bin")
     assert_array_equal(read(tmp_path / "all.bin", format="cf32:3").samples, Z)
+    np.save(tmp_path / "a.npy", NUMBERS)
+    assert_array_equal(read(tmp_path / "a.npy", format=":3").samples, NUMBERS)
+    assert_refused(tmp_path / "a.npy", "channels must be 3, that of the file; got 4", format=":4")
     with pytest.raises(ValueError, match="such as cs16 or cs16:5; got 'cs16:x'"):
         read(tmp_path / "all.bin", format="cs16:x")
     with pytest.raises(ValueError, match=r"format must be one of .*; got 'cs17'"):

@@ -22,7 +22,12 @@ from arrivals.recordings.formats.file_contents import (
     check_size,
 )
 from arrivals.recordings.formats.registry import HEAD, reader_for
-from arrivals.recordings.formats.several_files import file_names, joined, raw_layout
+from arrivals.recordings.formats.several_files import (
+    check_channels,
+    file_names,
+    joined,
+    raw_layout,
+)
 from arrivals.recordings.recording import Recording
 from arrivals.recordings.stored_samples import StoredSamples
 from arrivals.typing import Float
@@ -122,6 +127,8 @@ def read(
         return _recording(contents, rate, options, array)
     several = [_opened(each, options) for each in paths]
     try:
+        if ":" in (format or ""):
+            check_channels([contents for contents, _ in several], n_channels)
         contents = joined([contents for contents, _ in several], paths, transpose=transpose)
         recording = _recording(contents, rate, options, array)
     except Exception as error:

@@ -67,6 +67,23 @@ def raw_layout(form: str | None, array: SensorArray | None) -> tuple[str | None,
     return form, array.n_channels or wired
 
 
+def check_channels(contents: Sequence[FileContents], n_channels: int | None) -> None:
+    """Raise a ValueError if a file has another number of channels.
+
+    Examples
+    --------
+    >>> check_channels([FileContents(np.zeros((9, 2)))], 3)
+    Traceback (most recent call last):
+    ValueError: the number of channels must be 2, that of the file; got 3
+    """
+    for each in contents:
+        present = each.array.shape[1] if each.array.ndim == 2 else 1
+        if present != n_channels:
+            raise ValueError(
+                f"the number of channels must be {present}, that of the file; got {n_channels}"
+            )
+
+
 def joined(
     contents: Sequence[FileContents], paths: Sequence[Path], *, transpose: bool = False
 ) -> FileContents:
