@@ -113,6 +113,23 @@ def test_sigmf_archive_is_read_in_place(tmp_path: Path) -> None:
     assert_array_equal(contents.array[7:20], Y[7:20].astype("c8"))
 
 
+@pytest.mark.parametrize("name", ["f64_le", "f32_be", "i32_be", "i16_be", "i8", "u8"])
+@pytest.mark.parametrize("kind", ["c", "r"])
+def test_sigmf_types_are_decoded(tmp_path: Path, kind: str, name: str) -> None:
+    bits, zero = int(name[1:].partition("_")[0]), 128 if name[0] == "u" else 0
+    code = f"{'>' if name.endswith('_be') else '<'}{name[0]}{bits // 8}"
+    parts = np.stack([Y.real, Y.imag], axis=-1).reshape(60, -1)
+    stored = parts if name[0] == "f" else np.round(parts * 2.0 ** (bits - 1)) + zero
+    fields = {"core:datatype": kind + name, "core:num_channels": 3 if kind == "c" else 6}
+    meta = sigmf(tmp_path, fields=fields)
+    meta.with_suffix(".sigmf-data").write_bytes(stored.astype(code).tobytes())
+    step = 1e-6 if name[0] == "f" else 2.0 ** (1 - bits) + 1e-7
+    samples = read_sigmf(meta, ReadingOptions()).array
+    assert samples.dtype.kind == {"c": "c", "r": "f"}[kind]
+    assert_allclose(samples[:], Y if kind == "c" else parts, atol=step)
+    assert_array_equal(samples[7:20], samples[:][7:20])
+
+
 def test_sigmf_real_samples_are_real(tmp_path: Path) -> None:
     meta = sigmf(tmp_path, fields={"core:datatype": "rf32_le", "core:num_channels": 2})
     array = read_sigmf(meta, ReadingOptions()).array

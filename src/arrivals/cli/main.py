@@ -106,8 +106,9 @@ def _add_track(commands: Any) -> None:
         help="track directions through a recording or a stream",
         description="Track directions of arrival through a recording (WAV, FLAC and other audio, "
         "npy, npz, MATLAB, HDF5, CSV, SigMF and raw IQ, SIO, miniSEED), or through a WAV stream or "
-        "raw interleaved samples from standard input. Frequencies, windows and tracker are chosen from array and recording (of a stream, its first 2 s) unless they are "
-        "given; a line on standard error has the choice as options.",
+        "raw interleaved samples from standard input. Frequencies, windows and tracker are chosen "
+        "from array and recording (of a stream, its first 2 s) unless they are given; a line on "
+        "standard error has the choice as options.",
         epilog="live: arecord -t wav -f S16_LE -r 48000 -c 8 | arrivals track - --array ARRAY.toml",
         allow_abbrev=False,
     )

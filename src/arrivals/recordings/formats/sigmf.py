@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import tarfile
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -18,10 +19,11 @@ from arrivals.recordings.formats.file_contents import (
     damage_refused,
     import_reader_package,
 )
+from arrivals.recordings.raw_numbers import RawRows, scale_of
 from arrivals.recordings.stored_samples import StoredSamples
 from arrivals.validation import count, positive
 
-DATATYPE = re.compile(r"[cr](f32|f64|[iu]32|[iu]16)_[lb]e|[cr][iu]8")
+DATATYPE = re.compile(r"[cr](f32|f64|i32|i16)_[lb]e|[cr][iu]8")
 META, DATA, ARCHIVE = ".sigmf-meta", ".sigmf-data", ".sigmf"
 MAX_META = 100_000_000  # bytes of the metadata
 
@@ -48,36 +50,58 @@ def read_sigmf(path: Path, options: ReadingOptions) -> FileContents:
         If metadata or samples are missing, damaged, or do not fit each other.
     """
     sigmf = import_reader_package("sigmf", "a SigMF recording")
-    read_from = _in_archive if path.suffix.lower() == ARCHIVE else _beside
+    locate = _in_archive if path.suffix.lower() == ARCHIVE else _beside
     with damage_refused("SigMF recording"):
-        recording = read_from(sigmf, path)
+        metadata, data, offset, n_bytes = locate(path)
+        recording = sigmf.SigMFFile(metadata=json.loads(metadata))
+        n_channels, frame = _checked(recording, n_bytes)
     fields, captures = recording.get_global_info(), recording.get_captures()
-    n_channels = int(fields.get("core:num_channels", 1))
+    parts, name = fields["core:datatype"][0], fields["core:datatype"][1:]
+    is_complex, kind = parts == "c", _number(name)
+    zero = 128 if kind == "|u1" else 0
+    rows = RawRows(data, offset, kind, (1 + is_complex) * n_channels, zero)
+    load, row = partial(_rows, rows, is_complex), np.dtype(complex if is_complex else _real(kind))
+    samples = StoredSamples((n_bytes // frame, n_channels), row, load)
     rate = fields.get("core:sample_rate")
-    kind = np.dtype(complex if fields["core:datatype"][0] == "c" else np.float32)
-    load = partial(_rows, recording, n_channels)
-    samples = StoredSamples((recording.sample_count, n_channels), kind, load)
     rate = None if rate is None else positive("core:sample_rate", rate)
     frequency, note = _frequency(captures), _note(captures, recording.get_annotations())
     return FileContents(samples, rate, frequency=frequency, note=note)
 
 
-def _rows(recording: Any, n_channels: int, start: int, stop: int) -> NDArray[Any]:
+def _rows(rows: RawRows, is_complex: bool, start: int, stop: int) -> NDArray[Any]:
     """Return rows of all channels, (stop - start, n_channels); integers in [-1, 1)."""
-    if stop <= start:
-        return np.zeros((0, n_channels))
-    block: NDArray[Any] = recording.read_samples(start, stop - start)
-    return block.reshape(-1, n_channels)
+    numbers = np.ascontiguousarray(rows(start, stop), _real(rows.kind))
+    scale = scale_of(rows.kind)
+    numbers = numbers if scale is None else np.multiply(numbers, scale, dtype=numbers.dtype)
+    return numbers.view(np.result_type(numbers, np.complex64)) if is_complex else numbers
 
 
-def _in_archive(sigmf: Any, path: Path) -> Any:
-    recording = sigmf.fromarchive(path, skip_checksum=True)
-    _check(recording, recording.data_size_bytes)
-    return recording
+def _real(kind: str) -> type[np.float32 | np.float64]:
+    """Return the precision of a type code: float32 for up to 16 bits and floats of 32."""
+    return np.float32 if kind[1:] in ("f4", "i2", "i1", "u1") else np.float64
 
 
-def _beside(sigmf: Any, path: Path) -> Any:
-    """Return metadata, with the samples in the file of the same name."""
+def _number(name: str) -> str:
+    """Return the type code of numpy of f32_le, i16_be, u8 and so on."""
+    size = int(name[1:].partition("_")[0]) // 8
+    return f"{'|' if size == 1 else '>' if name.endswith('_be') else '<'}{name[0]}{size}"
+
+
+def _in_archive(path: Path) -> tuple[bytes, Path, int, int]:
+    """Return metadata, and the file, the first byte and the number of bytes of the samples."""
+    with tarfile.open(path, "r:") as archive:
+        members = [each for each in archive.getmembers() if each.isfile()]
+        meta = [each for each in members if each.name.endswith(META)]
+        data = [each for each in members if each.name.endswith(DATA)]
+        if len(meta) != 1 or len(data) != 1:
+            raise ValueError(f"an archive must have one recording; got {len(meta)}")
+        file = archive.extractfile(meta[0])
+        metadata = b"" if file is None or meta[0].size > MAX_META else file.read()
+    return metadata, path, data[0].offset_data, data[0].size
+
+
+def _beside(path: Path) -> tuple[bytes, Path, int, int]:
+    """Return metadata and samples of two files of the same name, as `_in_archive` does."""
     meta, data = path.with_suffix(META), path.with_suffix(DATA)
     if not meta.is_file():
         cure = "or read raw samples by --format and --rate"
@@ -86,14 +110,11 @@ def _beside(sigmf: Any, path: Path) -> Any:
         raise ValueError(f"{data.name} is missing: put it beside the metadata")
     if meta.stat().st_size > MAX_META:
         raise ValueError(f"the metadata must have at most {MAX_META} bytes")
-    recording = sigmf.SigMFFile(metadata=json.loads(meta.read_text("utf-8-sig")))
-    _check(recording, data.stat().st_size)
-    recording.set_data_file(data, skip_checksum=True)
-    return recording
+    return meta.read_bytes(), data, 0, data.stat().st_size
 
 
-def _check(recording: Any, n_bytes: int) -> None:
-    """Raise a ValueError if the fields are invalid, or do not fit the number of bytes."""
+def _checked(recording: Any, n_bytes: int) -> tuple[int, int]:
+    """Return number of channels and bytes of a sample; the fields must fit the number of bytes."""
     fields, captures = recording.get_global_info(), recording.get_captures()
     datatype = fields.get("core:datatype")
     if not (isinstance(datatype, str) and DATATYPE.fullmatch(datatype)):
@@ -110,6 +131,7 @@ def _check(recording: Any, n_bytes: int) -> None:
             f"expected at least {least} samples of {n_channels} channels, {datatype} ({frame} "
             f"bytes); got {n_bytes / frame:.8g}: copy the samples again"
         )
+    return n_channels, frame
 
 
 def _frequency(captures: Sequence[Mapping[str, Any]]) -> float | None:
