@@ -1,9 +1,10 @@
 """Track directions of arrival, and positions from signal strength.
 
 The parts live in four subpackages: `arrivals.motion_models`, `arrivals.measurement_models`,
-`arrivals.trackers` and `arrivals.scenarios`. `arrivals.read` reads a recording, `arrivals.track`
-tracks one in one call, `arrivals.locate` sources by readings of signal strength; `arrivals.plot`
-draws the result.
+`arrivals.trackers` and `arrivals.scenarios`. For recordings, `arrivals.read` reads one,
+`arrivals.check` checks its channels and the wiring of its array, `arrivals.track` tracks it in one
+call, `arrivals.locate` locates sources by readings of signal strength, `arrivals.plot` draws the
+result.
 """
 
 from importlib import import_module
@@ -11,14 +12,16 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from arrivals.plots.runs import plot
+    from arrivals.recordings.check import check
     from arrivals.recordings.readers import read
     from arrivals.recordings.readings.locating import locate
     from arrivals.recordings.tracking import track
 
 __version__ = "0.1.0"
-__all__ = ["__version__", "locate", "plot", "read", "track"]
+__all__ = ["__version__", "check", "locate", "plot", "read", "track"]
 
 LAZY = {
+    "check": "arrivals.recordings.check",
     "locate": "arrivals.recordings.readings.locating",
     "plot": "arrivals.plots.runs",
     "read": "arrivals.recordings.readers",

@@ -21,9 +21,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0; 2 for invalid input, with one line on standard error; 130 after an interrupt. If the
-        reader of standard output closes it, the program ends with status 0. With ARRIVALS_DEBUG=1
-        in the environment, an error prints its traceback too.
+        0; 1 if `arrivals check` finds a fault; 2 for invalid input, with one line on standard
+        error; 130 after an interrupt. If the reader of standard output closes it, the program ends
+        with status 0. With ARRIVALS_DEBUG=1 in the environment, an error prints its traceback too.
 
     Examples
     --------
@@ -57,10 +57,9 @@ def _run(argv: Sequence[str] | None) -> int:
             warnings.simplefilter("default", UserWarning)
         warnings.showwarning = _print_warning  # type: ignore[assignment]  # its first argument
         try:
-            run(argv)
+            return run(argv)
         except SystemExit as end:  # of -h and --version
             return end.code if isinstance(end.code, int) else 2 if end.code else 0
-    return 0
 
 
 def _print_warning(text: Warning | str, *_: Any, **__: Any) -> None:

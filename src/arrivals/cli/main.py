@@ -1,4 +1,4 @@
-"""Parser of the command line: track, demo, locate, reproduce, list."""
+"""Parser of the command line: track, check, demo, locate, reproduce, list."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from typing import Any, NoReturn
 
 import arrivals
 from arrivals import scenarios
+from arrivals.cli.check import add_check
 from arrivals.cli.locate import add_locate
 from arrivals.cli.track import track
 from arrivals.measurement_models.arrays.presets import preset_names, preset_summary
@@ -28,13 +29,18 @@ from arrivals.trackers import available, find
 DEMOS: dict[str, Callable[..., None]] = {"swellex96": demo, "brp2012": infrasound}
 
 
-def run(argv: Sequence[str] | None = None) -> None:
-    """Run the subcommand of the arguments.
+def run(argv: Sequence[str] | None = None) -> int:
+    """Run the subcommand of the arguments, and return its exit status.
 
     Parameters
     ----------
     argv : sequence of str, optional
         Arguments; those of the process if None.
+
+    Returns
+    -------
+    int
+        0, or 1 if `arrivals check` finds a fault.
 
     Raises
     ------
@@ -48,7 +54,7 @@ def run(argv: Sequence[str] | None = None) -> None:
     ValueError: the following arguments are required: --array (see arrivals track -h)
     """
     arguments = _parser().parse_args(argv)
-    arguments.command(arguments)
+    return int(arguments.command(arguments) or 0)
 
 
 class _Parser(argparse.ArgumentParser):
@@ -92,6 +98,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"arrivals {arrivals.__version__}")
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
     _add_track(commands)
+    add_check(commands)
     _add_demo(commands)
     add_locate(commands, _bar)
     add_reproduce(commands)
