@@ -7,6 +7,7 @@ import argparse
 from arrivals.cli.models import n_stream_channels, printed_warnings, read_recording
 from arrivals.cli.outputs import Bar, draw, live_output, refuse, write_table
 from arrivals.measurement_models import SensorArray
+from arrivals.recordings.check import warn_of_faults
 from arrivals.recordings.choice.assembly import make_tracker
 from arrivals.recordings.sample_stream import band_samples, live_samples, track_samples
 from arrivals.recordings.stream import track_live
@@ -29,6 +30,8 @@ def track_band(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -> N
     if recording.is_narrowband:
         raise ValueError(f"{arguments.file}: --band requires real samples; got complex ones")
     tracker, rate = _band_tracker(arguments, array, recording.rate)
+    with printed_warnings():
+        warn_of_faults(recording)
     samples = bar(recording.samples, desc=arguments.tracker)
     result = track_samples(tracker, samples, rate, every=arguments.hop or 1)
     write_table(result, arguments.out)

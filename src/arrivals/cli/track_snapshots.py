@@ -14,6 +14,7 @@ from arrivals.cli.models import n_stream_channels, printed_warnings, read_record
 from arrivals.cli.outputs import Bar, draw, live_output, refuse, write_table
 from arrivals.measurement_models import SensorArray
 from arrivals.measurements import is_missing
+from arrivals.recordings.check import warn_of_faults
 from arrivals.recordings.choice import Choice, MeanSpectrum, TrackOptions, choose
 from arrivals.recordings.choice.assembly import assembled
 from arrivals.recordings.formats.iq import complex_frames
@@ -57,6 +58,7 @@ def _track_file(
         choice = choice_for(recording, options)
         measurement, tracker = assembled(recording.array or array, choice, recording.rate)
         steps = RecordedSteps(recording, choice)
+        warn_of_faults(recording, min(choice.frequencies))
     time = steps.time if np.isfinite(steps.time).all() else None
     announced = map(_announcement(choice, options), steps)
     result = tracker.run(bar(announced, desc=choice.tracker, total=len(steps)))

@@ -6,7 +6,7 @@ import argparse
 
 import numpy as np
 
-from arrivals.cli.models import model_at, read_recording
+from arrivals.cli.models import model_at, printed_warnings, read_recording
 from arrivals.cli.outputs import Bar, draw, refuse, write_table
 from arrivals.cli.separated_signals import (
     analytic,
@@ -16,6 +16,7 @@ from arrivals.cli.separated_signals import (
     write_signals,
 )
 from arrivals.measurement_models import SensorArray
+from arrivals.recordings.check import warn_of_faults
 from arrivals.recordings.formats.file_contents import MAX_BYTES
 from arrivals.recordings.recording import Recording
 from arrivals.recordings.stored_samples import StoredSamples
@@ -72,6 +73,8 @@ def track_sources(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -
     rate = None if arguments.window else recording.rate
     if arguments.signals:
         check_writable(arguments.signals, real_valued, rate)
+    with printed_warnings():
+        warn_of_faults(recording, arguments.frequency)
     result = tracker.run(bar(z, desc=arguments.tracker))
     result = result if time is None else result.at(time)
     if arguments.signals:

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from arrivals.measurement_models import SensorArray
 from arrivals.measurement_models.arrays.files import given_array
 from arrivals.messages import similar
+from arrivals.recordings.check import warn_of_faults
 from arrivals.recordings.choice import Choice, MeanSpectrum, TrackOptions, choose
 from arrivals.recordings.choice.assembly import assembled, make_tracker, takes_samples
 from arrivals.recordings.framing import FramedSnapshots, frame_recording
@@ -50,7 +51,8 @@ def track(
 
     Whatever is not given is chosen from the array and the recording, as `choose` says: talkers and
     other wideband sources are tracked by `wideband_mixture` at all usable bins, in steps of 64 ms;
-    spectral lines, and sources below the frequencies of speech, by `svalse`.
+    spectral lines, and sources below the frequencies of speech, by `svalse`. A fault of a channel
+    or of the wiring, as in `check`, is a warning.
 
     Parameters
     ----------
@@ -104,6 +106,7 @@ def track(
     _check_arguments(more, choice.tracker)
     _, made = assembled(_array_of(recording), choice, recording.rate)
     steps = RecordedSteps(recording, choice)
+    warn_of_faults(recording, min(choice.frequencies))
     with threadpool_limits(1, "blas"):  # matrices are small: more threads only wait
         run = made.run(steps)
     return run.at(steps.time) if np.isfinite(steps.time).all() else run
@@ -129,6 +132,7 @@ def _track_band(recording: Recording, options: TrackOptions) -> Run:
             raise ValueError(f"{name} must be left out for {options.tracker!r}, of real samples")
     measurement = band_samples(array, rate, options.band)
     made = make_tracker(options.tracker or "", measurement, options.settings)
+    warn_of_faults(recording)
     return track_samples(made, recording.samples, rate, every=options.hop or 1)
 
 
