@@ -119,13 +119,13 @@ from arrivals.recordings import read
 
 counts = np.arange(-6, 6, dtype="<i4").reshape(4, 3)
 content = b"COUNTS 500 3\\n" + counts.tobytes()
-for name in ("a.counts", "a.dat", "cut.counts"):
+for name in ("a.counts", "a.data", "cut.counts"):
     with open(name, "wb") as file:
         file.write(content[:-1] if name.startswith("cut") else content)
 np.save("b.npy", counts)
 assert read("b.npy").n_channels == 3
 assert "counts_file" not in sys.modules, "it must be imported on demand only"
-for name in ("a.counts", "a.dat"):
+for name in ("a.counts", "a.data"):
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         recording = read(name)

@@ -113,7 +113,7 @@ def reproduce(
     --------
     >>> reproduce("interpolation-table9", "out")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
-    ValueError: name must be one of 'all', 'any-array', ...; got 'interpolation-table9'
+    ValueError: name must be one of 'all', 'any-array', ...; got 'interpolation-table9': did you ...
     """
     one_of("name", name, ("all", *STUDIES))
     if jobs != -1:
