@@ -111,8 +111,11 @@ def _kind_and_keys(keys: dict[str, Any]) -> tuple[str, dict[str, Any]]:
     allowed = (*required, *common, *(("height",) if is_geographic else ()))
     for key in keys:
         if key not in allowed:
-            hint = nearest(key, allowed)
+            others = GEOGRAPHIC if "positions" in required else ()
+            hint = nearest(key, (*allowed, *others))
             raise ValueError(f"an array of kind {name!r} has no key {key!r}: {hint}")
+    if preset.get("clockwise") and keys.get("clockwise") is False:
+        raise ValueError(f"clockwise must be true for {name!r}, as its elements are numbered")
     for key in required:
         if key not in keys:
             choice = ", or 'latitude' and 'longitude'" if key == "positions" else ""

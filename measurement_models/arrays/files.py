@@ -15,6 +15,7 @@ import numpy as np
 
 from arrivals.files import file_error, open_input
 from arrivals.measurement_models.arrays.description import from_description
+from arrivals.measurement_models.arrays.positions import UNITS
 from arrivals.measurement_models.arrays.presets import preset_names
 from arrivals.measurement_models.arrays.sensor_array import SensorArray
 from arrivals.measurement_models.arrays.stations import stations_array
@@ -136,29 +137,53 @@ def _line_of(error: ValueError, text: str) -> str:
 def from_csv(path: str | Path, *, speed: float | None = None) -> SensorArray:
     """Read positions in metres, one sensor a row, columns x, y, z as far as there are any.
 
-    A first row that holds no number is taken for a heading.
+    A first row that holds no number is a heading; columns other than x, y, z are left out then.
 
     Raises
     ------
     ValueError
-        If a row has no number where one is wanted, or rows differ in length.
+        If a row has no number where one is wanted, rows differ in length, or a heading has no x or
+        another unit.
     """
     with open_input(path) as file:
         data = file.read()
     try:
         lines = list(table_lines(data))
         rows = [_numbers(line) for line in lines]
+        n = len(rows[0]) if rows else 0
+        columns = list(range(n))
         if rows and not any(number is not None for number in rows[0]):
-            lines, rows = lines[1:], rows[1:]
+            columns, lines, rows = _axes(lines[0].cells), lines[1:], rows[1:]
         if not rows:
             raise ValueError("the file has no positions")
-        n = len(rows[0])
-        for line, row in zip(lines, rows, strict=True):
-            if len(row) != n or None in row:
-                raise ValueError(f"line {line.number} must have {n} numbers; got {line.cells}")
-        return SensorArray(np.array(rows, dtype=np.float64), speed)
+        places = [[row[k] for k in columns] if len(row) == n else [None] for row in rows]
+        for line, place in zip(lines, places, strict=True):
+            if None in place:
+                raise ValueError(
+                    f"line {line.number} must have {len(columns)} numbers; got {line.cells}"
+                )
+        return SensorArray(np.array(places, dtype=np.float64), speed)
     except ValueError as error:
         raise file_error(path, error) from None
+
+
+def _axes(heading: list[str]) -> list[int]:
+    """Return the columns of x, y and z."""
+    names = ["".join(filter(str.isalnum, cell.lower())) for cell in heading]
+    axes = sorted((name, k) for k, name in enumerate(names)
+                  if name[:1] in ("x", "y", "z") and name[1:] in ("", *UNITS))  # fmt: skip
+    if not axes:
+        raise ValueError(
+            f"the heading must have x, y, z; got {shown(heading)}: latitudes and longitudes are "
+            "keys of a TOML file"
+        )
+    for name, k in axes:
+        if name[1:] not in ("", "m"):
+            raise ValueError(
+                f"positions of a table must be in metres; got {heading[k]!r}: name the column "
+                f"{name[0]}, and write a TOML file with positions = the table and unit"
+            )
+    return [k for _, k in axes]
 
 
 def _numbers(line: TableLine) -> list[float | None]:

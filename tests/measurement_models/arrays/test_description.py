@@ -122,6 +122,8 @@ GEO = {"kind": "positions", "latitude": [1.0, 2.0], "longitude": [3.0, 4.0]}
         ({**KINDS[0], "clockwise": True}, "clockwise must be left out for a line"),
         ({**KINDS[1], "clockwise": "yes"}, "clockwise must be true or false; got 'yes'"),
         ({**KINDS[1], "rotation": "north"}, "rotation must be a number; got 'north'"),
+        ({"kind": "positions", "lat": [1.0]}, "no key 'lat': did you mean latitude?"),
+        ({"kind": "kraken-5", "radius": 1, "clockwise": False}, "clockwise must be true for 'krak"),
         ({**KINDS[1], "roation": 3}, "kind 'uca' has no key 'roation': did you mean rotation?"),
         ({"kind": "uca", "n_sensors": 4, "raduis": 1}, "no key 'raduis': did you mean radius?"),
         ({"kind": "circle"}, "got 'circle': known: kinect-360, "),

@@ -146,6 +146,7 @@ def csv(path: Path, content: bytes) -> Path:
         (b"x;y\r\n0;1,5\r\n2,25;3\r\n", [[0.0, 1.5], [2.25, 3.0]]),
         (b'"x"\t"y"\n# metres\n0\t"1"\n', [[0.0, 1.0]]),
         ("x,y\n0,1\n".encode("utf-16"), [[0.0, 1.0]]),
+        (b"mic,y [m],x [m]\n1,0.5,2\nb,3,4\n", [[2.0, 0.5], [4.0, 3.0]]),
     ],
 )
 def test_positions_from_a_table(
@@ -160,6 +161,9 @@ def test_positions_from_a_table(
     [
         (b"", "has no positions"),
         (b"x,y\n", "has no positions"),
+        (b"name,lat,lon\na,1,2\n", r"must have x, y, z; got .*: latitudes and longitudes are keys"),
+        (b"x_cm,y_cm\n1,2\n", "must be in metres; got 'x_cm': name the column x, and write"),
+        (b"mic,x\n1\n", r"line 2 must have 1 numbers; got \['1'\]"),
         (b"0,1\n2\n", r"line 2 must have 2 numbers; got \['2'\]"),
         (b"0,1\n2,b\n", "line 2 must have 2 numbers"),
         (b"0,1\n0,1\n", "numbers 1 and 2 of"),
