@@ -108,7 +108,7 @@ def test_table_of_steps_may_have_devices_and_windows(tmp_path: Path) -> None:
     network = located.networks["tag 1"]
     np.testing.assert_allclose(network.rss_db[0], np.mean([rows[1][2:], rows[3][2:]], axis=0))
     np.testing.assert_allclose(network.time[:2], [0.5, 1.5])
-    assert "240 readings averaged" in located.understood
+    assert "sensor and step: 240" in located.understood
 
 
 def survey(seed: int = 1) -> tuple[Float, list[dict[str, Any]]]:
@@ -267,3 +267,18 @@ def test_loss_exponent_is_chosen_where_the_number_of_sources_is_known() -> None:
 def test_invalid_arguments_raise_one_line(arguments: dict[str, Any], message: str) -> None:
     with pytest.raises((ValueError, TypeError), match=message):
         arrivals.locate(**{"readings": levels()[0], "sensors": PLACES, **arguments})
+
+
+def test_levels_without_a_sign_raise_a_warning(tmp_path: Path) -> None:
+    rows = [(*row[:2], -row[2]) for row in ROWS]
+    with pytest.warns(UserWarning, match="above 20 dB: if they are dBm without their sign"):
+        arrivals.locate(written(tmp_path, text(LONG, rows)), sensors(tmp_path), alpha=2.5)
+
+
+def test_steps_in_which_a_source_leaves_the_network_raise_a_warning(tmp_path: Path) -> None:
+    rows = [(1000 * row[0], *row[1:]) for row in ROWS]
+    path = written(tmp_path, text(LONG, rows))
+    with pytest.warns(UserWarning, match=r"in the 1000 s between steps, .*check the unit of time"):
+        arrivals.locate(path, sensors(tmp_path), alpha=2.5)
+    path.write_text(text(("time_ms", *LONG[1:]), rows))
+    assert error(arrivals.locate(path, sensors(tmp_path), alpha=2.5).run) < 2.5

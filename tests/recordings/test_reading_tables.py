@@ -32,6 +32,14 @@ def assert_same(one: Network, other: Network) -> None:
         np.testing.assert_array_equal(getattr(one, part), getattr(other, part))
 
 
+def test_windows_do_not_depend_on_duplicates() -> None:
+    rng = np.random.default_rng(0)
+    time, sensor = np.sort(rng.uniform(0, 60, 300)), rng.integers(0, len(NAMES), 300)
+    once = SingleReadings(time, sensor, -time, NAMES, PLACES)
+    twice = once.select(np.repeat(np.arange(300), 2))
+    assert scattered_window(twice, 1.5) == scattered_window(once, 1.5) == 2.0
+
+
 def test_one_row_a_reading_is_the_same_network_as_one_row_a_step(tmp_path: Path) -> None:
     assert_same(read(tmp_path, text(LONG, ROWS)), read(tmp_path, wide(ROWS)))
 
@@ -121,7 +129,7 @@ def test_readings_of_one_sensor_at_one_time_are_averaged(tmp_path: Path) -> None
 
 def test_sensors_outside_the_table_are_left_out_with_a_warning(tmp_path: Path) -> None:
     rows = [*ROWS, (0, "other", -30), (1, "other", -30), (1, "another", -30)]
-    with pytest.warns(UserWarning, match="3 readings of 2 sensors .* left out: 'other', 'another'"):
+    with pytest.warns(UserWarning, match=r"3 readings are left out, .* \(2\): 'other', 'another'"):
         network = read(tmp_path, text(LONG, rows))
     assert_same(network, read(tmp_path, text(LONG, ROWS)))
 

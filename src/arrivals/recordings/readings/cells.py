@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -14,6 +15,7 @@ from arrivals.tables import TableRow
 from arrivals.typing import Float
 
 MAX_LEVEL_DB = 340.0  # 39 Np: levels beyond are no measurements
+LEAST_UNSIGNED_DB = 20.0  # dBm without their sign are above
 SHOWN = 3  # names in a message
 
 
@@ -69,15 +71,16 @@ def some(names: Sequence[str]) -> str:
 
 
 def checked(level: Float, missing: Sequence[float]) -> Float:
-    """Return levels of a receiver, NaN where they are missing."""
-    return in_range(without(level, missing))
-
-
-def in_range(rss_db: Float) -> Float:
-    """Return levels, dB, if they can be those of a receiver."""
+    """Return levels of a receiver, dB, NaN where they are missing."""
+    rss_db = without(level, missing)
     valid = rss_db[np.isfinite(rss_db)]
     worst = valid[np.abs(valid).argmax()] if valid.size else 0.0
     if abs(worst) > MAX_LEVEL_DB:
         cure = f"pass missing=[{worst:g}] (--missing {worst:g}) if it stands for a missing reading"
         raise ValueError(f"rss_db must lie within ±{MAX_LEVEL_DB:g} dB; got {worst:g}: {cure}")
+    if valid.size and valid.min() > LEAST_UNSIGNED_DB:
+        warnings.warn(
+            f"all levels are above {LEAST_UNSIGNED_DB:g} dB: if they are dBm without their sign, "
+            "strong readings count as weak; write the sign", stacklevel=2
+        )  # fmt: skip
     return rss_db

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.signal_strength.fill_values import without
 from arrivals.measurements import real_numbers
-from arrivals.recordings.readings.cells import in_range, some
+from arrivals.recordings.readings.cells import checked, some
 from arrivals.recordings.readings.located import Located
 from arrivals.recordings.readings.network import Network
 from arrivals.recordings.readings.network_files import read_npz
@@ -148,9 +148,9 @@ def _network(readings: Any, sensors: Any, time: ArrayLike | None, missing: list[
     if sensors is None:
         raise ValueError("levels require the positions of the sensors")
     table = sensor_table(sensors)
-    levels = without(real_numbers("readings", readings), missing)
+    levels = checked(real_numbers("readings", readings), missing)
     times = None if time is None else real_numbers("time", time)
-    return Network.fixed(table.name, table.positions, in_range(levels), times)
+    return Network.fixed(table.name, table.positions, levels, times)
 
 
 def _in_steps(
@@ -172,7 +172,7 @@ def _in_steps(
     n_readings = sum(int(np.isfinite(each.level).sum()) for each in parts.values())
     n_averaged = n_readings - sum(int(np.isfinite(one.rss_db).sum()) for one in networks.values())
     if n_averaged:
-        phrases.append(f"{n_averaged} readings averaged with others of their sensor and step")
+        phrases.append(f"readings averaged with others of their sensor and step: {n_averaged}")
     plane = next(iter(networks.values())).plane
     if plane is not None:
         phrases.append(f"x, y from {plane.lat:.6f}, {plane.lon:.6f}")

@@ -9,11 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from arrivals.files import open_input
-from arrivals.measurement_models.signal_strength.fill_values import without
 from arrivals.measurements import real_numbers
 from arrivals.recordings.formats.file_contents import MAX_BYTES, check_size
 from arrivals.recordings.formats.numpy_files import numpy_arrays
-from arrivals.recordings.readings.cells import in_range
+from arrivals.recordings.readings.cells import checked
 from arrivals.recordings.readings.network import Network
 from arrivals.recordings.readings.sensor_tables import named
 from arrivals.recordings.readings.steps import as_network
@@ -88,5 +87,5 @@ def read_npz(path: str | PathLike[str], missing: Sequence[float] = ()) -> Networ
         sensors = np.broadcast_to(sensors, (*rss_db.shape, 2))
         name = held.get("sensor_name", np.arange(rss_db.shape[1])).astype(str).ravel().tolist()
         time = held.get("time", np.arange(float(len(rss_db))))
-        rss_db = in_range(without(rss_db, missing))
+        rss_db = checked(rss_db, missing)
         return Network(tuple(name), time, rss_db, sensors, held.get("tx_xy"))

@@ -82,7 +82,7 @@ def scattered_window(readings: SingleReadings, speed: float) -> float | None:
     >>> scattered_window(readings, 1.5)
     1.0
     """
-    time, sensor = readings.time, readings.sensor
+    time, sensor = np.unique(np.stack([readings.time, readings.sensor]), axis=1)  # no duplicates
     if readings.static_source or len(time) > MAX_SCATTERED * len(np.unique(time)):
         return None
     order = np.lexsort((time, sensor))

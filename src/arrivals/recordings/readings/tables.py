@@ -112,9 +112,10 @@ def _is_wide(cells: Cells, table: SensorTable) -> bool:
     if "level" in found and {"sensor", "access point", "device"} & set(found):
         return False
     if len(unknown) < len(columns):
+        time = "" if {"time", "date"} & set(found) else "; the column of times is 'time_s'"
         raise ValueError(
             f"the sensor {unknown[0]!r} is not in the table of sensors: remove the column, or "
-            "add the sensor there"
+            f"add the sensor there{time}"
         )
     raise ValueError(
         f"the columns {', '.join(cells.columns)} are neither sensors nor understood: a table has "
@@ -132,7 +133,7 @@ def _wide(cells: Cells, table: SensorTable, missing: Sequence[float]) -> ReadTab
     if "time" in cells.found:
         time, start, phrase = times(cells)
     else:
-        time, start, phrase = np.arange(float(len(levels))), None, "steps without times"
+        time, start, phrase = np.arange(float(len(levels))), None, "no times: steps of 1 s"
     sensor = np.array([find(index, name) for name in columns], dtype=np.int64)
     n = len(columns)
     readings = SingleReadings(
@@ -165,8 +166,8 @@ def _long(cells: Cells, table: SensorTable, missing: Sequence[float]) -> ReadTab
         foreign = [one for one, is_known in zip(cells.texts(column), valid, strict=True)
                    if not is_known]  # fmt: skip
         warnings.warn(
-            f"{len(foreign)} readings of {len(set(foreign))} sensors that are not in the table of "
-            f"sensors are left out: {some(foreign)}", stacklevel=4
+            f"{len(foreign)} readings are left out, of sensors that are not in the table of "
+            f"sensors ({len(set(foreign))}): {some(foreign)}", stacklevel=4
         )  # fmt: skip
     device = cells.device_column(column)
     time, start, phrase = times(cells)

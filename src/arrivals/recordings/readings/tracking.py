@@ -145,6 +145,13 @@ def locate_sources(
             f"got {n_sources}"
         )
     warn_fill_values(network.rss_db)
+    between = float(np.median(np.diff(network.time))) if len(network) > 1 else 0.0
+    if between * source.speed > network.extent:
+        warnings.warn(
+            f"in the {between:g} s between steps, a source of --speed {source.speed:g} m/s leaves "
+            f"the network of {network.extent:g} m: check the unit of time (time_ms) and --speed",
+            stacklevel=2,
+        )
     model = path_loss.model(network)
     run = _track(
         kind(
