@@ -259,9 +259,11 @@ def test_loss_exponent_is_chosen_where_the_number_of_sources_is_known() -> None:
         ({"window": 0.0}, "window must be finite and positive"),
         ({"sensors": None}, "levels require the positions of the sensors"),
         ({"sensors": np.zeros(3)}, r"sensors must have shape \(n_sensors, 2\)"),
-        ({"time": [0.0]}, "time must have|rss_db must have shape"),
+        ({"time": [0.0]}, r"time must have shape \(\d+,\); got \(1,\)"),
+        ({"sensors": np.eye(2)}, r"readings must have shape \(n_steps, 2\), a column for each"),
+        ({"readings": np.ones(12)}, r"readings must have shape \(n_steps, 12\)"),
         ({"readings": Network.fixed("ab", np.eye(2), np.ones((2, 2)))}, "must be left out where"),
-        ({"beta": 1.0}, "locate has no argument 'beta': others are tracker, progress, alpha"),
+        ({"n_source": 1}, "locate has no argument 'n_source': did you mean n_sources?"),
     ],
 )
 def test_invalid_arguments_raise_one_line(arguments: dict[str, Any], message: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import fields, replace
@@ -14,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.signal_strength.fill_values import without
 from arrivals.measurements import real_numbers
+from arrivals.messages import nearest
 from arrivals.recordings.readings.cells import checked, some
 from arrivals.recordings.readings.located import Located
 from arrivals.recordings.readings.network import Network
@@ -128,7 +130,8 @@ def _settings(more: dict[str, Any]) -> tuple[PathLossSettings, SourceSettings]:
     names = ["tracker", "progress", *known[0], *known[1]]
     unknown = sorted(set(more) - set(names))
     if unknown:
-        raise TypeError(f"locate has no argument {unknown[0]!r}: others are {', '.join(names)}")
+        hint = nearest(unknown[0], {*inspect.signature(locate).parameters, *names} - {"more"})
+        raise TypeError(f"locate has no argument {unknown[0]!r}: {hint}")
     parts = [{name: more.pop(name) for name in each if name in more} for each in known]
     return PathLossSettings(**parts[0]), SourceSettings(**parts[1])
 
@@ -149,7 +152,13 @@ def _network(readings: Any, sensors: Any, time: ArrayLike | None, missing: list[
         raise ValueError("levels require the positions of the sensors")
     table = sensor_table(sensors)
     levels = checked(real_numbers("readings", readings), missing)
+    n_sensors = len(table.name)
+    if levels.ndim != 2 or levels.shape[1] != n_sensors:
+        wanted = f"(n_steps, {n_sensors}), a column for each sensor"
+        raise ValueError(f"readings must have shape {wanted}; got {levels.shape}")
     times = None if time is None else real_numbers("time", time)
+    if times is not None and times.shape != levels.shape[:1]:
+        raise ValueError(f"time must have shape {levels.shape[:1]}; got {times.shape}")
     return Network.fixed(table.name, table.positions, levels, times)
 
 
