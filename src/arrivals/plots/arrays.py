@@ -50,7 +50,7 @@ def plot_array(
     --------
     >>> plot_array(SensorArray.ula(8, spacing=0.5)).get_xlabel()
     'position, m'
-    >>> plot_array(SensorArray.from_file("uma-8"), clockwise=True).get_ylabel()
+    >>> plot_array(SensorArray.uca(5, radius=0.3), clockwise=True).get_ylabel()
     'north, m'
     """
     ax = new_axes((5.0, 1.9) if array.dim == 1 else (3.6, 3.6), array.dim) if ax is None else ax
