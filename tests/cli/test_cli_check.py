@@ -70,3 +70,43 @@ def test_track_prints_a_warning_line_a_fault(
             "arrivals: warning: channel 3 is silent: connect its sensor, or add missing = [3] "
             "to the array file"
         ]
+
+
+def test_check_takes_the_files_of_track(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rng = np.random.default_rng(0)
+    z = rng.standard_normal((4000, 8)) + 1j * rng.standard_normal((4000, 8))
+    z[:, 5] = 0
+    np.save(files / "z.npy", z)
+    z.astype("c8").tofile(files / "z.bin")
+    for i, channel in enumerate(z.T):
+        channel.astype("c8").tofile(files / f"z{i}.cf32")
+    options = ["--array", "array.toml", "--rate", "4000", "--center", "900"]
+    texts = []
+    for names in (
+        ["z.npy"],
+        ["z.bin", "--format", "cf32"],
+        ["z.bin", "--format", "cf32", "--channels", "8"],
+        [f"z{i}.cf32" for i in range(8)],
+    ):
+        assert main(["check", *names, *options]) == 1
+        texts.append(capsys.readouterr().out)
+    assert "FAULT: channel 6 is silent" in texts[0]
+    assert texts == texts[:1] * 4
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("-",), "FILE must be a file, not standard input"),
+        (("noise.wav", "--center", "9"), "--center requires complex samples; got real ones"),
+        (("noise.wav", "--center", "9", "--frequency", "9"), "pass only one of"),
+        (("noise.wav", "--channels", "7"), "the number of channels must be 8"),
+        (("noise.wav", "--variable", "x"), "without named arrays"),
+        (("noise.wav", "b.txt", "--out", "b.txt"), "must be different files"),
+    ],
+)
+def test_check_refuses_options_of_files_that_do_not_fit(
+    arguments: tuple[str, ...], words: str, files: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (files / "b.txt").write_text("1\n")
+    assert_rejected(["check", *arguments], capsys, files, words)

@@ -235,3 +235,8 @@ def test_track_warns_of_a_fault_and_not_without() -> None:
     with pytest.warns(UserWarning, match="channel 5 is inverted"):
         arrivals.track(recording, frequencies=[1000.0, 2000.0], tracker="cbf")
     arrivals.track(TALK, CIRCLE, rate=RATE, frequencies=[1000.0, 2000.0], tracker="cbf")
+
+
+def test_misspelt_argument_is_refused_with_the_right_one() -> None:
+    with pytest.raises(TypeError, match="check has no argument 'rat': did you mean rate"):
+        check(TALK, CIRCLE, rat=RATE)

@@ -135,3 +135,18 @@ def test_wave_across_stations_is_tracked_in_compass_bearings(tmp_path: Path) -> 
     bearings = np.rad2deg(run.doa[np.isfinite(run.doa)]) % 360
     assert len(bearings) > 5
     assert abs(np.median(bearings) - 305) < 2
+
+
+def test_check_names_the_channels_of_stations(tmp_path: Path) -> None:
+    silent = np.zeros(2000, "i4")
+    path = write(
+        tmp_path / "a.mseed",
+        ("XX.A..SHZ", 0, X[:, 0]), ("XX.B..SHZ", 0, silent), ("XX.C..SHZ", 0, X[:, 2]),
+    )  # fmt: skip
+    (tmp_path / "s.csv").write_text("name,x_m,y_m\nC,0,0\nB,900,0\nD,0,900\n")
+    keys = 'kind = "stations"\nstations = "s.csv"\nspeed = 6000.0\n'
+    (tmp_path / "array.toml").write_text(keys)
+    with pytest.warns(UserWarning, match="are left out"):
+        report = arrivals.check(path, tmp_path / "array.toml")
+    assert [each.channel for each in report.channels] == [3, 2]
+    assert [(each.kind, each.channels) for each in report.faults] == [("silent", (2,))]

@@ -6,8 +6,11 @@ import argparse
 import sys
 from typing import Any
 
-from arrivals.cli.outputs import check_different
+from arrivals.cli.models import printed_warnings
+from arrivals.cli.outputs import check_different, input_files
+from arrivals.cli.reading import add_reading, read_recording
 from arrivals.files import atomic_write, check_output
+from arrivals.measurement_models.arrays.files import given_array
 from arrivals.recordings.check import check
 
 
@@ -28,15 +31,11 @@ def add_check(commands: Any) -> None:
         allow_abbrev=False,
     )
     option = add.add_argument
-    option("file", metavar="FILE", help="recording")
+    add_reading(option)
     option("--array", metavar="ARRAY", help="array file, or name of a preset (none: levels alone)")
     option("--json", action="store_true", help="print numbers, faults and notes as JSON")
     option("--out", metavar="FILE", help="write the report to a file (standard output)")
     option("--frequency", type=float, metavar="HZ", help="frequency of complex snapshots")
-    option("--rate", type=float, metavar="HZ",
-           help="samples per second, if the file does not contain it")  # fmt: skip
-    option("--variable", metavar="NAME", help="name of the array in an npz or mat file")
-    option("--transpose", action="store_true", help="rows of the file are channels")
     add.set_defaults(command=check_recording)
 
 
@@ -54,13 +53,18 @@ def check_recording(arguments: argparse.Namespace) -> int:
         1 if there is a fault, else 0.
     """
     if arguments.out:
-        check_different("--out, the recording and the array file", arguments.out, arguments.file,
-                        arguments.array)  # fmt: skip
+        check_different("--out, the recording and the array file", arguments.out, arguments.array,
+                        *input_files(arguments))  # fmt: skip
         check_output(arguments.out)
-    report = check(
-        arguments.file, arguments.array, frequency=arguments.frequency, rate=arguments.rate,
-        variable=arguments.variable, transpose=arguments.transpose,
-    )  # fmt: skip
+    if arguments.file == "-":
+        raise ValueError("FILE must be a file, not standard input: write the samples to one")
+    if arguments.frequency is not None and arguments.center is not None:
+        raise ValueError("pass only one of --frequency and --center")
+    frequency = arguments.frequency if arguments.center is None else arguments.center
+    array = given_array(arguments.array)
+    recording = read_recording(arguments, array, every_channel=True)
+    with printed_warnings():
+        report = check(recording, array, frequency=frequency)
     text = (report.to_json() if arguments.json else str(report)) + "\n"
     if arguments.out:
         with atomic_write(arguments.out) as file:

@@ -16,6 +16,7 @@ import arrivals
 from arrivals import scenarios
 from arrivals.cli.check import add_check
 from arrivals.cli.locate import add_locate
+from arrivals.cli.reading import add_reading
 from arrivals.cli.track import track
 from arrivals.measurement_models.arrays.presets import preset_names, preset_summary
 from arrivals.messages import shown, similar
@@ -79,15 +80,6 @@ class _Parser(argparse.ArgumentParser):
             raise argparse.ArgumentError(action, listed + similar(value, choices))
 
 
-class _Files(argparse.Action):
-    """One file by its name, several by a list."""
-
-    def __call__(self, parser: Any, namespace: Any, values: Any, option: Any = None) -> None:
-        if len(values) > 1 and "-" in values:
-            raise ValueError("standard input (-) must be the only file")
-        setattr(namespace, self.dest, values[0] if len(values) == 1 else values)
-
-
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(
         prog="arrivals",
@@ -120,18 +112,10 @@ def _add_track(commands: Any) -> None:
         allow_abbrev=False,
     )
     option = add.add_argument
-    option("file", metavar="FILE", nargs="+", action=_Files,
-           help="recording; several files have the channels of one; - for samples from "
-                "standard input")  # fmt: skip
+    add_reading(option, "; - for samples from standard input")
     option("--array", required=True, metavar="ARRAY",
            help="array file (TOML, JSON), or the name of a preset in `arrivals list`")  # fmt: skip
     option("--frequency", type=float, metavar="HZ", help="frequency of narrowband sources")
-    option(
-        "--center",
-        type=float,
-        metavar="HZ",
-        help="centre frequency of complex samples (IQ), if the file does not contain it",
-    )
     option(
         "--frequencies",
         nargs="+",
@@ -167,28 +151,12 @@ def _add_track(commands: Any) -> None:
            help="write separated source signals (WAV or npy); needs a tracker that "
                 "estimates signals")  # fmt: skip
     option("--plot", metavar="PNG", help="draw the tracks over the beam power")
-    option(
-        "--rate",
-        type=float,
-        metavar="HZ",
-        help="samples per second, if the file does not contain it",
-    )
     option("--window", type=int, metavar="N", help="length of a window, samples")
     option("--hop", type=int, metavar="N",
            help="samples between windows (the window), or between output lines of real "
                 "samples (1)")  # fmt: skip
-    option("--variable", metavar="NAME", help="name of the array in a file of several")
-    option("--transpose", action="store_true", help="rows of the file are channels")
-    option("--format", metavar="NAME",
-           help="format of a file, in place of its suffix, such as cs16 of raw IQ")  # fmt: skip
     option("--dtype", choices=(*DTYPES, *RAW_TYPES),
            help="sample type of raw standard input (int16)")  # fmt: skip
-    option(
-        "--channels",
-        type=int,
-        metavar="N",
-        help="number of channels of standard input or a raw file (those of the array)",
-    )
     option("--quiet", action="store_true", help="hide the progress bar")
     add.set_defaults(command=lambda arguments: track(arguments, _bar(_is_quiet(arguments))))
 

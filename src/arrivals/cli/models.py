@@ -11,12 +11,9 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from arrivals.cli.outputs import refuse
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.measurement_models.arrays.files import TABLES
 from arrivals.recordings.choice.assembly import measurement_at
-from arrivals.recordings.readers import read
-from arrivals.recordings.recording import Recording
 from arrivals.validation import count
 
 
@@ -39,21 +36,6 @@ def require_speed(array: SensorArray, arguments: argparse.Namespace) -> None:
             f"{arguments.array}: the key 'speed' is missing: "
             f"a frequency requires the wave speed, m/s: {cure}"
         )
-
-
-def read_recording(arguments: argparse.Namespace, array: SensorArray) -> Recording:
-    """Return the recording of the files of the arguments, for the sensors of the array."""
-    refuse(arguments, ("dtype",), "requires samples from standard input")
-    form = arguments.format
-    if arguments.channels is not None:
-        form = f"{form or ''}:{arguments.channels}"
-    with printed_warnings():
-        recording = read(arguments.file, rate=arguments.rate, variable=arguments.variable,
-                         transpose=arguments.transpose, array=array, rate_required=True,
-                         format=form)  # fmt: skip
-    if arguments.center is not None and not recording.is_narrowband:
-        raise ValueError("--center requires complex samples; got real ones: pass --frequency")
-    return recording
 
 
 @contextmanager

@@ -36,10 +36,11 @@ def standard_input(arguments: argparse.Namespace) -> Iterator[None]:
     Raises
     ------
     ValueError
-        If arguments contradict the header.
+        If arguments contradict the header, or are for standard input alone.
     """
     arguments.source = None
     if arguments.file != "-":
+        refuse(arguments, ("dtype",), "requires samples from standard input")
         yield
         return
     head = sys.stdin.buffer.read(HEAD)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import argparse
 
-from arrivals.cli.models import n_stream_channels, printed_warnings, read_recording
+from arrivals.cli.models import n_stream_channels, printed_warnings
 from arrivals.cli.outputs import Bar, draw, live_output, refuse, write_table
+from arrivals.cli.reading import read_recording
 from arrivals.measurement_models import SensorArray
 from arrivals.recordings.check import warn_of_faults
 from arrivals.recordings.choice.assembly import make_tracker

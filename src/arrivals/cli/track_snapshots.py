@@ -10,8 +10,9 @@ from typing import BinaryIO
 
 import numpy as np
 
-from arrivals.cli.models import n_stream_channels, printed_warnings, read_recording, require_speed
+from arrivals.cli.models import n_stream_channels, printed_warnings, require_speed
 from arrivals.cli.outputs import Bar, draw, live_output, refuse, write_table
+from arrivals.cli.reading import read_recording
 from arrivals.measurement_models import SensorArray
 from arrivals.measurements import is_missing
 from arrivals.recordings.check import warn_of_faults

@@ -6,8 +6,9 @@ import argparse
 
 import numpy as np
 
-from arrivals.cli.models import model_at, printed_warnings, read_recording
+from arrivals.cli.models import model_at, printed_warnings
 from arrivals.cli.outputs import Bar, draw, refuse, write_table
+from arrivals.cli.reading import read_recording
 from arrivals.cli.separated_signals import (
     analytic,
     check_writable,

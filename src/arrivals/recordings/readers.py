@@ -33,6 +33,7 @@ from arrivals.recordings.stored_samples import StoredSamples
 from arrivals.typing import Float
 from arrivals.validation import positive
 
+READING = ("rate", "variable", "transpose", "max_bytes", "format")  # of `track` and `check`, too
 LOADED_AT_ONCE = 2**26  # bytes of samples that are loaded from the file when it is read: 64 MB
 
 
@@ -115,28 +116,69 @@ def read(
     >>> recording.n_channels, recording.rate, recording.duration
     (4, 1000.0, 0.5)
     """
+    options = ReadingOptions(variable, transpose, max_bytes, rate_required, format)
+    return _read(path, rate, options, array, select=True)
+
+
+def read_channels(
+    path: Any, array: SensorArray | None, *, rate: float | None = None, **options: Any
+) -> Recording:
+    """Read all channels of a recording, whether they fit an array or not.
+
+    Parameters
+    ----------
+    path : str, path, sequence of them, or array_like
+        As in `read`.
+    array : SensorArray or None
+        Number of channels of a file that has no header.
+    rate : float, optional
+        As in `read`.
+    **options : object
+        `variable`, `transpose`, `max_bytes` and `format` of `read`.
+
+    Returns
+    -------
+    Recording
+        Without an array.
+
+    Examples
+    --------
+    >>> read_channels(np.ones((10, 4)), SensorArray.ula(3, spacing=0.5), rate=8.0).n_channels
+    4
+    """
+    return _read(path, rate, ReadingOptions(**options), array, select=False)
+
+
+def _read(
+    path: Any,
+    rate: float | None,
+    options: ReadingOptions,
+    array: SensorArray | None,
+    *,
+    select: bool,
+) -> Recording:
     if rate is not None:
         positive("rate", rate)
-    paths = file_names(path)
-    form, n_channels = raw_layout(format, array if len(paths) == 1 else None)
-    options = ReadingOptions(
-        variable, transpose, max_bytes, rate_required and rate is None, form, n_channels
-    )
+    paths, given = file_names(path), options.format or ""
+    form, n_channels = raw_layout(options.format, array if len(paths) == 1 else None)
+    is_missing = options.rate_required and rate is None
+    options = replace(options, rate_required=is_missing, format=form, n_channels=n_channels)
+    array = array if select else None
     if not paths:
         contents = FileContents(numbers("samples", path))
         return _recording(contents, rate, options, array)
     several = [_opened(each, options) for each in paths]
     try:
-        if ":" in (format or ""):
+        if ":" in given:
             check_channels([contents for contents, _ in several], n_channels)
-        contents = joined([contents for contents, _ in several], paths, transpose=transpose)
+        contents = joined([contents for contents, _ in several], paths, transpose=options.transpose)
         recording = _recording(contents, rate, options, array)
     except Exception as error:
         has_name = any(str(error).startswith(f"{each}: ") for each in paths)
         raise error if has_name else file_error(paths[0], error) from error
     for each, (_, notes) in zip(paths, several, strict=True):
         for note in notes:
-            warnings.warn(f"{each}: {note}", stacklevel=2)
+            warnings.warn(f"{each}: {note}", stacklevel=3)
     return recording
 
 

@@ -19,7 +19,7 @@ from arrivals.recordings.choice import Choice, MeanSpectrum, TrackOptions, choos
 from arrivals.recordings.choice.assembly import assembled, make_tracker, takes_samples
 from arrivals.recordings.framing import FramedSnapshots, frame_recording
 from arrivals.recordings.narrowband import check_frequency, default_window
-from arrivals.recordings.readers import read
+from arrivals.recordings.readers import READING, read
 from arrivals.recordings.recording import Recording
 from arrivals.recordings.sample_stream import band_samples, track_samples
 from arrivals.recordings.step_snapshots import (
@@ -32,7 +32,6 @@ from arrivals.trackers.run import Run
 from arrivals.typing import Complex
 
 BLOCK = 2**20  # samples, or complex numbers of the steps, that are processed together: 16 MB
-READING = ("rate", "variable", "transpose", "max_bytes", "format")  # arguments of `read`
 
 
 def track(

@@ -11,6 +11,8 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models import SensorArray
 from arrivals.measurement_models.arrays.files import given_array
+from arrivals.measurement_models.arrays.stations import StationArray
+from arrivals.messages import similar
 from arrivals.recordings.check.array_channels import ArrayChannels
 from arrivals.recordings.check.faults import (
     level_faults,
@@ -29,7 +31,7 @@ from arrivals.recordings.check.levels import (
 from arrivals.recordings.check.report import ChannelCheck, CheckReport, Fault
 from arrivals.recordings.check.wiring_result import SHORT, Effort
 from arrivals.recordings.choice.limits import alias_frequency
-from arrivals.recordings.readers import read
+from arrivals.recordings.readers import READING, read_channels
 from arrivals.recordings.recording import Recording
 from arrivals.typing import Float
 from arrivals.validation import positive
@@ -52,9 +54,9 @@ def check(
         Array file, preset or array; that of the recording if None. Without, levels alone are
         checked.
     frequency : float, optional
-        Frequency of complex snapshots, Hz.
+        Frequency of complex snapshots, Hz; that of the recording if None.
     **reading : object
-        `rate`, `variable`, `transpose` and `max_bytes` of `read`.
+        `rate`, `variable`, `transpose`, `max_bytes` and `format` of `read`.
 
     Returns
     -------
@@ -86,13 +88,19 @@ def check(
     """
     array = given_array(array)
     if not isinstance(recording, Recording):
-        recording = read(recording, **reading)
+        for name in reading:
+            if name not in READING:
+                raise TypeError(f"check has no argument {name!r}{similar(name, READING)}")
+        recording = read_channels(recording, array, **reading)
     elif reading:
         raise TypeError(f"{', '.join(reading)} must be left out for a Recording, which has its own")
     if frequency is not None:
         positive("frequency", frequency)
         if not recording.is_narrowband:
             raise ValueError("frequency must be None for real samples, which contain it")
+    if isinstance(array, StationArray):
+        array = array.matched(recording.names)
+    frequency = recording.frequency if frequency is None else frequency
     is_selected = array is None or array == recording.array
     return _report(recording, recording.array if is_selected else array, frequency, Effort())
 
