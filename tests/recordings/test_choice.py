@@ -163,7 +163,7 @@ def test_complex_samples_of_a_radio_are_reduced_in_steps_of_20_ms() -> None:
     options = TrackOptions(frequencies=433.92e6)
     choice = choose(ANTENNAS, 240e3, None, options, n_samples=960_000)
     assert (choice.tracker, choice.n_snapshots, choice.reduce) == ("svalse", 4800, True)
-    assert (choice.settings["solver__tempering"], choice.n_rows(8)) == (1.0, 8)
+    assert (choice.settings["solver__tempering"], choice.n_rows(8)) == (1.0, 64)
     assert "--snapshots 4800 --reduce --set" in str(choice)
     assert choose(ANTENNAS, 240e3, None, options, n_samples=24_000).n_snapshots == 1200
     music = TrackOptions("music", frequencies=433.92e6)
@@ -171,7 +171,7 @@ def test_complex_samples_of_a_radio_are_reduced_in_steps_of_20_ms() -> None:
     given = TrackOptions("music", frequencies=433.92e6, snapshots=100)
     assert choose(ANTENNAS, 240e3, None, given).n_rows(8) == 100
     given = TrackOptions(frequencies=433.92e6, snapshots=100, reduce=True)
-    assert choose(ANTENNAS, 240e3, None, given).n_rows(8) == 8
+    assert choose(ANTENNAS, 240e3, None, given).n_rows(8) == 64
 
 
 @pytest.mark.parametrize(("rate", "n"), [(1000.0, 128), (4000.0, 200), (10_000.0, 200)])

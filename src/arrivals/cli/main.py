@@ -132,7 +132,7 @@ def _add_track(commands: Any) -> None:
            help="largest shift of tones at --frequency, such as a Doppler shift: in each step "
                 "the strongest frequency within it is used")  # fmt: skip
     option("--reduce", action="store_true",
-           help="replace the complex samples of a step by as many as channels, of the same "
+           help="replace the complex samples of a step by eight a channel, of the same "
                 "covariance")  # fmt: skip
     option(
         "--snr",

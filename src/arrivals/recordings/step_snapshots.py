@@ -9,16 +9,29 @@ import numpy as np
 from arrivals.typing import Bool, Complex
 from arrivals.validation import positive
 
+ROWS = 8  # reduced snapshots a channel
 PER_BIN = 4  # candidates in the width of a bin: an eighth of it is the largest error, 0.1 dB
 
 
+def reduced_number(n_snapshots: int, n_channels: int) -> int:
+    """Return the number of snapshots in a reduced step, at most eight a channel.
+
+    Examples
+    --------
+    >>> reduced_number(4800, 5), reduced_number(10, 5)
+    (40, 10)
+    """
+    return min(n_snapshots, ROWS * n_channels)
+
+
 def reduced_snapshots(steps: Complex) -> Complex:
-    """Return at most n_channels snapshots a step, whose sample covariance is that of the step's.
+    """Return at most eight snapshots a channel, whose sample covariance is that of the step's.
 
     With the snapshots as rows of Y (N, M), and R = Yᴴ Y / N = U Λ Uᴴ, those of the result are
-    W = √M F Λ^½ Uᴴ, so that Wᴴ W / M = R. To a method that depends on snapshots by their sample
-    covariance they are the same. The unitary DFT matrix F gives each of them the same share of all
-    sources and of the noise, for methods that compare the snapshots' noise.
+    W = √K F Λ^½ Uᴴ, so that Wᴴ W / K = R. To a method that depends on snapshots by their sample
+    covariance they are as N snapshots, of which N / K count as one. The columns of F, the first M
+    of the unitary DFT matrix (K, K), give each of them the same share of all sources and of the
+    noise, for methods that compare the snapshots' noise.
 
     Parameters
     ----------
@@ -28,19 +41,19 @@ def reduced_snapshots(steps: Complex) -> Complex:
 
     Returns
     -------
-    ndarray, shape (..., min(n_snapshots, n_channels), n_channels)
-        NaN where a channel is missing in all snapshots; unchanged if there are no more snapshots
-        than channels.
+    ndarray, shape (..., reduced_number(n_snapshots, n_channels), n_channels)
+        NaN where a channel is missing in all snapshots; unchanged if there are no more snapshots.
 
     Examples
     --------
     >>> y = np.exp(1j * np.arange(200)).reshape(100, 2)
     >>> w = reduced_snapshots(y)
-    >>> w.shape, np.allclose(w.conj().T @ w / 2, y.conj().T @ y / 100)
-    ((2, 2), True)
+    >>> w.shape, np.allclose(w.conj().T @ w / 16, y.conj().T @ y / 100)
+    ((16, 2), True)
     """
     n, m = steps.shape[-2:]
-    if n <= m:
+    k = reduced_number(n, m)
+    if k == n:
         return steps
     valid: Bool = np.asarray(~np.isnan(steps))
     present: Bool = np.any(valid, axis=-2, keepdims=True)
@@ -50,9 +63,9 @@ def reduced_snapshots(steps: Complex) -> Complex:
     # R = Yᴴ Y / N
     R = y.conj().swapaxes(-1, -2) @ y / np.maximum(complete.sum(axis=-2, keepdims=True), 1)
     power, U = np.linalg.eigh(R)
-    F = np.exp(-2j * np.pi / m * np.outer(np.arange(m), np.arange(m))) / np.sqrt(m)
-    # W = √M F Λ^½ Uᴴ
-    W = F @ (np.sqrt(m * np.maximum(power, 0.0))[..., None] * U.conj().swapaxes(-1, -2))
+    F = np.exp(-2j * np.pi / k * np.outer(np.arange(k), np.arange(m))) / np.sqrt(k)
+    # W = √K F Λ^½ Uᴴ
+    W = F @ (np.sqrt(k * np.maximum(power, 0.0))[..., None] * U.conj().swapaxes(-1, -2))
     usable = present & complete.any(axis=-2, keepdims=True)
     return np.where(usable, W, complex(np.nan, np.nan))
 

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from arrivals.recordings.step_snapshots import reduced_number
 from arrivals.validation import count, items, positive
 
 
@@ -26,8 +27,8 @@ class TrackOptions:
     settings : mapping of str to object
         Parameters of the tracker, as in `set_params`.
     reduce : bool
-        True to replace the snapshots of a step by as many as there are channels, of the same
-        covariance; only for complex samples.
+        True to replace the snapshots of a step by eight a channel, of the same covariance; only for
+        complex samples.
     follow : float, optional
         Largest shift, Hz, of tones at the given frequencies: in each step they are where the power
         of all channels is largest.
@@ -95,7 +96,7 @@ class Choice:
     settings : mapping of str to object
         Parameters of the tracker.
     reduce : bool
-        True if the snapshots of a step are replaced by as many as there are channels.
+        True if the snapshots of a step are replaced by eight a channel.
     follow : float, optional
         Largest shift of the frequencies, Hz, as in `TrackOptions`.
 
@@ -123,9 +124,9 @@ class Choice:
         Examples
         --------
         >>> Choice("IQ", "svalse", (433e6,), n_snapshots=4800, reduce=True).n_rows(5)
-        5
+        40
         """
-        return min(self.n_snapshots, n_sensors) if self.reduce else self.n_snapshots
+        return reduced_number(self.n_snapshots, n_sensors) if self.reduce else self.n_snapshots
 
     def __str__(self) -> str:
         words = [f"--tracker {self.tracker}"]

@@ -26,6 +26,7 @@ LEAST_BINS = 8  # of a mixture over bins
 STEP_S, SHORTEST_STEP_S, STEPS = 0.128, 0.005, 20  # of complex snapshots
 RADIO_STEP_S, SHORTEST_RADIO = 0.020, 200  # of radios: s, and samples in a step of 20 ms at least
 POWER_FLOOR, MAX_SNR_DB = 3.0, 20.0  # of svalse on recorded data
+RADIO_FLOOR, RADIO_SNR_DB = 1.0, 15.0  # of reduced steps; gains and phases of receivers deviate
 
 
 def choose(
@@ -161,8 +162,8 @@ def _of_snapshots(rate: float | None, options: TrackOptions, n_samples: int | No
     if options.tracker is not None:
         return choice
     # the few snapshots that stand for a reduced step are not tempered any further
-    settings = _recorded(1 if reduce else n) | dict(options.settings)
-    return replace(choice, settings=settings)
+    settings = _recorded(1, RADIO_SNR_DB, RADIO_FLOOR) if reduce else _recorded(n)
+    return replace(choice, settings=settings | dict(options.settings))
 
 
 def _snapshots_of_step(rate: float | None, n_samples: int | None) -> int:
@@ -263,10 +264,12 @@ def _completed(choice: Choice, options: TrackOptions, snr_db: float) -> Choice:
     return replace(choice, window=window, hop=hop, n_snapshots=n, settings=settings)
 
 
-def _recorded(n: int, snr_db: float = MAX_SNR_DB) -> dict[str, Any]:
+def _recorded(
+    n: int, snr_db: float = MAX_SNR_DB, power_floor: float = POWER_FLOOR
+) -> dict[str, Any]:
     """Return settings of svalse for recorded data, of which n snapshots count as one."""
     return {
         "solver__tempering": float(n),
-        "solver__power_floor": POWER_FLOOR,
+        "solver__power_floor": power_floor,
         "solver__max_snr_db": snr_db,
     }
