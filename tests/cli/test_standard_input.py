@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import soundfile
 from command_line import RATE, SHELL, WINDOW, run_cli, track
-from scipy.io import wavfile
+from scipy.io import savemat, wavfile
 
 from arrivals.__main__ import main
 
@@ -140,3 +140,13 @@ def test_channels_of_the_header_must_fit_the_array(scene: Path, here: Path) -> N
     done = as_stream(scene, (here / "a.wav").read_bytes())
     assert done.returncode == 2
     assert b"must have 8 channels; got 6" in done.stderr
+
+
+def test_matlab_is_read_and_text_refused(scene: Path, here: Path, expected: bytes) -> None:
+    samples, rate = soundfile.read(scene / "tow.wav", dtype="float32")
+    savemat(here / "a.mat", {"samples": samples, "rate": float(rate)})
+    done = as_stream(scene, (here / "a.mat").read_bytes())
+    assert (done.returncode, done.stdout) == (0, expected), done.stderr
+    done = as_stream(scene, b"0.125, 0.250\n" * 1000, "--rate", str(RATE))
+    message = b"arrivals: standard input is text, not samples: write it to a file"
+    assert (done.returncode, done.stdout, done.stderr[: len(message)]) == (2, b"", message)

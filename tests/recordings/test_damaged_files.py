@@ -268,3 +268,14 @@ def test_arrays_of_an_archive_are_loaded_on_demand() -> None:
     arrays = numpy_arrays(file)
     assert [arrays[name].is_numeric for name in arrays] == [True, False]
     assert_array_equal(arrays["samples"].load(), NUMBERS)
+
+
+def test_encrypted_npz_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "a.npz"
+    np.savez(path, samples=np.ones((9, 2)), rate=8.0)
+    data = bytearray(path.read_bytes())
+    at = data.index(b"PK\1\2")
+    data[6], data[at + 8] = data[6] | 1, data[at + 8] | 1
+    path.write_bytes(data)
+    with pytest.raises(ValueError, match=r"a.npz: the file is encrypted: save it without"):
+        read(path)

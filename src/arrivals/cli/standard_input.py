@@ -16,7 +16,7 @@ from arrivals.recordings.formats.registry import READERS
 from arrivals.recordings.formats.wav import is_wav, wav_header
 from arrivals.recordings.raw_numbers import DTYPES, Replay
 
-HEAD = 32  # bytes by which a format is recognised
+HEAD = 128  # bytes by which a format is recognised
 NAME = "standard input"
 
 
@@ -36,7 +36,7 @@ def standard_input(arguments: argparse.Namespace) -> Iterator[None]:
     Raises
     ------
     ValueError
-        If arguments contradict the header, or are for standard input alone.
+        If arguments contradict the header, or are for standard input alone; or if it is text.
     """
     arguments.source = None
     if arguments.file != "-":
@@ -46,6 +46,8 @@ def standard_input(arguments: argparse.Namespace) -> Iterator[None]:
     head = sys.stdin.buffer.read(HEAD)
     source = cast(BinaryIO, Replay(head, sys.stdin.buffer))
     known = next((reader for reader in READERS if reader.takes(head)), None)
+    if known is None and len(head) == HEAD and head.isascii() and _is_text(head.decode("ascii")):
+        raise ValueError(f"{NAME} is text, not samples: write it to a file, and pass its name")
     if known is None:
         arguments.source = source
         yield
@@ -63,6 +65,10 @@ def standard_input(arguments: argparse.Namespace) -> Iterator[None]:
             yield
         except (ValueError, OSError) as error:
             raise ValueError(str(error).replace(arguments.file, NAME)) from error
+
+
+def _is_text(head: str) -> bool:
+    return "".join(head.split()).isprintable()
 
 
 class _Recorder:

@@ -71,7 +71,8 @@ def read(
           ``time`` or ``t`` is in s.
 
         In a file of named arrays the array may have the name ``samples`` or ``snapshots``
-        (complex), with a number ``rate``, ``fs`` or ``Fs`` in Hz and an array ``time`` in s.
+        (complex), with a number ``rate``, ``fs``, ``sample_rate`` or the like in Hz and an array
+        ``time`` in s.
     rate : float, optional
         Samples per second, Hz; replaces that of the file.
     variable : str, optional

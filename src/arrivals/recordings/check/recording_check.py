@@ -195,7 +195,7 @@ def _description(
     alias: float | None,
     scale: tuple[float, float] | None,
 ) -> str:
-    parts = [f"{recording.n_channels} channels"]
+    parts = [f"{recording.n_channels} channel{'s' * (recording.n_channels > 1)}"]
     if np.isfinite(recording.duration):
         parts.append(f"{recording.duration:.4g} s")
     if recording.rate is not None:

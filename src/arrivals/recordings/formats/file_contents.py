@@ -16,7 +16,7 @@ from arrivals.recordings.stored_samples import StoredSamples, row_type
 from arrivals.typing import Float
 
 MAX_BYTES = 2_000_000_000  # of the arrays that are loaded from a file at once
-RATES = ("rate", "fs", "Fs", "sample_freq")  # names of a scalar with the rate
+RATES = ("rate", "fs", "Fs", "sample_freq", "sampling_rate", "sample_rate")  # names of a scalar
 
 
 class FileContents(NamedTuple):

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arrivals.recordings.formats.file_contents import (
+    RATES,
     FileContents,
     ReadingOptions,
     damage_refused,
@@ -20,7 +21,6 @@ from arrivals.recordings.formats.file_contents import (
 from arrivals.recordings.stored_samples import StoredSamples, row_type
 from arrivals.typing import Float
 
-RATES = ("rate", "fs", "Fs", "sample_freq", "sampling_rate", "sample_rate")
 TIMES = ("time", "t")
 STANDARD = ("time_data", "samples", "snapshots")  # names of datasets with samples
 CACHE = 2**26  # bytes of the chunks that are kept decompressed

@@ -80,6 +80,9 @@ def numpy_arrays(file: BinaryIO, path: Path | None = None) -> dict[str, StoredAr
             return {"": _stored(file, size, lambda: _at_start(file), path)}
         archive = zipfile.ZipFile(file)
         members = [each for each in archive.infolist() if each.filename.endswith(".npy")]
+    if any(each.flag_bits & 1 for each in members):
+        raise ValueError("the file is encrypted: save it without a password")
+    with damage_refused(KIND):
         return {each.filename.removesuffix(".npy"): _member(archive, each) for each in members}
 
 
