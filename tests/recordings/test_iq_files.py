@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from arrivals.recordings import read
 from arrivals.recordings.formats.file_contents import ReadingOptions
 from arrivals.recordings.formats.iq import RAW_TYPES, SUFFIXES, read_iq
 from arrivals.recordings.formats.sigmf import read_sigmf
@@ -199,3 +200,12 @@ def test_sigmf_half_a_recording_is_refused(tmp_path: Path) -> None:
     (tmp_path / "b.sigmf").write_bytes(b"not a tar file")
     with pytest.raises(ValueError, match="not a SigMF recording"):
         read_sigmf(tmp_path / "b.sigmf", ReadingOptions())
+
+
+@pytest.mark.parametrize("form", ["cs32", "cs16", "cs8", "cu8"])
+def test_floats_are_not_read_as_integers(tmp_path: Path, form: str) -> None:
+    path = tmp_path / "a.cf32"
+    parts = np.random.default_rng(0).standard_normal(4000).astype("<f4")
+    parts.tofile(path)
+    with pytest.raises(ValueError, match=f"a.cf32: the samples are not {form} but cf32: pass"):
+        read(path, format=form)

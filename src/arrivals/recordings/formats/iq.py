@@ -15,6 +15,7 @@ from arrivals.validation import count
 
 SHOWN = 65_536  # numbers at the beginning of a file whose size is checked
 SMALLEST, LARGEST_REAL = 1e-20, 1e20  # of samples as reals that are not those of another type
+FLOATS, LEAST_FLOATS = (1e-6, 1e4), 64  # sizes of nearly all bytes that are float32, and number
 
 
 class RawType(NamedTuple):
@@ -119,8 +120,13 @@ def _rows(
 
 
 def _check_plausible(path: Path, name: str, kind: RawType) -> None:
-    """Raise a ValueError if most reals are of sizes that bytes of another type have."""
+    """Raise a ValueError if most numbers are of sizes that those of another type have."""
     if kind.dtype.kind != "f":
+        with np.errstate(invalid="ignore"):
+            size = np.abs(np.fromfile(path, "<f4", SHOWN))
+            are_floats = ((size > FLOATS[0]) & (size < FLOATS[1])).mean() > 0.99
+        if size.size >= LEAST_FLOATS and are_floats:
+            raise ValueError(f"the samples are not {name} but cf32: pass another format (--format)")
         return
     numbers = np.fromfile(path, kind.dtype, SHOWN)
     with np.errstate(invalid="ignore"):
