@@ -12,7 +12,7 @@ from rss_tables import between, heading, line
 
 from arrivals.measurement_models import LogNormalRSS, db_to_neper
 from arrivals.motion_models import RandomWalk
-from arrivals.recordings.readings import Calibration, Network, calibrate, read_network
+from arrivals.recordings.networks import Calibration, Network, calibrate, read_network
 from arrivals.scenarios.metrics.position_errors import distances
 from arrivals.scenarios.reproduce.rss.birth_death import (
     gospa_over_time,

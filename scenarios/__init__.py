@@ -5,8 +5,8 @@ The classes of the scenes are in `arrivals.scenarios.simulations`; `create` make
 
 from arrivals.plots.arrays import plot_array
 from arrivals.plots.bearing_time import plot_bearing_time
+from arrivals.recordings.networks import Network, calibrate, read_network
 from arrivals.recordings.readers import read
-from arrivals.recordings.readings import Network, calibrate, read_network
 from arrivals.recordings.recording import Recording
 from arrivals.scenarios.base import Scenario, Trial
 from arrivals.scenarios.bounds.detection import exact_detection, network_detection

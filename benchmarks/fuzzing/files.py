@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from arrivals.measurement_models import SensorArray
+from arrivals.recordings.networks import read_network
 from arrivals.recordings.readers import read
-from arrivals.recordings.readings import read_network
 from arrivals.scenarios.experiments.monte_carlo import monte_carlo
 from arrivals.scenarios.experiments.study import Study
 from arrivals.scenarios.simulations.sampled_source import InterpolationTone

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from arrivals.plots.runs import plot
     from arrivals.recordings.check import check
+    from arrivals.recordings.networks.locating import locate
     from arrivals.recordings.readers import read
-    from arrivals.recordings.readings.locating import locate
     from arrivals.recordings.tracking import track
 
 __version__ = "0.1.0"
@@ -22,7 +22,7 @@ __all__ = ["__version__", "check", "locate", "plot", "read", "track"]
 
 LAZY = {
     "check": "arrivals.recordings.check",
-    "locate": "arrivals.recordings.readings.locating",
+    "locate": "arrivals.recordings.networks.locating",
     "plot": "arrivals.plots.runs",
     "read": "arrivals.recordings.readers",
     "track": "arrivals.recordings.tracking",

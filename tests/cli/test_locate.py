@@ -11,8 +11,8 @@ from reading_tables import walk as walk_of_a_phone
 import arrivals.scenarios
 from arrivals.__main__ import main
 from arrivals.plots.maps import ellipse, plot_map
-from arrivals.recordings.readings import Network, calibrate
-from arrivals.recordings.readings.tracking import locate_sources
+from arrivals.recordings.networks import Network, calibrate
+from arrivals.recordings.networks.tracking import locate_sources
 from arrivals.scenarios import create, read_network
 from arrivals.scenarios.reproduce.rss.measured_network import FLOOR_DB, track_transmitter
 from arrivals.typing import Float

@@ -13,7 +13,7 @@ from reading_tables import NAMES, PLACES, START, iso, sensors, text, truth, walk
 import arrivals
 from arrivals.measurement_models.arrays.local_plane import LocalPlane
 from arrivals.plots.maps import plot_map
-from arrivals.recordings.readings import Network
+from arrivals.recordings.networks import Network
 from arrivals.trackers.run import Run
 from arrivals.typing import Float
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from arrivals.measurement_models import db_to_neper, neper_to_db
-from arrivals.recordings.readings import Network, calibrate, read_network, read_sensors
+from arrivals.recordings.networks import Network, calibrate, read_network, read_sensors
 from arrivals.scenarios.reproduce.rss.measured_network import (
     FLOOR_DB,
     centre,

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from reading_tables import NAMES, PLACES, iso, sensors, text, walk, wide
 
 from arrivals.measurement_models.arrays.local_plane import LocalPlane
-from arrivals.recordings.readings import Network, read_network, read_sensors
-from arrivals.recordings.readings.columns import ALIASES, roles
-from arrivals.recordings.readings.steps import SingleReadings, as_network, scattered_window
-from arrivals.recordings.readings.times import iso_text, parsed
+from arrivals.recordings.networks import Network, read_network, read_sensors
+from arrivals.recordings.networks.columns import ALIASES, roles
+from arrivals.recordings.networks.steps import SingleReadings, as_network, scattered_window
+from arrivals.recordings.networks.times import iso_text, parsed
 
 ROWS = walk(6)
 LONG = ("time_s", "sensor", "rss_db")

@@ -9,7 +9,7 @@ import numpy as np
 
 from arrivals.measurement_models import LogNormalRSS
 from arrivals.motion_models import ConstantVelocity
-from arrivals.recordings.readings import Calibration, Network
+from arrivals.recordings.networks import Calibration, Network
 from arrivals.trackers import RSSVB, AmplitudePrior, VariationalSolver
 from arrivals.trackers.rss.inference.joint_posterior import JointPosterior, Prior
 from arrivals.trackers.rss.inference.map_search import maximize

@@ -12,7 +12,7 @@ import numpy as np
 
 from arrivals.cli.outputs import check_different
 from arrivals.files import check_output
-from arrivals.recordings.readings.locating import locate
+from arrivals.recordings.networks.locating import locate
 
 # arguments of `locate` that are fields of its settings, and their options
 SETTINGS = {

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from arrivals.measurement_models.signal_strength.fill_values import fill_values, without
-from arrivals.recordings.readings import Network, calibrate, read_network
-from arrivals.recordings.readings.tracking import locate_sources
+from arrivals.recordings.networks import Network, calibrate, read_network
+from arrivals.recordings.networks.tracking import locate_sources
 from arrivals.typing import Float
 
 PLACES = np.array([[0, 0], [30, 0], [0, 30], [30, 30], [15, 0], [0, 15], [30, 15.0]])

@@ -120,13 +120,13 @@ def joined(
         raise ValueError("transpose requires a single file")
     arrays = [each.array if each.array.ndim == 2 else each.array[:, None] for each in contents]
     for path, each, array in zip(paths[1:], contents[1:], arrays[1:], strict=True):
-        facts = {
+        properties = {
             "length": (len(arrays[0]), len(array)),
             "rate": (first.rate, each.rate),
             "frequency": (first.frequency, each.frequency),
             "kind of samples": (arrays[0].dtype.kind == "c", array.dtype.kind == "c"),
         }
-        for noun, (one, other) in facts.items():
+        for noun, (one, other) in properties.items():
             if one != other:
                 raise ValueError(f"{path} must have the same {noun}: {one}; got {other}")
     names = [each.names or () for each in contents]

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from os import PathLike
 
 from arrivals.files import atomic_write
-from arrivals.recordings.readings.network import Network
-from arrivals.recordings.readings.times import iso_text
+from arrivals.recordings.networks.network import Network
+from arrivals.recordings.networks.times import iso_text
 from arrivals.trackers.run import Run, header, text
 
 

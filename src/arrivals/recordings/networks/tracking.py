@@ -12,7 +12,7 @@ import numpy as np
 from arrivals.measurement_models import LogNormalRSS, db_to_neper
 from arrivals.measurement_models.signal_strength.fill_values import warn_fill_values
 from arrivals.motion_models import ConstantVelocity
-from arrivals.recordings.readings.network import Network
+from arrivals.recordings.networks.network import Network
 from arrivals.trackers import RSSML, RSSVB, AmplitudePrior, PositionEstimate, find
 from arrivals.trackers.run import Run, RunRecorder
 from arrivals.validation import one_of

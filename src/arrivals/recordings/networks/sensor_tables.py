@@ -14,7 +14,7 @@ import numpy as np
 from arrivals.files import file_error, open_input
 from arrivals.measurement_models.arrays.local_plane import LocalPlane
 from arrivals.measurements import real_numbers
-from arrivals.recordings.readings.columns import Column, roles, understood_names
+from arrivals.recordings.networks.columns import Column, roles, understood_names
 from arrivals.tables import TableRow, named_rows
 from arrivals.typing import Float
 

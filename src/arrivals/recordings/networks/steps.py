@@ -9,7 +9,7 @@ import numpy as np
 
 from arrivals.measurement_models.arrays.local_plane import LocalPlane
 from arrivals.recordings.formats.file_contents import MAX_BYTES, check_size
-from arrivals.recordings.readings.network import Network
+from arrivals.recordings.networks.network import Network
 from arrivals.typing import Float, Int
 
 MAX_SCATTERED = 1.5  # mean number of readings at a time, below which times are scattered

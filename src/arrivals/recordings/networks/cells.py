@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from arrivals.measurement_models.signal_strength.fill_values import without
-from arrivals.recordings.readings.columns import Column, understood_names
-from arrivals.recordings.readings.times import iso_text, parsed
+from arrivals.recordings.networks.columns import Column, understood_names
+from arrivals.recordings.networks.times import iso_text, parsed
 from arrivals.tables import TableRow
 from arrivals.typing import Float
 

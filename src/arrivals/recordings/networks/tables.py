@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from arrivals.measurement_models.arrays.local_plane import LocalPlane
-from arrivals.recordings.readings.cells import Cells, checked, some, times
-from arrivals.recordings.readings.columns import plain_name, roles, understood_names
-from arrivals.recordings.readings.exports import rows_of
-from arrivals.recordings.readings.sensor_tables import (
+from arrivals.recordings.networks.cells import Cells, checked, some, times
+from arrivals.recordings.networks.columns import plain_name, roles, understood_names
+from arrivals.recordings.networks.exports import rows_of
+from arrivals.recordings.networks.sensor_tables import (
     POSITIONS,
     SensorTable,
     check_angles,
@@ -23,7 +23,7 @@ from arrivals.recordings.readings.sensor_tables import (
     position_columns,
     sensor_table,
 )
-from arrivals.recordings.readings.steps import SingleReadings
+from arrivals.recordings.networks.steps import SingleReadings
 from arrivals.typing import Bool
 
 RECEIVERS = ("sensor", "receiver", "rx", "gateway", "anchor", "node")  # begin a column's name

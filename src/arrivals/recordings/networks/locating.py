@@ -16,15 +16,15 @@ from numpy.typing import ArrayLike
 from arrivals.measurement_models.signal_strength.fill_values import without
 from arrivals.measurements import real_numbers
 from arrivals.messages import nearest
-from arrivals.recordings.readings.cells import checked, some
-from arrivals.recordings.readings.located import Located
-from arrivals.recordings.readings.network import Network
-from arrivals.recordings.readings.network_files import read_npz
-from arrivals.recordings.readings.sensor_tables import named, sensor_table
-from arrivals.recordings.readings.steps import as_network, scattered_window
-from arrivals.recordings.readings.tables import ReadTable, read_table
-from arrivals.recordings.readings.times import FIRST_DATE
-from arrivals.recordings.readings.tracking import (
+from arrivals.recordings.networks.cells import checked, some
+from arrivals.recordings.networks.located import Located
+from arrivals.recordings.networks.network import Network
+from arrivals.recordings.networks.network_files import read_npz
+from arrivals.recordings.networks.sensor_tables import named, sensor_table
+from arrivals.recordings.networks.steps import as_network, scattered_window
+from arrivals.recordings.networks.tables import ReadTable, read_table
+from arrivals.recordings.networks.times import FIRST_DATE
+from arrivals.recordings.networks.tracking import (
     PathLossSettings,
     SourceSettings,
     locate_sources,

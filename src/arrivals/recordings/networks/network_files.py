@@ -12,11 +12,11 @@ from arrivals.files import open_input
 from arrivals.measurements import real_numbers
 from arrivals.recordings.formats.file_contents import MAX_BYTES, check_size
 from arrivals.recordings.formats.numpy_files import numpy_arrays
-from arrivals.recordings.readings.cells import checked
-from arrivals.recordings.readings.network import Network
-from arrivals.recordings.readings.sensor_tables import named
-from arrivals.recordings.readings.steps import as_network
-from arrivals.recordings.readings.tables import read_table
+from arrivals.recordings.networks.cells import checked
+from arrivals.recordings.networks.network import Network
+from arrivals.recordings.networks.sensor_tables import named
+from arrivals.recordings.networks.steps import as_network
+from arrivals.recordings.networks.tables import read_table
 
 ARRAYS = ("rss_db", "sensor_xy", "sensor_name", "time", "tx_xy")  # of an npz file
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from arrivals.measurement_models import LogGains, LogNormalRSS, db_to_neper
 from arrivals.measurement_models.signal_strength.fill_values import warn_fill_values
-from arrivals.recordings.readings.network import Network
+from arrivals.recordings.networks.network import Network
 from arrivals.typing import Float, Int
 from arrivals.validation import positive
 
