@@ -67,7 +67,9 @@ def refuse(arguments: argparse.Namespace, names: Iterable[str], reason: str) -> 
 
 
 def write_table(result: Run, path: str | None) -> None:
-    """Write the tracks file, to standard output without a path."""
+    """Write the tracks file, to standard output without a path; say so if it has no row."""
+    if next(iter(result.rows()), None) is None:
+        print(f"arrivals: no source was found in {len(result)} steps", file=sys.stderr)
     if path:
         result.to_csv(path)
         return
