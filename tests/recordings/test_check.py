@@ -143,6 +143,21 @@ def test_tone_on_displaced_sensors_is_no_fault() -> None:
     assert "the wiring was not tested" in report.notes[0]
 
 
+@pytest.mark.parametrize(("n_sensors", "spacing"), [(8, 1.875), (21, 5.6)])
+@pytest.mark.parametrize("n_tones", [3, 9])
+def test_tones_that_interfere_over_several_paths_are_no_fault(
+    n_sensors: int, spacing: float, n_tones: int
+) -> None:
+    array, rng = SensorArray.ula(n_sensors, spacing, speed=1489.0), np.random.default_rng(0)
+    t = np.arange(15000)[:, None] / 1500.0
+    y = 0.3 * rng.standard_normal((15000, n_sensors))
+    for f in rng.choice([49, 64, 79, 94, 112, 130, 148, 166, 201, 235], n_tones, replace=False):
+        for angle in np.deg2rad([-12.0, 8.0, 20.0]):
+            delay = array.positions[:, 0] * np.sin(angle + 0.005 * t) / array.speed
+            y += rng.uniform(0.3, 1) * np.sin(2 * np.pi * f * (t + delay) + rng.uniform(0, 6))
+    assert check(y, array, rate=1500.0).faults == ()
+
+
 @settings(max_examples=3)
 @given(st.floats(1e-3, 1e3))
 def test_gain_of_all_channels_changes_no_agreement(gain: float) -> None:

@@ -90,6 +90,31 @@ def beam_power(segments: PhaseSegments, responses: Complex) -> Float:
     return np.asarray(power / (n_windows * n_channels**2))
 
 
+def bin_power(segments: PhaseSegments, responses: Complex, direction: Int) -> Float:
+    """Return the weighted mean power of one beam of each segment, as in `beam_power`, by bin.
+
+    Parameters
+    ----------
+    segments, responses
+        As in `beam_power`.
+    direction : ndarray of int, shape (n_segments,)
+        Index of each segment's direction.
+
+    Returns
+    -------
+    ndarray, shape (n_segments, n_bins)
+
+    Examples
+    --------
+    >>> segments = PhaseSegments(np.ones((1, 2, 4, 3)), np.ones((1, 2)), np.ones(2), 64)
+    >>> bin_power(segments, np.ones((2, 3, 1)), np.zeros(1, int))
+    array([[1., 1.]])
+    """
+    a = np.moveaxis(responses[:, :, direction], 2, 0).conj()
+    beam = np.einsum("tfnm,tfm->tfn", segments.phasors, a, optimize=True) / segments.n_channels
+    return np.asarray(segments.weight * (np.abs(beam) ** 2).mean(axis=2))
+
+
 def agreement(
     segments: PhaseSegments,
     responses: Complex,

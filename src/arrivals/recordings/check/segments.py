@@ -22,6 +22,7 @@ NOISE_SPREAD = 0.9  # over the number of channels: four deviations of the mean o
 MIN_CELLS = 4.0  # least weight of a segment: fewer cells fit some direction by chance
 MAX_PAIRS = 32
 MIN_BANDWIDTH = 0.1  # deviation of the frequencies, of their mean: 0.3 or more for speech
+LINE_BINS = 3  # neighbouring bins over which a tone extends
 Rows = Callable[[int, int], NDArray[Any]]  # samples of the rows from the first to before the last
 
 
@@ -89,6 +90,15 @@ class PhaseSegments:
         middle = float(weight @ self.frequency) / total
         variance = float(weight @ (self.frequency - middle) ** 2) / total
         return self.window == 1 or variance < (MIN_BANDWIDTH * middle) ** 2
+
+    def lines(self, rate: float) -> Int:
+        """Return the number of the line of each bin: of some neighbouring bins, as a tone has."""
+        return np.asarray(np.round(self.frequency * self.window / rate)).astype(int) // LINE_BINS
+
+    def n_lines(self, rate: float) -> float:
+        """Return the effective number of lines: few for a recording of some tones."""
+        weight = np.bincount(self.lines(rate), self.weight.sum(axis=0))
+        return float(weight.sum() ** 2 / max(float((weight**2).sum()), 1e-12))
 
     def strongest(self, low: float, high: float, n_segments: int, n_bins: int) -> PhaseSegments:
         """Return the segments, and the bins between two frequencies, of the largest weights."""

@@ -8,7 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
-from arrivals.recordings.check.beam_agreement import agreement, beam_power
+from arrivals.recordings.check.beam_agreement import agreement, beam_power, bin_power
 from arrivals.recordings.check.segments import PhaseSegments
 from arrivals.typing import Complex, Float, Int
 
@@ -25,6 +25,7 @@ PAIR_RATIO = 1.3  # of beam power after two inversions to that after one change
 MAX_ALTERNATIVES = 3
 REFINED = 2  # samples about the peak of the agreement
 MIN_SIGNIFICANCE = 2.5  # standard errors of the gain, over segments
+MIN_LINE_SIGNIFICANCE = 2.2  # over lines of the spectrum: at most 2.05 of tones over several paths
 MIN_PEAK = 0.4  # of a delayed channel's agreement, relative to the others
 SAME_DIRECTION = 0.8  # coherence of responses
 MAX_DELAY = 64  # samples
@@ -98,9 +99,10 @@ class WiringSearch:
     Examples
     --------
     >>> rng = np.random.default_rng(0)
-    >>> u = np.exp(2j * np.pi * rng.random((8, 16, 4, 1))) * np.array([1, 1, -1, 1, 1])
-    >>> segments = PhaseSegments(u, np.ones((8, 16)), np.linspace(100, 300, 16), 64)
-    >>> search = WiringSearch(segments, np.ones((16, 5, 1), complex), rate=1000.0)
+    >>> u = np.exp(2j * np.pi * rng.random((8, 24, 4, 1))) * np.array([1, 1, -1, 1, 1])
+    >>> f = np.arange(3, 27) * 1000 / 64
+    >>> segments = PhaseSegments(u, np.ones((8, 24)), f, 64)
+    >>> search = WiringSearch(segments, np.ones((24, 5, 1), complex), rate=1000.0)
     >>> [(each.kind, each.channels) for each in search.corrections()]
     [('inverted', (2,))]
     """
@@ -120,7 +122,7 @@ class WiringSearch:
         for each in made[:-1]:  # a first change that a later one made superfluous
             others = [other for other in made if other is not each]
             with_it, without = (self._power(self.corrected(some)) for some in (made, others))
-            if not self._is_enough(each.kind, *self._gain(without, with_it)):
+            if not self._gain(each.kind, without, with_it):
                 made = others
         return made
 
@@ -155,34 +157,34 @@ class WiringSearch:
         angle = 2 * np.pi * self.segments.frequency / self.rate
         return np.asarray(np.exp(1j * angle).astype(np.complex64)[:, None])
 
-    def _power(self, segments: PhaseSegments) -> Float:
-        return np.asarray(beam_power(segments, self.responses).max(axis=1))
+    def _power(self, segments: PhaseSegments, direction: Int | None = None) -> Float:
+        """Return the power of the strongest beams, (n_segments, n_bins)."""
+        if direction is None:
+            direction = beam_power(segments, self.responses).argmax(axis=1)
+        return bin_power(segments, self.responses, direction)
 
-    def _gain(self, before: Float, after: Float) -> tuple[float, float]:
-        """Return the gain, in channels, and its number of standard errors."""
+    def _gain(self, kind: str, before: Float, after: Float) -> float:
+        """Return the gain, in channels; 0 if it is small, or that of few segments or tones."""
         steps = after - before
-        share = steps.sum() / max(after.sum(), 1e-12)
-        error = np.sqrt((steps**2).sum())
-        gain = float(share * self.segments.n_channels / 2)
-        return gain, float(steps.sum() / max(error, 1e-12))
-
-    def _is_enough(self, kind: str, gain: float, significance: float) -> bool:
+        gain = float(steps.sum() / max(after.sum(), 1e-12) * self.segments.n_channels / 2)
         least = MIN_GAIN[kind]
         if self.segments.is_narrowband:
             least = max(least, MIN_NARROWBAND_GAIN)
-        return gain >= least and significance >= MIN_SIGNIFICANCE
+        errors = [MIN_SIGNIFICANCE * np.linalg.norm(steps.sum(axis=1))]
+        if self.segments.window > 1:
+            by_line = np.bincount(self.segments.lines(self.rate), steps.sum(axis=0))
+            errors.append(MIN_LINE_SIGNIFICANCE * np.linalg.norm(by_line))
+        return gain if gain >= least and steps.sum() >= max(errors) else 0.0
 
     def _best(self, segments: PhaseSegments) -> Correction | None:
-        power = beam_power(segments, self.responses)
-        before = power.max(axis=1)
+        direction = beam_power(segments, self.responses).argmax(axis=1)
+        before = self._power(segments, direction)
 
         def measured(each: Correction) -> Correction:
             changed = segments.with_phasors(each.apply(segments.phasors, self._turn))
-            gain, significance = self._gain(before, self._power(changed))
-            is_enough = self._is_enough(each.kind, gain, significance)
-            return replace(each, gain=gain if is_enough else 0.0)
+            return replace(each, gain=self._gain(each.kind, before, self._power(changed)))
 
-        found = [measured(each) for each in self._candidates(segments, power.argmax(axis=1))]
+        found = [measured(each) for each in self._candidates(segments, direction)]
         latest = max((each for each in found if each.kind == LATE), key=_gain_of, default=None)
         if latest is not None and latest.gain:
             shifts = (k for k in range(-REFINED, REFINED + 1) if k and latest.delay + k)

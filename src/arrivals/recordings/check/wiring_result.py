@@ -27,6 +27,7 @@ EVEN = 0.8  # least of a channel's agreement, of the median, where nothing is se
 BROKEN = 0.35  # of a channel's agreement, relative to the median
 CORRECTION_COST = 0.03  # of agreement, that one more correction must gain
 MIN_CHANNELS, MIN_DIRECTIONS = 3, 3
+MIN_LINES = 5  # below, tones that interfere over several paths resemble faults
 
 
 FEW_DIRECTIONS = (
@@ -236,6 +237,8 @@ def _result(
         if np.median(values) < MIN_AGREEMENT:
             return _not_tested(array, "no plane wave fits the channels")
         return WiringResult(values, remark=FEW_DIRECTIONS)
+    if segments.window > 1 and segments.n_lines(rate) < MIN_LINES and not segments.is_narrowband:
+        return _not_tested(array, "there are too few tones")
     before = search.agreement().real
     if is_short and before.min() >= EVEN * np.median(before) >= EVEN * MIN_AGREEMENT:
         return WiringResult(before, quality=float(before.mean()))
