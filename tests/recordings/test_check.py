@@ -119,6 +119,22 @@ def test_wrong_lengths_are_a_fault_with_the_unit(factor: float, words: str) -> N
     assert words in report.faults[0].text
 
 
+def test_millimetres_for_metres_of_a_short_recording_are_a_fault() -> None:
+    assert faults(checked(TALK, SensorArray(1000 * CIRCLE.positions, 343.0))) == [("scale", ())]
+    assert (
+        "wrong lengths" in checked(ON_SQUARE, SensorArray(100 * SQUARE.positions, 343.0)).notes[0]
+    )
+
+
+def test_wrong_lengths_of_a_line_are_a_note_as_waves_from_its_side_have_no_delays_either() -> None:
+    wrong = checked(ON_LINE, SensorArray(100 * LINE.positions, 343.0))
+    assert wrong.faults == ()
+    assert "waves from its side" in wrong.notes[0]
+    rng = np.random.default_rng(0)
+    side = rng.standard_normal((32000, 1)) + 0.1 * rng.standard_normal((32000, 8))
+    assert checked(side, SensorArray.ula(8, 0.5, speed=343.0)).faults == ()
+
+
 def test_too_large_lengths_as_of_sources_far_above_are_a_note() -> None:
     report = checked(TALK, SensorArray(2 * CIRCLE.positions, 343.0))
     assert report.faults == ()
@@ -156,6 +172,14 @@ def test_tones_that_interfere_over_several_paths_are_no_fault(
             delay = array.positions[:, 0] * np.sin(angle + 0.005 * t) / array.speed
             y += rng.uniform(0.3, 1) * np.sin(2 * np.pi * f * (t + delay) + rng.uniform(0, 6))
     assert check(y, array, rate=1500.0).faults == ()
+
+
+def test_frequency_of_complex_snapshots_is_that_of_the_recording() -> None:
+    array = SensorArray.uca(5, radius=0.35, speed=3e8)
+    z = array.steering_vector(np.linspace(0, 6, 400), wavelength=0.7)
+    z[:, 3] *= -1
+    recording = Recording(z, rate=1e5, frequency=3e8 / 0.7)
+    assert faults(check(recording, array)) == [("inverted", (4,))]
 
 
 @settings(max_examples=3)

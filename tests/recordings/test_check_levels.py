@@ -107,3 +107,19 @@ def test_report_is_a_table_a_dictionary_and_json() -> None:
     assert loaded == report.to_dict()
     assert loaded["channels"][1]["rms_db"] is None
     assert loaded["faults"][0]["channels"] == [2]
+
+
+def test_rare_flat_tops_are_a_note() -> None:
+    samples = np.random.default_rng(0).standard_normal((40000, 2))
+    for start in (1000, 2000, 3000):
+        samples[start : start + 6, 0] = 5.0
+    report = check(samples, rate=8000.0)
+    assert report.faults == ()
+    assert "channel 1 is clipped in few samples" in report.notes
+
+
+def test_weak_channel_of_36_db_is_silent_and_of_34_db_noted() -> None:
+    noise = np.random.default_rng(0).standard_normal((8000, 6))
+    report = check(noise * 10 ** (-np.array([0, 0, 0, 0, 34, 36]) / 20), rate=8000.0)
+    assert [(each.kind, each.channels) for each in report.faults] == [("silent", (6,))]
+    assert any("channel 5 is 34 dB weaker" in note for note in report.notes)

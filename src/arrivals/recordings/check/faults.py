@@ -12,9 +12,10 @@ from arrivals.recordings.check.wiring import INVERTED, LATE, SWAPPED, Correction
 from arrivals.recordings.check.wiring_result import WiringResult
 from arrivals.typing import Bool, Float
 
-SILENT_DB = 40.0  # below the median of the channels; sensors of one kind differ by 6 dB or so
+SILENT_DB = 35.0  # below the median of the channels; sensors of one kind differ by 6 dB or so
 WEAK_DB = 12.0  # below the median: noted
-MAX_CLIPPED = 1e-4  # share of samples in flat tops; 0 of the recordings that are not clipped
+MAX_CLIPPED = 1e-3  # share of samples in flat tops; less does no harm to directions
+NOTED_CLIPPED = 1e-4
 MAX_HUM, HUM_ABOVE_DB = 0.5, 10.0  # share of hum in a channel, and its power above the median
 LARGER, NOTED, SMALLER = 1.5, 0.6, 0.2  # of the scale: 0.2 is 78 degrees over the plane
 MIN_LOW = 0.3  # of the range of a small scale: no delays at all are waves from straight above
@@ -31,7 +32,7 @@ LENGTH_UNITS = {  # by the factor between them
 
 
 def is_silent(levels: ChannelLevels) -> Bool:
-    """Return True for channels that are constant, missing, or 40 dB below the median.
+    """Return True for channels that are constant, missing, or 35 dB below the median.
 
     Examples
     --------
@@ -122,6 +123,8 @@ def level_notes(
         if weaker > WEAK_DB:
             text = f"is {weaker:.0f} dB weaker than the median of the channels"
             notes.append(f"channel {labels[m]} {text}")
+        if NOTED_CLIPPED < levels.clipped[m] <= MAX_CLIPPED:
+            notes.append(f"channel {labels[m]} is clipped in few samples")
         if levels.missing[m] > 0.01:
             notes.append(f"{100 * levels.missing[m]:.0f} % of channel {labels[m]} are missing")
     if np.median(hum[1]) > MAX_HUM:
@@ -267,17 +270,18 @@ def scale_fault(scale: Float, dim: int, is_confirmed: bool = True) -> Fault | st
     the array is 0.0099 to 0.01 times the size in its file (centimetres for metres?): correct ...
     """
     low, high = scale
-    is_small, is_large = high < NOTED and dim > 1, (low + high) / 2 > LARGER
+    is_small, is_large = high < (NOTED if dim > 1 else SMALLER), (low + high) / 2 > LARGER
     if not is_small and not is_large:
         return None
-    size = f"{low:.2g} to {high:.2g} times the size in its file"
-    is_sure = not is_small or (high < SMALLER and low > MIN_LOW * high)
-    if not is_confirmed or not is_sure:
-        cause = "waves from far outside of its plane, echoes" if is_small else "echoes"
-        return f"delays fit an array {size}: {cause}, another wave speed, or wrong lengths"
     least, most = (1 / high, 1 / max(low, 1e-9)) if is_small else (low, high)
     units = [unit for factor, unit in LENGTH_UNITS.items() if least / 1.1 < factor < most * 1.1]
     hint = f" ({', or '.join(units)}?)" if units else ""
+    size = f"{low:.2g} to {high:.2g} times the size in its file"
+    is_sure = not is_small or (dim > 1 and high < SMALLER and low > MIN_LOW * high)
+    if not is_confirmed or not is_sure:
+        aside = "waves from far outside of its plane" if dim > 1 else "waves from its side"
+        cause = f"{aside}, echoes" if is_small else "echoes"
+        return f"delays fit an array {size}: {cause}, another wave speed, or wrong lengths"
     text = f"the array is {size}{hint}: correct its lengths, or the wave speed, in the array file"
     return Fault("scale", (), text)
 

@@ -11,7 +11,7 @@ from arrivals.recordings.check.beam_agreement import scan_responses
 from arrivals.recordings.check.segments import PhaseSegments, Rows, window_length
 from arrivals.recordings.check.spacing_scale import spacing_scale
 from arrivals.recordings.check.wiring import Correction, WiringSearch
-from arrivals.recordings.choice.limits import LOWEST_HZ, alias_frequency
+from arrivals.recordings.choice.limits import LOWEST_HZ, alias_frequency, power_of_two
 from arrivals.typing import Float
 
 LOWEST, HIGHEST = 0.12, 1.5  # of the alias limit: below, phases hardly differ between sensors
@@ -27,6 +27,7 @@ EVEN = 0.8  # least of a channel's agreement, of the median, where nothing is se
 BROKEN = 0.35  # of a channel's agreement, relative to the median
 CORRECTION_COST = 0.03  # of agreement, that one more correction must gain
 MIN_CHANNELS, MIN_DIRECTIONS = 3, 3
+MIN_WINDOWS = 16  # of a recording, if that leaves windows of 64 ms
 MIN_LINES = 5  # below, tones that interfere over several paths resemble faults
 
 
@@ -145,6 +146,7 @@ def wiring_of_samples(
         return _not_tested(array, f"less than {MIN_CHANNELS} channels with a signal")
     alias = alias_frequency(array)
     window = window_length(rate, max(0.04 * alias, min(LOWEST_HZ, alias / 4)))
+    window = min(window, max(window_length(rate, np.inf), power_of_two(n_rows / MIN_WINDOWS)))
     if n_rows < 2 * window:
         return _not_tested(array, "the recording is too short")
     segments = PhaseSegments.of_samples(rows, n_rows, rate, window, effort.examined)
