@@ -120,7 +120,7 @@ class ArrayChannels:
     def _missing(self, frequency: float | None) -> str:
         """Return what the test of the wiring lacks; empty if nothing."""
         if self.array is None or self.fault is not None:
-            return "it requires an array with as many sensors"
+            return "it requires an array with a sensor for each channel"
         if self.array.speed is None:
             return "the array has no wave speed"
         if self.recording.is_narrowband and frequency is None:
