@@ -105,12 +105,12 @@ def mean_beam_power(A: Complex, Y: Complex) -> Float:
     ----------
     A : ndarray, shape (n_nuisance, n_bins, n_sensors, n_directions)
         Steering vectors for each value of the nuisance parameter: slowness or elevation.
-    Y : ndarray, shape (n_bins, n_sensors, n_snapshots)
+    Y : ndarray, shape (..., n_bins, n_sensors, n_snapshots)
         Snapshots without valid data are left out, and sensors that are NaN are left out of theirs.
 
     Returns
     -------
-    ndarray, shape (n_directions,)
+    ndarray, shape (..., n_directions)
         A plane wave of amplitude w has M|w|² in its direction, M the number of valid sensors.
 
     Examples
@@ -119,12 +119,12 @@ def mean_beam_power(A: Complex, Y: Complex) -> Float:
     array([2.])
     """
     valid = ~np.isnan(Y)
-    # axes: nuisance, bins, directions, snapshots
-    beam = np.swapaxes(A.conj(), 2, 3) @ np.where(valid, Y, 0)
-    norm = np.swapaxes(A.real**2 + A.imag**2, 2, 3) @ valid
+    # axes: ..., nuisance, bins, directions, snapshots; |aᴴy| = |aᵀy*|
+    beam = np.swapaxes(A, 2, 3) @ np.where(valid, Y, 0).conj()[..., None, :, :, :]
+    norm = np.swapaxes(A.real**2 + A.imag**2, 2, 3) @ valid[..., None, :, :, :]
     power = (beam.real**2 + beam.imag**2) / np.maximum(norm, 1e-12)
-    n_valid = max(int(valid.any(axis=1).sum()), 1)
-    return np.asarray(power.sum(axis=(1, 3)).max(axis=0) / n_valid)
+    n_valid = np.maximum(valid.any(axis=-2).sum(axis=(-2, -1)), 1)
+    return np.asarray(power.sum(axis=(-3, -1)).max(axis=-2) / n_valid[..., None])
 
 
 def find_peaks(power: Float, *, circular: bool, joined: bool = False) -> Int:

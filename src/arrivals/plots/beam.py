@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
@@ -47,11 +47,11 @@ def draw_beam(
     doa = scan_directions(measurement.array, N_DIRECTIONS)
     starts = np.arange(0, len(at), max(1, -(-len(at) // N_COLUMNS)))
     every = max(1, -(-len(at) // N_STEPS))
-    powers, has_power = [], False
+    power_of, powers, has_power = _beam(measurement, doa), [], False
     for block in _blocks(snapshots, np.diff(np.append(starts, len(at))), measurement.shape):
         block = block[::every]
         has_power = has_power or bool((np.isfinite(block) & (block != 0)).any())
-        powers.append(_beam(measurement, doa, block))
+        powers.append(power_of(block))
     if not has_power:
         return
     power = np.array(powers)
@@ -83,16 +83,23 @@ def _blocks(snapshots: Any, sizes: Int, shape: tuple[int, ...]) -> Iterator[Comp
     raise ValueError(f"snapshots must have shape {(int(sizes.sum()), *shape)}; got {got}")
 
 
-def _beam(measurement: ArraySnapshot, doa: Float, block: Any) -> Float:
-    """Return the highest power in each direction of the steps of a block."""
+def _beam(measurement: ArraySnapshot, doa: Float) -> Callable[[Complex], Float]:
+    """Return the highest power in each direction of the steps of a block, as a function."""
     isotropic = measurement.response is None
     if measurement.is_single and isotropic and measurement.coherence is None:
-        A = measurement.steering_vector(doa)
-        return np.asarray(bartlett_power(A, block).max(axis=0))
+        single = measurement.steering_vector(doa)
+        return lambda block: np.asarray(bartlett_power(single, block).max(axis=0))
     steering = measurement.waves.steering(doa)
-    frames = block.reshape(len(block), measurement.n_bins, measurement.n_snapshots, -1)
-    pairs = (measurement.whitened(np.swapaxes(Y, 1, 2), steering) for Y in frames)
-    return np.asarray(np.max([mean_beam_power(A, Y) for Y, A in pairs], axis=0))
+
+    def power(block: Complex) -> Float:
+        frames = block.reshape(len(block), measurement.n_bins, measurement.n_snapshots, -1)
+        frames = np.swapaxes(frames, 2, 3)  # (n_steps, n_bins, n_sensors, n_snapshots)
+        if measurement.coherence is None:
+            return np.asarray(mean_beam_power(steering, frames).max(axis=0))
+        pairs = (measurement.whitened(Y, steering) for Y in frames)
+        return np.asarray(np.max([mean_beam_power(A, Y) for Y, A in pairs], axis=0))
+
+    return power
 
 
 def _edges(centres: Float) -> Float:
