@@ -87,6 +87,7 @@ def test_forms_of_recording_and_array_give_the_same_run(talk: Float, tmp_path: P
         arrivals.track(tmp_path / "talk.npz", str(tmp_path / "a.toml")),
         arrivals.track(Recording(samples, RATE, array=ARRAY)),
         arrivals.track(read(tmp_path / "talk.npz"), ARRAY),
+        arrivals.track(arrivals.read(tmp_path / "talk.npz", array=tmp_path / "a.toml")),
         arrivals.track(samples, ARRAY, tracker="wideband_mixture", rate=RATE),
     ):
         assert_array_equal(run.doa, expected.doa)

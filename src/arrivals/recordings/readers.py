@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from arrivals.files import file_error, open_input
 from arrivals.measurement_models import SensorArray
+from arrivals.measurement_models.arrays.files import given_array
 from arrivals.measurements import numbers
 from arrivals.recordings.formats.file_contents import (
     MAX_BYTES,
@@ -43,7 +44,7 @@ def read(
     rate: float | None = None,
     variable: str | None = None,
     transpose: bool = False,
-    array: SensorArray | None = None,
+    array: str | PathLike[str] | SensorArray | None = None,
     max_bytes: float = MAX_BYTES,
     rate_required: bool = False,
     format: str | None = None,  # noqa: A002  (the option's name)
@@ -79,8 +80,9 @@ def read(
         Name of the array in a file of named arrays, required if there are several.
     transpose : bool
         True if the rows of the file are channels.
-    array : SensorArray, optional
-        Selects the channels of its sensors, in its order; `array` of the recording.
+    array : str, path or SensorArray, optional
+        Array file, name of a preset, or array. It selects the channels of its sensors, in its
+        order, and is the `array` of the recording.
     max_bytes : float
         Largest size of the numbers, decompressed, of a format that is not read in blocks; larger
         ones are refused unread.
@@ -118,7 +120,7 @@ def read(
     (4, 1000.0, 0.5)
     """
     options = ReadingOptions(variable, transpose, max_bytes, rate_required, format)
-    return _read(path, rate, options, array, select=True)
+    return _read(path, rate, options, given_array(array), select=True)
 
 
 def read_channels(
