@@ -12,7 +12,6 @@ from reading_tables import NAMES, PLACES, START, iso, sensors, text, truth, walk
 
 import arrivals
 from arrivals.measurement_models.arrays.local_plane import LocalPlane
-from arrivals.plots.maps import plot_map
 from arrivals.recordings.networks import Network
 from arrivals.trackers.run import Run
 from arrivals.typing import Float
@@ -85,8 +84,9 @@ def test_several_devices_are_located_one_by_one(tmp_path: Path) -> None:
     assert located.header == ("device", *alone.header)
     with pytest.raises(ValueError, match=r"run must be one of runs.*tag-1, tag-2"):
         located.run  # noqa: B018
-    names = [one.get_text() for one in plot_map(located.runs).get_legend().get_texts()]  # type: ignore[union-attr]
-    assert names == ["tag-1", "tag-2"]
+    legend: Any = arrivals.plot(located).get_legend()
+    assert [one.get_text() for one in legend.get_texts()] == ["sensors", "tag-1", "tag-2"]
+    np.testing.assert_array_equal(located.sensors, np.unique(PLACES, axis=0))
 
 
 def test_group_by_names_the_column_of_the_devices(tmp_path: Path) -> None:

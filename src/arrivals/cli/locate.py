@@ -8,8 +8,6 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-
 from arrivals.cli.outputs import check_different
 from arrivals.files import check_output
 from arrivals.recordings.networks.locating import locate
@@ -115,12 +113,9 @@ def run_locate(arguments: argparse.Namespace, bar: Callable[..., Any]) -> None:
         writer.writerows(located.rows())
     if arguments.plot:
         from arrivals.plots.bearing_time import save
-        from arrivals.plots.maps import plot_map
+        from arrivals.plots.runs import plot
 
-        networks = list(located.networks.values())
-        sensors = np.unique(np.concatenate([one.sensors[-1] for one in networks]), axis=0)
-        runs = located.runs if located.has_devices else located.run
-        save(plot_map(runs, sensors=sensors, truth=networks[0].truth), arguments.plot)
+        save(plot(located), arguments.plot)
 
 
 def _check_outputs(arguments: argparse.Namespace) -> None:

@@ -2,23 +2,41 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Protocol
 
 from arrivals.plots.bearing_time import plot_bearing_time
 from arrivals.plots.maps import plot_map
 from arrivals.trackers.run import Run
+from arrivals.typing import Float
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-def plot(run: Run, **more: Any) -> Axes:
-    """Draw the directions of a run over time, or its positions on a map.
+class PlacedRuns(Protocol):
+    """Runs of trackers of positions by name, as `arrivals.locate` returns them."""
+
+    @property
+    def runs(self) -> Mapping[str, Run]:
+        """Runs by name."""
+
+    @property
+    def sensors(self) -> Float:
+        """Sensor positions, m, (n_sensors, 2)."""
+
+    @property
+    def truth(self) -> Float | None:
+        """True positions, m, (n_steps, n_sources, 2), if they are known."""
+
+
+def plot(run: Run | PlacedRuns, **more: Any) -> Axes:
+    """Draw the directions of a run over time, or positions on a map.
 
     Parameters
     ----------
-    run : Run
-        Run of a tracker of directions or of positions.
+    run : Run, or the result of `arrivals.locate`
+        Run of a tracker of directions or of positions, or several of positions.
     **more : object
         Arguments of `plot_bearing_time` or of `plot_map`; the times are those of the run.
 
@@ -35,6 +53,8 @@ def plot(run: Run, **more: Any) -> Axes:
     >>> plot(CBF(model).run([model.steering_vector(0.5)])).get_ylabel()
     'direction of arrival, degrees'
     """
+    if not isinstance(run, Run):
+        return plot_map(run.runs, **{"sensors": run.sensors, "truth": run.truth} | more)
     if "doa" in run.fields:
         return plot_bearing_time(run, **{"time": run.time} | more)
     return plot_map(run, **more)

@@ -7,10 +7,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from os import PathLike
 
+import numpy as np
+
 from arrivals.files import atomic_write
 from arrivals.recordings.networks.network import Network
 from arrivals.recordings.networks.times import iso_text
 from arrivals.trackers.run import Run, header, text
+from arrivals.typing import Float
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +50,17 @@ class Located:
         if len(self.runs) != 1:
             raise ValueError(f"run must be one of runs[...]: {', '.join(self.runs)}")
         return next(iter(self.runs.values()))
+
+    @property
+    def sensors(self) -> Float:
+        """Last positions of the sensors of all devices, m, (n_sensors, 2)."""
+        last = [network.sensors[-1] for network in self.networks.values()]
+        return np.unique(np.concatenate(last), axis=0)
+
+    @property
+    def truth(self) -> Float | None:
+        """True positions, m, of the first device, if they are known."""
+        return next(iter(self.networks.values())).truth
 
     @property
     def header(self) -> tuple[str, ...]:
