@@ -105,6 +105,7 @@ def _finish(ax: Axes, dim: int, clockwise: bool) -> None:
         ax.axhline(0, color="0.8", linewidth=1, zorder=1)
         ax.set(xlabel="position, m", yticks=[], ylim=(-0.4, 1))
         ax.spines[["left", "right", "top"]].set_visible(False)
+        ax.locator_params(axis="x", nbins=6)
         return
     names = ("east, m", "north, m") if clockwise else ("x, m", "y, m")
     ax.set(xlabel=names[0], ylabel=names[1])
