@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from arrivals.measurement_models.arrays.positions import UNITS
+
 SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "secs": 1.0, "seconds": 1.0, "utc": 1.0, "iso": 1.0,
            "iso8601": 1.0, "unix": 1.0, "epoch": 1.0, "ms": 1e-3, "msec": 1e-3, "millis": 1e-3,
            "milliseconds": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}  # fmt: skip
-METRES = {"": 1.0, "m": 1.0, "meters": 1.0, "metres": 1.0, "cm": 1e-2, "mm": 1e-3, "km": 1e3,
-          "ft": 0.3048}  # fmt: skip
+METRES = {"": 1.0, "meters": 1.0, "metres": 1.0, **UNITS}
 DEGREES = {"": 1.0, "deg": 1.0, "degrees": 1.0, "wgs84": 1.0}
 DECIBELS = {"": 1.0, "db": 1.0, "dbm": 1.0, "dbfs": 1.0}
 NO_UNIT = {"": 1.0}
