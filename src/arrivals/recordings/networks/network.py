@@ -67,9 +67,7 @@ class Network:
         for name, expected in (("rss_db", shape), ("sensors", (*shape, 2))):
             got = getattr(self, name).shape
             if got != expected:
-                raise ValueError(
-                    f"{name} must have shape {expected}; got {getattr(self, name).shape}"
-                )
+                raise ValueError(f"{name} must have shape {expected}; got {got}")
         if not np.isfinite(self.time).all():
             raise ValueError(f"time must be finite; got NaN in step {np.isnan(self.time).argmax()}")
         got = (len(self), 0, 2) if self.truth is None else self.truth.shape

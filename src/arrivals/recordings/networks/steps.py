@@ -88,9 +88,9 @@ def scattered_window(readings: SingleReadings, speed: float) -> float | None:
     order = np.lexsort((time, sensor))
     between = np.diff(time[order])[np.diff(sensor[order]) == 0]
     between = between[between > 0]
-    if not between.size or len(np.unique(sensor)) < 2:
-        return None
     n_sensors = len(np.unique(sensor))
+    if not between.size or n_sensors < 2:
+        return None
     extent = float(np.ptp(readings.positions, axis=0).max())
     longest = extent / (2 * np.sqrt(n_sensors) * max(speed, 1e-9))
     length = min(float(np.median(between)), longest)

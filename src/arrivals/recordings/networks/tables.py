@@ -140,8 +140,8 @@ def _wide(cells: Cells, table: SensorTable, missing: Sequence[float]) -> ReadTab
         np.repeat(time, n), np.tile(sensor, len(levels)), checked(levels.ravel(), missing),
         tuple(table.name), table.positions, plane=table.plane, start=start,
     )  # fmt: skip
-    rows = None if device is None else np.repeat(np.array(cells.texts(device), dtype=object), n)
-    return _by_device(readings, rows, device, True, (f"{n} columns of sensors", phrase))
+    names = None if device is None else [one for one in cells.texts(device) for _ in columns]
+    return _by_device(readings, names, device, True, (f"{n} columns of sensors", phrase))
 
 
 def _long(cells: Cells, table: SensorTable, missing: Sequence[float]) -> ReadTable:
@@ -174,7 +174,7 @@ def _long(cells: Cells, table: SensorTable, missing: Sequence[float]) -> ReadTab
     level = checked(np.array([row.real(cells.found["level"].name) for row in cells.rows]), missing)
     readings = SingleReadings(time, sensor, level, tuple(table.name), table.positions,
                               plane=table.plane, start=start)  # fmt: skip
-    names = None if device is None else np.array(cells.texts(device), dtype=object)
+    names = None if device is None else cells.texts(device)
     phrases = [phrase, f"sensor {column!r}", f"level {cells.found['level'].name!r}"]
     if any(set(pair) <= set(cells.found) for pair in POSITIONS):
         phrases.append("positions in the rows not used")
@@ -224,12 +224,12 @@ def _with_positions(cells: Cells, missing: Sequence[float]) -> ReadTable:
         phrases.append("sources at rest")
     if not valid.all():
         phrases.append(f"rows without level or position left out: {np.count_nonzero(~valid)}")
-    names = None if device is None else np.array(cells.texts(device), dtype=object)
+    names = None if device is None else cells.texts(device)
     return _by_device(readings, names, device, False, tuple(phrases), valid)
 
 
 def _by_device(
-    readings: SingleReadings, names: Any, column: str | None, is_wide: bool,
+    readings: SingleReadings, names: Sequence[str] | None, column: str | None, is_wide: bool,
     phrases: tuple[str, ...], valid: Bool | None = None,
 ) -> ReadTable:  # fmt: skip
     """Return the readings of each device, without those that are not valid."""
