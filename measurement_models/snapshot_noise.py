@@ -152,7 +152,7 @@ class SnapshotNoise(SnapshotGate, SingleSourceSnapshot):
     def observe(
         self, z: ArrayLike | None, reference: Reference = "middle"
     ) -> ObservedSnapshots | None:
-        """Return what `SnapshotGate.observe` does, with snapshots in white noise, L z."""
+        """Return the valid data as `SnapshotGate.observe` does, in white noise: L z."""
         observed = super().observe(z, reference)
         if observed is None or self.coherence is None:
             return observed

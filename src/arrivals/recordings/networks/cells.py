@@ -45,7 +45,7 @@ class Cells:
 
 
 def times(cells: Cells) -> tuple[Float, float | None, str]:
-    """Return times, what they count from, and a phrase about them."""
+    """Return times, their origin, and a phrase about them; the origin is None without dates."""
     found = cells.found
     column = found.get("time") or found.get("date")
     if column is None:

@@ -130,7 +130,7 @@ def _read(path: str | PathLike[str]) -> SensorTable:
 def position_columns(
     found: Mapping[str, Column], columns: Sequence[str]
 ) -> tuple[tuple[str, str], Column, Column]:
-    """Return the two columns of positions, and whether they are x, y or latitude, longitude.
+    """Return the pair of roles, x, y or latitude, longitude, and the two columns of positions.
 
     Raises
     ------

@@ -17,7 +17,7 @@ SMALLER_UNITS = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3))
 
 
 def parsed(cells: Sequence[str], lines: Sequence[int], scale: float) -> tuple[Float, float | None]:
-    """Return times, s, and what they count from if they have a date.
+    """Return times, s, and their origin if they have dates.
 
     Parameters
     ----------
