@@ -55,10 +55,7 @@ def read_audio(path: Path, options: ReadingOptions) -> FileContents:
     package = import_reader_package("soundfile", f"a {path.suffix} file")
     with open_input(path) as opened:
         expected = announced_size(opened.read(24))
-    if expected > path.stat().st_size:
-        raise ValueError(
-            f"truncated: expected {expected} bytes; got {path.stat().st_size}: copy it again"
-        )
+    check_length(expected, path.stat().st_size)
     try:
         with package.SoundFile(path) as file:
             shape, rate = (file.frames, file.channels), float(file.samplerate)

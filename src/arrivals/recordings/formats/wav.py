@@ -11,7 +11,7 @@ import numpy as np
 
 from arrivals.files import open_input
 from arrivals.recordings.formats.audio import read_audio
-from arrivals.recordings.formats.file_contents import FileContents, ReadingOptions
+from arrivals.recordings.formats.file_contents import FileContents, ReadingOptions, check_length
 from arrivals.recordings.raw_numbers import RawRows, scale_of
 from arrivals.recordings.stored_samples import StoredSamples
 from arrivals.validation import positive
@@ -65,10 +65,7 @@ def read_wav(path: Path, options: ReadingOptions) -> FileContents:
         file.seek(0)
         form, start, size = wav_header(file, length)
     rate, present = positive("rate", form.rate), length - start
-    if size is not None and size > present:
-        raise ValueError(
-            f"truncated: expected {size} bytes of samples; got {present}: copy it again"
-        )
+    check_length(size or 0, present, "bytes of samples")
     if form.kind is None:
         return read_audio(path, options)
     n_samples = (present if size is None else size) // form.frame
