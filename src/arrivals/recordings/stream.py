@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, BinaryIO, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from arrivals.measurements import is_missing
 from arrivals.recordings.narrowband import (
@@ -16,6 +15,7 @@ from arrivals.recordings.narrowband import (
     default_window,
 )
 from arrivals.recordings.raw_numbers import DTYPES, Replay, decoded, item_size
+from arrivals.recordings.stored_samples import cleaned
 from arrivals.trackers import Tracker
 from arrivals.trackers.run import header, text
 from arrivals.typing import Complex, Float
@@ -101,7 +101,7 @@ def live_snapshots(
         samples = decoded(block, kind).reshape(-1, n_channels)
         first = step * n * hop
         if spectrum is None:
-            z = _complex_frames(samples)
+            z = cleaned(samples, np.dtype(complex))
         else:
             z = spectrum.amplitudes(samples, hop, first).swapaxes(0, 1)
             z = z if isinstance(frequency, Sequence | np.ndarray) else z[0]
@@ -130,13 +130,6 @@ def _steps(source: BinaryIO, frame: int, window: int, hop: int, n: int) -> Itera
     raise ValueError(
         f"the stream ended after {frames} frames of {frame} bytes; one window requires {window}"
     )
-
-
-def _complex_frames(frames: NDArray[Any]) -> Complex:
-    """Return frames of complex numbers, NaN where one is not finite."""
-    with np.errstate(invalid="ignore"):  # signalling NaN
-        z = frames.astype(np.complex128)
-    return np.where(np.isfinite(z), z, complex(np.nan, np.nan))
 
 
 def read_ahead(
