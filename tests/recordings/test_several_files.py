@@ -70,7 +70,7 @@ def test_files_that_differ_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"ch0.cf32: .*ch1.cf32 must have the same length: 50"):
         read(paths)
     np.save(tmp_path / "real.npy", NUMBERS[:, 0])
-    with pytest.raises(ValueError, match="the same kind of samples"):
+    with pytest.raises(ValueError, match="the same kind of samples: complex; got real"):
         read([paths[0], tmp_path / "real.npy"])
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["samples"], file["rate"] = NUMBERS, 3.0

@@ -89,9 +89,9 @@ def read(
     rate_required : bool
         True to refuse real samples without a rate; arrays with a header are not loaded then.
     format : str, optional
-        Format of a file without a header, such as cs16; it takes the place of the suffix. Its
-        number of channels is that of `array`, and one without, or one in each of several files;
-        ``cs16:5`` is another one.
+        Format of a file without a header, such as cs16; it takes the place of the suffix. The
+        number of channels is that of `array`; without an array, or in each of several files, it is
+        one. ``cs16:5`` has five channels.
 
     Returns
     -------

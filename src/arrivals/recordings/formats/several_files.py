@@ -124,7 +124,7 @@ def joined(
             "length": (len(arrays[0]), len(array)),
             "rate": (first.rate, each.rate),
             "frequency": (first.frequency, each.frequency),
-            "kind of samples": (arrays[0].dtype.kind == "c", array.dtype.kind == "c"),
+            "kind of samples": (_kind(arrays[0]), _kind(array)),
         }
         for noun, (one, other) in properties.items():
             if one != other:
@@ -133,6 +133,10 @@ def joined(
     whole = _side_by_side(arrays)
     together = tuple(name for each in names for name in each)
     return first._replace(array=whole, names=together if all(names) else None, note=None)
+
+
+def _kind(array: NDArray[Any] | StoredSamples) -> str:
+    return "complex" if array.dtype.kind == "c" else "real"
 
 
 def _side_by_side(
