@@ -68,6 +68,17 @@ def scale_of(kind: str) -> float | None:
     return float(2.0 ** (1 - 8 * (4 if kind[1:] == "i3" else np.dtype(kind).itemsize)))
 
 
+def real_type(kind: str) -> np.dtype[Any]:
+    """Return the type of scaled numbers: float32 for up to 16 bits and float32, else float64.
+
+    Examples
+    --------
+    >>> [str(real_type(kind)) for kind in ("<i2", "<i3", ">f4")]
+    ['float32', 'float64', 'float32']
+    """
+    return np.dtype(np.float32 if kind[1:] in ("f4", "i2", "i1", "u1") else np.float64)
+
+
 def decoded(raw: bytes, kind: str) -> NDArray[Any]:
     r"""Return the numbers in some bytes, integers as float64 in [-1, 1).
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arrivals.recordings.formats.file_contents import FileContents, ReadingOptions
+from arrivals.recordings.raw_numbers import real_type
 from arrivals.recordings.stored_samples import StoredSamples
 from arrivals.validation import count
 
@@ -28,13 +29,12 @@ class RawType(NamedTuple):
     @property
     def pair_type(self) -> np.dtype[Any]:
         """complex64 for parts of up to 16 bits and float32, else complex128."""
-        is_single = self.dtype.itemsize <= 2 or self.dtype.str == "<f4"
-        return np.dtype("<c8" if is_single else "<c16")
+        return np.result_type(real_type(self.dtype.str), np.complex64)
 
     def decoded(self, raw: bytes | NDArray[Any]) -> NDArray[np.complexfloating[Any]]:
         """Return pairs of parts as complex numbers, full scale 1."""
         numbers = np.frombuffer(raw, self.dtype)
-        real = np.dtype(f"<f{self.pair_type.itemsize // 2}").type
+        real = real_type(self.dtype.str).type
         parts = numbers.astype(real)
         if numbers.dtype.kind != "f":
             parts -= real(self.zero)

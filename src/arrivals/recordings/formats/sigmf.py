@@ -19,7 +19,7 @@ from arrivals.recordings.formats.file_contents import (
     damage_refused,
     import_reader_package,
 )
-from arrivals.recordings.raw_numbers import RawRows, scale_of
+from arrivals.recordings.raw_numbers import RawRows, real_type, scale_of
 from arrivals.recordings.stored_samples import StoredSamples
 from arrivals.validation import count, positive
 
@@ -60,8 +60,9 @@ def read_sigmf(path: Path, options: ReadingOptions) -> FileContents:
     is_complex, kind = parts == "c", _number(name)
     zero = 128 if kind == "|u1" else 0
     rows = RawRows(data, offset, kind, (1 + is_complex) * n_channels, zero)
-    load, row = partial(_rows, rows, is_complex), np.dtype(complex if is_complex else _real(kind))
-    samples = StoredSamples((n_bytes // frame, n_channels), row, load)
+    dtype = np.dtype(complex) if is_complex else real_type(kind)
+    load = partial(_rows, rows, is_complex)
+    samples = StoredSamples((n_bytes // frame, n_channels), dtype, load)
     rate = fields.get("core:sample_rate")
     rate = None if rate is None else positive("core:sample_rate", rate)
     frequency, note = _frequency(captures), _note(captures, recording.get_annotations())
@@ -70,15 +71,10 @@ def read_sigmf(path: Path, options: ReadingOptions) -> FileContents:
 
 def _rows(rows: RawRows, is_complex: bool, start: int, stop: int) -> NDArray[Any]:
     """Return rows of all channels, (stop - start, n_channels); integers in [-1, 1)."""
-    numbers = np.ascontiguousarray(rows(start, stop), _real(rows.kind))
+    numbers = np.ascontiguousarray(rows(start, stop), real_type(rows.kind))
     scale = scale_of(rows.kind)
     numbers = numbers if scale is None else np.multiply(numbers, scale, dtype=numbers.dtype)
     return numbers.view(np.result_type(numbers, np.complex64)) if is_complex else numbers
-
-
-def _real(kind: str) -> type[np.float32 | np.float64]:
-    """Return the precision of a type code: float32 for up to 16 bits and floats of 32."""
-    return np.float32 if kind[1:] in ("f4", "i2", "i1", "u1") else np.float64
 
 
 def _number(name: str) -> str:
@@ -125,7 +121,7 @@ def _checked(recording: Any, n_bytes: int) -> tuple[int, int]:
     frame = recording.get_sample_size() * n_channels
     parts = [*captures, *recording.get_annotations()]
     ends = (each.get("core:sample_start", 0) + each.get("core:sample_count", 0) for each in parts)
-    least = max(1, *ends, 1)
+    least = max([1, *ends])
     if n_bytes % frame or n_bytes // frame < least:
         raise ValueError(
             f"expected at least {least} samples of {n_channels} channels, {datatype} ({frame} "

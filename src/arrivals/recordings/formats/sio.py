@@ -21,6 +21,7 @@ from arrivals.recordings.formats.file_contents import (
     ReadingOptions,
     check_length,
 )
+from arrivals.recordings.raw_numbers import real_type
 from arrivals.recordings.stored_samples import StoredSamples
 
 CHECK, HEADER = 32677, 128  # the check word; bytes of the header
@@ -93,10 +94,9 @@ def read_sio(path: Path, options: ReadingOptions) -> FileContents:
     whole = header.record_bytes * (n_rounds + 1) * header.n_channels
     least = whole + (rest + 1) * header.dtype.itemsize
     check_length(least, present)
-    is_single = header.dtype.itemsize == 2 or header.dtype.kind == "f"
     samples = StoredSamples(
         (header.n_samples, header.n_channels),
-        np.dtype(np.float32 if is_single else np.float64),
+        real_type(header.dtype.str),
         partial(_rows, path, header),
     )
     return FileContents(samples)

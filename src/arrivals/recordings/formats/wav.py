@@ -7,12 +7,10 @@ import struct
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
-import numpy as np
-
 from arrivals.files import open_input
 from arrivals.recordings.formats.audio import read_audio
 from arrivals.recordings.formats.file_contents import FileContents, ReadingOptions, check_length
-from arrivals.recordings.raw_numbers import RawRows, scale_of
+from arrivals.recordings.raw_numbers import RawRows, real_type, scale_of
 from arrivals.recordings.stored_samples import StoredSamples
 from arrivals.validation import positive
 
@@ -69,10 +67,9 @@ def read_wav(path: Path, options: ReadingOptions) -> FileContents:
     if form.kind is None:
         return read_audio(path, options)
     n_samples = (present if size is None else size) // form.frame
-    dtype = np.dtype(np.float32 if form.kind[1:] in ("u1", "i2", "f4") else np.float64)
     rows = RawRows(path, start, form.kind, form.n_channels, 128 if form.kind == "|u1" else 0)
     shape, scale = (n_samples, form.n_channels), scale_of(form.kind)
-    return FileContents(StoredSamples(shape, dtype, rows, scale=scale), rate)
+    return FileContents(StoredSamples(shape, real_type(form.kind), rows, scale=scale), rate)
 
 
 def wav_header(file: BinaryIO, length: int | None = None) -> WavHeader:
