@@ -147,7 +147,7 @@ def complex_frames(source: BinaryIO, dtype: str) -> tuple[BinaryIO, str]:
     source : binary file
         As in `live_snapshots`.
     dtype : str
-        One of `DTYPES` or of `RAW_TYPES`; integers such as cs16 are converted to complex64.
+        One of `DTYPES` or of `RAW_TYPES`; pairs of the latter are converted to complex numbers.
 
     Returns
     -------
@@ -174,7 +174,7 @@ class _Converted:
         self._source, self._kind = source, kind
 
     def read(self, size: int) -> bytes:
-        """Return the next bytes of complex64, or complex128 for pairs of 32 bits and more."""
+        """Return the next bytes of complex numbers of the type `pair_type`."""
         pair = 2 * self._kind.dtype.itemsize
         block = self._source.read(size // self._kind.pair_type.itemsize * pair)
         return self._kind.decoded(block[: len(block) // pair * pair]).tobytes()

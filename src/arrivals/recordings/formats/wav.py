@@ -37,7 +37,7 @@ class SampleFormat(NamedTuple):
 class WavHeader(NamedTuple):
     """Header of a WAV file: format, first byte and number of bytes of the samples.
 
-    The size is None if the writer did not know it.
+    The size is None if the header does not contain it.
     """
 
     form: SampleFormat
