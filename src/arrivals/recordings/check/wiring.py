@@ -13,19 +13,19 @@ from arrivals.recordings.check.segments import PhaseSegments
 from arrivals.typing import Complex, Float, Int
 
 INVERTED, SWAPPED, LATE = "inverted", "swapped", "late"
-# Least gain of beam power, in units of what one more channel in phase adds. In 72 rooms without
-# a fault the largest gains are 0.00 of a swap, 0.03 of a delay and -1.8 of an inversion.
+# Least gain of beam power, in units of what one more channel in phase adds. Set above the gains
+# in simulated rooms without a fault, with the most room for inversions, the least for swaps.
 MIN_GAIN = {INVERTED: 0.4, SWAPPED: 0.06, LATE: 0.15}
 MIN_NARROWBAND_GAIN = 0.3  # with one frequency: other directions make up for small changes
-# Share of the best gain that is enough, as delays fit anything. In 72 rooms an inverted channel
-# has at least 1.00 of it, a late one at most 0.84 as an inversion.
+# Share of the best gain that is enough, as delays fit anything. Set between the shares of an
+# inversion in simulated rooms with an inverted channel, and in those with a late one.
 SIMPLER = {INVERTED: 0.93, SWAPPED: 0.95, LATE: 1.0}
 SIMILAR = {INVERTED: 0.9, SWAPPED: 0.9, LATE: 0.85}  # share of the gain that is worth a mention
 PAIR_RATIO = 1.3  # of beam power after two inversions to that after one change
 MAX_ALTERNATIVES = 3
 REFINED = 2  # samples about the peak of the agreement
 MIN_SIGNIFICANCE = 2.5  # standard errors of the gain, over segments
-MIN_LINE_SIGNIFICANCE = 2.2  # over lines of the spectrum: at most 2.05 of tones over several paths
+MIN_LINE_SIGNIFICANCE = 2.2  # over lines of the spectrum, above tones over several paths
 MIN_PEAK = 0.4  # of a delayed channel's agreement, relative to the others
 SAME_DIRECTION = 0.8  # coherence of responses
 MAX_DELAY = 64  # samples

@@ -17,7 +17,7 @@ from arrivals.typing import Float
 LOWEST, HIGHEST = 0.12, 1.5  # of the alias limit: below, phases hardly differ between sensors
 LOWEST_OF_RATE = 0.05  # where that is lower: of an array of almost no size
 MIN_SCALE = 1e-3  # of waves from straight above: no delays at all
-MIN_AGREEMENT = 0.5  # median of the channels; 0.73 to 0.93 in 72 rooms
+MIN_AGREEMENT = 0.5  # median of the channels; set below that of right arrays in simulated rooms
 MIN_WEIGHT = 20.0  # cells of coherent channels; white noise has less than 5
 MIN_SNAPSHOT_WEIGHT = 5.0  # segments of complex snapshots
 USUAL_SCALE = (0.8, 1.25)  # beyond: elevated sources, another wave speed, or wrong lengths
