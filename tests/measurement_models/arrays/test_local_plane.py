@@ -18,7 +18,9 @@ def test_plane_is_a_round_trip(origin: tuple[float, float], x: float, y: float) 
     np.testing.assert_allclose(back, (x, y), rtol=0, atol=1e-6)
 
 
-@pytest.mark.parametrize(("distance", "largest"), [(1e3, 1e-6), (1e4, 1e-4), (1e5, 0.02)])
+@pytest.mark.parametrize(
+    ("distance", "largest"), [(1e3, 1e-6), (1e4, 1e-4), (3e4, 1e-3), (1e5, 0.02), (9e5, 11.0)]
+)
 def test_plane_has_the_distances_and_azimuths_of_geodesics(distance: float, largest: float) -> None:
     geod = pytest.importorskip("pyproj").Geod(ellps="WGS84")
     azimuth = np.linspace(-180, 180, 37)
@@ -28,6 +30,20 @@ def test_plane_has_the_distances_and_azimuths_of_geodesics(distance: float, larg
         lon, far, _ = geod.fwd(many[0], many[1], azimuth, many[2])
         error = np.linalg.norm(LocalPlane(lat, 10.0).to_xy(far, lon) - truth, axis=0)
         assert error.max() < largest
+
+
+@pytest.mark.parametrize(("radius", "largest"), [(1e4, 4.2e-7), (1e5, 4.2e-5)])
+def test_plane_has_other_distances_slightly_too_long(radius: float, largest: float) -> None:
+    geod = pytest.importorskip("pyproj").Geod(ellps="WGS84")
+    azimuth, (i, j) = np.linspace(-180, 170, 36), np.triu_indices(36, 1)
+    for lat in (-60.0, 0.0, 45.0, 89.9):
+        many = [np.full(36, value) for value in (10.0, lat, radius)]
+        lon, far, _ = geod.fwd(many[0], many[1], azimuth, many[2])
+        x = np.array(LocalPlane(lat, 10.0).to_xy(far, lon))
+        true = geod.inv(lon[i], far[i], lon[j], far[j])[2]
+        excess = np.linalg.norm(x[:, i] - x[:, j], axis=0) / true - 1
+        assert excess.min() > -1e-9
+        assert 0.9 * largest < excess.max() < largest
 
 
 def test_plane_around_positions_crosses_the_date_line() -> None:
