@@ -86,3 +86,19 @@ def test_weak_sources_are_found_and_deviations_of_receivers_are_not(snr_db: floa
     recording = Recording(y, 240e3, frequency=3e8 / 0.69)
     run = track(recording, ARRAY)
     assert_allclose(np.rad2deg(np.sort(run.doa[2:])), [[-100, 30]] * (len(run) - 2), atol=12)
+
+
+@pytest.mark.parametrize(("doa_deg", "snr_db"), [([30.0], -10.0), ([30.0, 75.0], -7.0)])
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_weak_sources_are_found_within_300_ms(
+    doa_deg: list[float], snr_db: float, seed: int
+) -> None:
+    rng, n = np.random.default_rng(seed), len(doa_deg)
+    white = rng.standard_normal((96_000, n + 5)) + 1j * rng.standard_normal((96_000, n + 5))
+    deviations = 10 ** (rng.normal(0, 1, 5) / 20) * np.exp(1j * rng.normal(0, 0.087, 5))
+    A = ARRAY.steering_vector(np.deg2rad(doa_deg), 0.69) * deviations
+    y = 10 ** (snr_db / 20) * white[:, :n] @ A + white[:, n:]
+    run = track(Recording(y, 240e3, frequency=3e8 / 0.69), ARRAY)
+    late = run.time > 0.3
+    assert (run.n_found[late] == n).all()
+    assert_allclose(np.rad2deg(np.sort(run.doa[late])[:, :n]), [doa_deg] * late.sum(), atol=3)
