@@ -1,6 +1,7 @@
 """Wiring faults are found and named; recordings without faults have none."""
 
 from pathlib import Path
+from textwrap import indent
 
 import numpy as np
 import pytest
@@ -267,6 +268,12 @@ def test_snapshots_from_many_directions_show_inverted_swapped_and_dead_channels(
     still = array.steering_vector(np.full(900, 1.0), 0.7)
     report = check(still * signs, array, frequency=490.0)
     assert (report.faults, len(report.notes)) == ((), 1)
+
+
+def test_report_of_the_documentation_is_that_of_a_room() -> None:
+    page = Path(__file__).parents[2] / "docs" / "recordings.md"
+    samples = inverted(delayed(talk_in_room(CIRCLE, seconds=6.0), 1, 7), 4)
+    assert indent(str(checked(samples)), 4 * " ") in page.read_text(encoding="utf-8")
 
 
 def test_track_warns_of_a_fault_and_not_without() -> None:
