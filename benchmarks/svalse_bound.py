@@ -120,7 +120,7 @@ def gains(name: str, seeds: range) -> dict[str, list[float]]:
         trial = create(name).sample(np.random.default_rng(seed))
         model = trial.measurement
         assert isinstance(model, ArraySnapshot)
-        middle, first = model.manifold("middle"), model.manifold("first")
+        middle, first = model.angle_manifold("middle"), model.angle_manifold("first")
         tracker = SVALSE(model, BernoulliVonMises())
         for t, y in enumerate(trial.measurements):
             tracker.predict()

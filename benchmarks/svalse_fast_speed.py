@@ -147,7 +147,7 @@ class Counted(np.ndarray):
 def calls() -> None:
     """Array calls of one Newton step, six components, without and with learning the noise."""
     model, z, truth = draw("svalse_fig4", range(1, 2))
-    manifold, y = model.manifold(), z[0, :1]
+    manifold, y = model.angle_manifold(), z[0, :1]
     components = Components.zeros(1, 6)
     components.mu[0] = manifold.from_doa(truth[0])
     components.variance[0], components.kl_constant[0] = 1e-3, LOG_2PI

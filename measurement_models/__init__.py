@@ -14,7 +14,7 @@ from arrivals.measurement_models.delays.source_correlation import Autoregressive
 from arrivals.measurement_models.direction_measurement import DirectionMeasurement
 from arrivals.measurement_models.function import FunctionMeasurement
 from arrivals.measurement_models.linear import LinearMeasurement
-from arrivals.measurement_models.manifolds.manifold import Manifold
+from arrivals.measurement_models.manifolds.manifold import AngleManifold, Manifold, PointManifold
 from arrivals.measurement_models.manifolds.symmetric_line import ArrayManifold
 from arrivals.measurement_models.signal_strength.decibels import (
     db_to_neper,
@@ -38,6 +38,8 @@ __all__ = [
     "composite",
     "DirectionMeasurement",
     "Manifold",
+    "AngleManifold",
+    "PointManifold",
     "ArrayManifold",
     # bearings and signal strength
     "Bearing",

@@ -21,7 +21,12 @@ from arrivals.measurement_models.arrays.plane_waves import PlaneWaves, frequency
 from arrivals.measurement_models.arrays.sensor_array import SensorArray, direction
 from arrivals.measurement_models.base import MeasurementModel
 from arrivals.measurement_models.manifolds.fourier import fourier_manifold
-from arrivals.measurement_models.manifolds.manifold import Manifold, Reference
+from arrivals.measurement_models.manifolds.manifold import (
+    AngleManifold,
+    Manifold,
+    Reference,
+    angle_manifold,
+)
 from arrivals.measurement_models.manifolds.uniform_line import grid_line
 from arrivals.measurement_models.manifolds.whitened import whitened_manifold
 from arrivals.measurement_models.snapshot_likelihood import (
@@ -199,6 +204,16 @@ class ArraySnapshot(SnapshotNoise):
             check_directions(self.waves)
             self._manifolds[reference] = self._new_manifold(reference)
         return self._manifolds[reference]
+
+    def angle_manifold(self, reference: Reference = "middle") -> AngleManifold:
+        """Return the response as a Fourier series of one angle.
+
+        Raises
+        ------
+        ValueError
+            As `manifold` does, and if a source has two unknowns.
+        """
+        return angle_manifold("this method", self.manifold(reference))
 
     def _new_manifold(self, reference: Reference) -> Manifold:
         if self.coherence is not None:

@@ -32,6 +32,10 @@ class Trial:
         Motion model of the sources.
     signals : ndarray, shape (n_steps, n_sources), optional
         Source signals, complex or real, of scenarios that simulate them.
+    elevation : ndarray, shape (n_steps, n_sources), optional
+        Elevations, rad, where the truth is azimuths on the sphere.
+    range : ndarray, shape (n_steps, n_sources), optional
+        Ranges, m, where waves are spherical; infinite for a plane wave.
 
     Examples
     --------
@@ -46,6 +50,8 @@ class Trial:
     measurement: ArraySnapshot | ArraySamples | LogNormalRSS
     motion: MotionModel
     signals: Complex | Float | None = field(default=None, kw_only=True)
+    elevation: Float | None = field(default=None, kw_only=True)
+    range: Float | None = field(default=None, kw_only=True)
 
     def tracker(self, name: str | type[Tracker], **params: Any) -> Tracker:
         """Make a tracker with those models of the trial that its constructor takes.

@@ -7,12 +7,12 @@ from arrivals.trackers.base import Tracker
 from arrivals.trackers.beamforming.cbf import CBF
 from arrivals.trackers.beamforming.mvdr import MVDR
 from arrivals.trackers.beamforming.spectrum import find_peaks, refine_peaks
+from arrivals.trackers.direction_estimates import RangeEstimate, SourceEstimate, SphereEstimate
 from arrivals.trackers.direction_tracker import DirectionTracker
 from arrivals.trackers.estimates import (
     DirectionEstimate,
     Estimate,
     PositionEstimate,
-    SourceEstimate,
     StateEstimate,
 )
 from arrivals.trackers.gaussian.base import GaussianFilter
@@ -80,12 +80,14 @@ __all__ = [
     "QRDRLS",
     "RSSML",
     "RSSVB",
+    "RangeEstimate",
     "RootMUSIC",
     "Run",
     "SBL",
     "SSBL",
     "SVALSE",
     "SourceEstimate",
+    "SphereEstimate",
     "StateEstimate",
     "Tracker",
     "UKF",

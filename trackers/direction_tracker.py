@@ -21,7 +21,6 @@ from arrivals.trackers.run import Run, RunRecorder
 from arrivals.typing import Bool, Float, Int
 from arrivals.validation import positive
 
-NO_DIRECTION = DirectionEstimate.empty()
 ENDED: Any = object()  # in place of a measurement after the end of a shorter sequence
 
 
@@ -89,6 +88,8 @@ class DirectionTracker(Tracker):
         Their variances on the diagonal, rad²; 0 where unknown.
     estimate : DirectionEstimate
         Directions reported last; read-only.
+    estimate_kind : type of DirectionEstimate
+        Its class; with two unknowns a source `x` and `P` have both, source by source.
     noise : float
         Estimated noise variance of one sensor; NaN where the method gives none; read-only.
 
@@ -108,6 +109,8 @@ class DirectionTracker(Tracker):
     array([[0.3],
            [0.3]])
     """
+
+    estimate_kind: type[DirectionEstimate] = DirectionEstimate
 
     @property
     @abstractmethod
@@ -130,8 +133,8 @@ class DirectionTracker(Tracker):
 
     def report_none(self) -> None:
         """Report no direction, as between measurements."""
-        n = self.n_slots
-        self._estimate = NO_DIRECTION
+        n = self.n_slots * self.estimate_kind.n_unknowns
+        self._estimate = self.estimate_kind.empty()
         self.x, self.P = np.full(n, np.nan), np.zeros((n, n))
 
     def report(
@@ -183,6 +186,23 @@ class DirectionTracker(Tracker):
         self.x = padded(estimate.doa, n_slots, np.nan)
         variance = padded(estimate.std**2, n_slots, 0.0)
         self.P = np.diag(np.nan_to_num(variance, posinf=np.inf))
+
+    def report_estimate(self, estimate: DirectionEstimate) -> None:
+        """Make an estimate the present one, and set `x` and `P`, of one block a source.
+
+        Parameters
+        ----------
+        estimate : DirectionEstimate
+            Of class `estimate_kind`, with at most `n_slots` sources.
+        """
+        self._estimate = estimate
+        values, covariance = estimate.unknowns()
+        n, d = self.n_slots, values.shape[1]
+        self.x = padded(values.ravel(), n * d, np.nan)
+        blocks = np.zeros((n, d, n, d))
+        index = np.arange(len(values[:n]))
+        blocks[index, :, index] = np.nan_to_num(covariance[:n], posinf=np.inf)
+        self.P = blocks.reshape(n * d, n * d)
 
 
 class BatchDirectionTracker(DirectionTracker):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -100,6 +100,7 @@ class DirectionEstimate(Estimate):
         "label": -1,
     }
     columns: ClassVar[tuple[str, ...]] = ("label", "doa_deg", "std_deg", "existence", "level_db")
+    n_unknowns: ClassVar[int] = 1
 
     @classmethod
     def empty(cls, **others: Any) -> Self:
@@ -136,47 +137,15 @@ class DirectionEstimate(Estimate):
         degrees = np.rad2deg([self.doa, self.std])
         return list(zip(self.label, *degrees, self.existence, level_db, strict=True))
 
+    def unknowns(self) -> tuple[Float, Float]:
+        """Return the unknowns of each source, (n_sources, d), and covariances (n_sources, d, d).
 
-@dataclass(frozen=True, eq=False)
-class SourceEstimate(DirectionEstimate):
-    """Directions of arrival and autoregressive models of the sources.
-
-    Parameters
-    ----------
-    doa : ndarray, shape (n_found,)
-        Directions of arrival, rad.
-    std : ndarray, shape (n_found,)
-        Their standard deviations, rad; NaN where the method gives none.
-    existence : ndarray, shape (n_found,)
-        Probability that the source is active; NaN where the method gives none.
-    amplitude : ndarray, shape (n_found,)
-        Latest complex sample of each source.
-    label : ndarray of int, shape (n_found,)
-        Index of the source in the motion model.
-    converged : bool
-        False if an iterative method stopped before it met its tolerance.
-    iterations : int
-        Iterations of this step; 0 for a method without.
-    noise : float
-        Estimated variance of the noise at one sensor; NaN where the method gives none.
-    coefficients : ndarray, shape (n_found, largest order)
-        AR coefficients, zero beyond the order of a source.
-    innovation_variance : ndarray, shape (n_found,)
-        Variance of the innovations of each source.
-
-    Examples
-    --------
-    >>> SourceEstimate.empty(coefficients=np.zeros((0, 2))).n_found
-    0
-    """
-
-    coefficients: Float = field(default_factory=lambda: np.zeros((0, 0)))
-    innovation_variance: Float = field(default_factory=lambda: np.zeros(0))
-
-    per_source: ClassVar[dict[str, Any]] = DirectionEstimate.per_source | {
-        "coefficients": np.nan,
-        "innovation_variance": np.nan,
-    }
+        Examples
+        --------
+        >>> DirectionEstimate.empty().unknowns()[1].shape
+        (0, 1, 1)
+        """
+        return self.doa[:, None], (self.std**2)[:, None, None]
 
 
 @dataclass(frozen=True, eq=False)

@@ -89,6 +89,11 @@ class FourierManifold:
         return self.waves.array.n_sensors
 
     @property
+    def n_unknowns(self) -> int:
+        """One: the direction."""
+        return 1
+
+    @property
     def n_bins(self) -> int:
         """Number of frequency bins."""
         return len(self.waves.wavelengths)

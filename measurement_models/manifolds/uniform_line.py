@@ -57,6 +57,11 @@ class UniformLineManifold:
         return len(self.grid_index)
 
     @property
+    def n_unknowns(self) -> int:
+        """One: the electrical angle."""
+        return 1
+
+    @property
     def n_bins(self) -> int:
         """One frequency."""
         return 1

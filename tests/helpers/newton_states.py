@@ -32,13 +32,13 @@ def scene(seed: int, model: ArraySnapshot = MODEL, K: int = 5) -> Evaluation:
     doa = np.linspace(-1.1, 1.0, K) + rng.uniform(-0.1, 0.1, K)
     y = model.replace(noise=K / 100).simulate(doa, np.exp(2j * np.pi * rng.random(K)), rng)
     components = Components.zeros(1, K)
-    components.mu[0] = model.manifold().from_doa(doa) + 0.03 * rng.standard_normal(K)
+    components.mu[0] = model.angle_manifold().from_doa(doa) + 0.03 * rng.standard_normal(K)
     components.variance[0] = rng.uniform(5e-4, 3e-3, K)
     components.prior_mu[0] = components.mu[0] + 0.1
     components.prior_kappa[0] = np.where(np.arange(K) % 2, 120.0, 0.0)
     components.kl_constant[0] = np.log(2 * np.pi * np.i0(components.prior_kappa[0]))
     components.log_odds[0] = np.where(np.arange(K) % 2, np.log(3.0), -2.2)
-    response = ExpectedResponse(model.manifold())
+    response = ExpectedResponse(model.angle_manifold())
     return evaluation_of(response, unit(y)[None, None, :, None], components)
 
 

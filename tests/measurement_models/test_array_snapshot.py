@@ -187,7 +187,7 @@ def test_manifold_equals_the_steering_vector_up_to_the_amplitude(
 ) -> None:
     """w a(θ) of the manifold and to_amplitude(w) a(β) of the array are the same snapshot."""
     array = SensorArray(SensorArray.ula(7, 0.5, missing=missing).positions + shift)
-    manifold = ArraySnapshot(array, wavelength=1.3).manifold(reference)
+    manifold = ArraySnapshot(array, wavelength=1.3).angle_manifold(reference)
     doa, w = np.array([-1.2, -0.1, 0.4, 1.5]), np.array([1.0, 2j, -1.0, 0.5 + 0.1j])
     theta = manifold.from_doa(doa)
     response = manifold.steering(theta)[0, 0] * w
@@ -200,7 +200,7 @@ def test_manifold_equals_the_steering_vector_up_to_the_amplitude(
 
 @both_references
 def test_reference_sensor_has_phase_zero(reference: Reference) -> None:
-    manifold = MODELS[0].manifold(reference)
+    manifold = MODELS[0].angle_manifold(reference)
     a = manifold.steering([0.3, 1.0])[0, 0]
     where = {"first": 0, "middle": 2}[reference]
     np.testing.assert_allclose(a[where], 1.0, atol=1e-14)
@@ -210,7 +210,7 @@ def test_reference_sensor_has_phase_zero(reference: Reference) -> None:
 def test_order_of_the_sensors_is_kept() -> None:
     """Sensors need not be listed from one end to the other."""
     array = SensorArray(np.array([1.0, -0.5, 0.5, 2.0]))
-    manifold = ArraySnapshot(array, 1.0).manifold("middle")
+    manifold = ArraySnapshot(array, 1.0).angle_manifold("middle")
     assert isinstance(manifold, UniformLineManifold)
     assert np.diff(manifold.harmonics).tolist() == [-3, 2, 3]
 
@@ -218,7 +218,7 @@ def test_order_of_the_sensors_is_kept() -> None:
 @settings(deadline=None)
 @given(st.floats(-np.pi / 2, np.pi / 2), st.floats(1.0, 4.0))
 def test_to_doa_inverts_from_doa(doa: float, wavelength: float) -> None:
-    manifold = ArraySnapshot(LINE, wavelength).manifold()
+    manifold = ArraySnapshot(LINE, wavelength).angle_manifold()
     # arcsin loses half the digits at endfire
     assert manifold.to_doa(manifold.from_doa(doa)) == pytest.approx(doa, abs=5e-5)
     theta = np.linspace(-0.99, 0.99, 7) * manifold.from_doa(np.pi / 2)
@@ -226,7 +226,7 @@ def test_to_doa_inverts_from_doa(doa: float, wavelength: float) -> None:
 
 
 def test_angle_without_direction_is_nan_unless_within_its_slack() -> None:
-    manifold = ArraySnapshot(SensorArray.ula(5, 0.25), wavelength=1.0).manifold()
+    manifold = ArraySnapshot(SensorArray.ula(5, 0.25), wavelength=1.0).angle_manifold()
     theta = np.array([-3.0, -1.6, 1.5, 1.7])  # endfire is at pi/2
     np.testing.assert_array_equal(np.isnan(manifold.to_doa(theta)), [True, True, False, True])
     near = manifold.to_doa(theta, slack=0.1)
@@ -237,14 +237,14 @@ def test_angle_without_direction_is_nan_unless_within_its_slack() -> None:
 @settings(deadline=None)
 @given(st.floats(-1.2, 1.2))
 def test_doa_std_is_the_angle_std_divided_by_the_slope(doa: float) -> None:
-    manifold = MODELS[0].manifold()
+    manifold = MODELS[0].angle_manifold()
     slope = 2 * np.pi * 0.5 / 1.3 * np.cos(doa)
     std = manifold.doa_std(manifold.from_doa(doa), 1e-5)
     assert std == pytest.approx(1e-5 / slope, rel=1e-4)
 
 
 def test_doa_std_is_finite_at_endfire() -> None:
-    manifold = MODELS[0].manifold()
+    manifold = MODELS[0].angle_manifold()
     std = manifold.doa_std(manifold.from_doa([np.pi / 2, -np.pi / 2]), [0.01, 10.0])
     assert (std > 0).all()
     assert (std <= np.pi / 2).all()
@@ -252,7 +252,7 @@ def test_doa_std_is_finite_at_endfire() -> None:
 
 @both_references
 def test_manifold_without_sensors_keeps_the_response_of_the_others(reference: Reference) -> None:
-    whole = MODELS[0].manifold(reference)
+    whole = MODELS[0].angle_manifold(reference)
     part = whole.without([0, 3])
     theta, w = np.array([0.3, -1.0]), np.array([1.0, 1j])
     assert whole.without([]) is whole
@@ -268,24 +268,26 @@ def test_manifold_without_sensors_keeps_the_response_of_the_others(reference: Re
 
 
 def test_electrical_angle_requires_at_most_half_a_wavelength() -> None:
-    half: Float = ArraySnapshot(SensorArray.ula(5, 0.5), wavelength=1.0).manifold().from_doa(1.57)
+    half: Float = (
+        ArraySnapshot(SensorArray.ula(5, 0.5), wavelength=1.0).angle_manifold().from_doa(1.57)
+    )
     assert half == pytest.approx(np.pi, abs=1e-5)
 
 
 def test_manifold_arrays_have_nuisance_and_bin_axes() -> None:
-    manifold = MODELS[0].manifold()
+    manifold = MODELS[0].angle_manifold()
     assert manifold.steering(np.zeros(4)).shape == (1, manifold.n_bins, 5, 4)
     assert manifold.coefficients is None
     assert not manifold.front_back_ambiguous
     assert manifold.nuisance_weights.tolist() == [1.0]
     with pytest.raises(ValueError, match="reference must be one of"):
-        MODELS[0].manifold("last")  # type: ignore[arg-type]
+        MODELS[0].angle_manifold("last")  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("spacing", [0.5, 0.3])
 def test_slope_is_the_derivative_of_the_angle(spacing: float) -> None:
     """Down to a tenth of the broadside's, where the direction is no longer identifiable."""
-    line = ArraySnapshot(SensorArray.ula(7, spacing), wavelength=1.0).manifold()
+    line = ArraySnapshot(SensorArray.ula(7, spacing), wavelength=1.0).angle_manifold()
     doa = np.deg2rad([-80.0, -30.0, 0.0, 12.0, 75.0])
     slope = (line.from_doa(doa + 1e-6) - line.from_doa(doa - 1e-6)) / 2e-6
     np.testing.assert_allclose(line.slope(line.from_doa(doa)), slope, rtol=1e-6)

@@ -159,7 +159,7 @@ def test_log_likelihood_of_known_amplitudes_equals_the_gaussian_of_the_noise(
 @every_model
 def test_manifold_and_norm_are_those_of_whitened_waves(model: ArraySnapshot) -> None:
     theta = np.linspace(-3, 3, 50)
-    manifold = model.manifold()
+    manifold = model.angle_manifold()
     expected = model.whitening() @ fourier_manifold(model.waves).steering(theta)
     assert_allclose(manifold.steering(theta), expected, atol=1e-7)
     series = np.asarray(manifold.norm_squared())

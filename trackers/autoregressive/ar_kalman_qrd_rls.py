@@ -32,7 +32,7 @@ from arrivals.trackers.autoregressive.regressions import (
 from arrivals.trackers.autoregressive.settings import NoiseSettings, RegressionSettings
 from arrivals.trackers.autoregressive.snapshots import completes_interval, to_snapshot
 from arrivals.trackers.autoregressive.steady_state import StateSpace
-from arrivals.trackers.estimates import SourceEstimate
+from arrivals.trackers.direction_estimates import SourceEstimate
 from arrivals.trackers.gaussian.linalg import transposed
 from arrivals.trackers.registry import register
 from arrivals.typing import Float

@@ -11,7 +11,7 @@ from arrivals.motion_models.autoregressive.sources import AutoregressiveSources
 from arrivals.trackers.autoregressive.belief import SourceBelief, to_state_vector
 from arrivals.trackers.autoregressive.direction_covariance import direction_std
 from arrivals.trackers.autoregressive.snapshots import completes_interval
-from arrivals.trackers.estimates import SourceEstimate
+from arrivals.trackers.direction_estimates import SourceEstimate
 from arrivals.trackers.run import Run
 from arrivals.typing import Complex, Int
 

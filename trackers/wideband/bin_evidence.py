@@ -9,7 +9,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from arrivals.measurement_models.manifolds.manifold import Manifold
+from arrivals.measurement_models.manifolds.manifold import AngleManifold
 from arrivals.trackers.wideband.direction_grid import DirectionGrid
 from arrivals.typing import Bool, Complex, Float, Int
 
@@ -113,12 +113,12 @@ def unit_snapshots(snapshots: Complex, bins: Bool) -> tuple[SingleComplex, Float
 
 
 @lru_cache(maxsize=16)  # one for each set of sensors with valid data
-def scan_response(manifold: Manifold, grid: DirectionGrid, ratio: float) -> ScanResponse:
+def scan_response(manifold: AngleManifold, grid: DirectionGrid, ratio: float) -> ScanResponse:
     """Return the responses of a manifold on a grid, cached.
 
     Parameters
     ----------
-    manifold : Manifold
+    manifold : AngleManifold
         Whitened response of the array.
     grid : DirectionGrid
         Directions.

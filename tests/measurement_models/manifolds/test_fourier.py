@@ -48,7 +48,7 @@ def directions(model: ArraySnapshot, n: int = 41) -> Float:
 @every_model
 @pytest.mark.parametrize("reference", ["middle", "first"])
 def test_series_equals_the_response_up_to_a_phase(model: ArraySnapshot, reference: Any) -> None:
-    manifold = model.manifold(reference)
+    manifold = model.angle_manifold(reference)
     assert isinstance(manifold, FourierManifold)
     doa = directions(model)
     exact = model.waves.steering(doa)
@@ -63,7 +63,7 @@ def test_series_equals_the_response_up_to_a_phase(model: ArraySnapshot, referenc
 def test_series_of_a_circle_is_short_and_exact(radius: float) -> None:
     """Specification: about 2πr/λ plus 10 to 25 harmonics, errors below 4e-10."""
     array = SensorArray.uca(9, radius)
-    manifold = ArraySnapshot(array, 1.0).manifold()
+    manifold = ArraySnapshot(array, 1.0).angle_manifold()
     assert manifold.harmonics.max() <= 2 * np.pi * radius + 25
     theta = np.random.default_rng(0).uniform(-np.pi, np.pi, 200)
     error = manifold.steering(theta)[0, 0].T - array.steering_vector(theta, 1.0)
@@ -72,7 +72,7 @@ def test_series_of_a_circle_is_short_and_exact(radius: float) -> None:
 
 @every_model
 def test_norm_squared_equals_that_of_the_response(model: ArraySnapshot) -> None:
-    manifold = model.manifold()
+    manifold = model.angle_manifold()
     theta = directions(model)
     exact = (np.abs(manifold.steering(theta)) ** 2).sum(axis=2)  # (S, F, n)
     norm = manifold.norm_squared()
@@ -85,7 +85,7 @@ def test_norm_squared_equals_that_of_the_response(model: ArraySnapshot) -> None:
 
 @every_model
 def test_to_amplitude_refers_to_the_origin(model: ArraySnapshot) -> None:
-    manifold, doa = model.manifold(), np.array([0.4])
+    manifold, doa = model.angle_manifold(), np.array([0.4])
     w = manifold.to_amplitude([2j], doa)
     if model.n_bins == 1 and not model.slowness and not model.elevation:
         response = 2j * manifold.steering(doa)[0, 0, :, 0]
@@ -98,7 +98,7 @@ def test_to_amplitude_refers_to_the_origin(model: ArraySnapshot) -> None:
 def test_manifold_without_sensors_and_bins_equals_that_of_the_smaller_array(
     model: ArraySnapshot,
 ) -> None:
-    manifold = model.manifold()
+    manifold = model.angle_manifold()
     part = manifold.without([0, 3])
     assert manifold.without([]) is manifold
     assert part.n_sensors == model.array.n_sensors - 2
@@ -113,7 +113,7 @@ def test_manifold_without_sensors_and_bins_equals_that_of_the_smaller_array(
 
 
 def test_to_doa_of_a_line_folds_angles_to_the_front() -> None:
-    manifold = ArraySnapshot(SPARSE, [1.0, 1.7]).manifold()
+    manifold = ArraySnapshot(SPARSE, [1.0, 1.7]).angle_manifold()
     assert manifold.front_back_ambiguous
     theta = np.deg2rad([0.0, 80.0, 100.0, 180.0, -100.0, 260.0])
     np.testing.assert_allclose(
@@ -138,7 +138,7 @@ def test_to_doa_of_a_line_folds_angles_to_the_front() -> None:
 def test_electrical_angle_requires_a_grid_within_half_a_wavelength(
     model: ArraySnapshot, fast: bool
 ) -> None:
-    assert isinstance(model.manifold(), UniformLineManifold) is fast
+    assert isinstance(model.angle_manifold(), UniformLineManifold) is fast
 
 
 # models
@@ -276,13 +276,13 @@ def test_arrays_without_identifiable_directions_are_refused(
     array: SensorArray, message: str
 ) -> None:
     with pytest.raises(ValueError, match=message):
-        ArraySnapshot(array, 1.0).manifold()
+        ArraySnapshot(array, 1.0).angle_manifold()
 
 
 def test_directional_elements_resolve_front_and_back() -> None:
     row = SensorArray(np.array([[0.0, 0.0], [0.4, 0.0], [0.8, 0.0]]))
     model = ArraySnapshot(row, 1.0, response=ElementResponse.first_order([1.0, 2.0, -1.0]))
-    assert model.manifold().n_sensors == 3
+    assert model.angle_manifold().n_sensors == 3
 
 
 @pytest.mark.parametrize(

@@ -55,7 +55,7 @@ class PublishedProgram(CoordinateSolver):
 def replayed(name: str, n_steps: int, engine: CoordinateSolver) -> tuple[Float, Int, Any]:
     """Return the largest deviation of each step, degrees, from the recorded prior; iterations."""
     z = np.load(Path(FOLDER or "") / "svalse" / f"{name}.npz")
-    manifold = LINE.manifold("first")
+    manifold = LINE.angle_manifold("first")
     worst, iterations = [], []
     for t in range(n_steps):
         known = None

@@ -33,7 +33,7 @@ def initialized(
     seed: int, prior: ComponentPrior | None = None, manifold: Manifold | None = None
 ) -> RecordingAscent:
     """State after initialization and the first selection of the support."""
-    manifold = manifold or MODEL.manifold()
+    manifold = manifold or MODEL.angle_manifold()
     state = RecordingAscent(CoordinateSolver(), snapshot(seed), manifold, prior)
     state.initialize()
     state.choose_support()
@@ -116,7 +116,7 @@ def test_choose_support_ends_at_a_local_maximum_with_the_exact_amplitudes(seed: 
 def test_elbo_of_a_fixed_support_never_decreases(
     seed: int, sequential: bool, reference: Literal["middle", "first"]
 ) -> None:
-    state = initialized(seed, PRIOR if sequential else None, MODEL.manifold(reference))
+    state = initialized(seed, PRIOR if sequential else None, MODEL.angle_manifold(reference))
     on = np.flatnonzero(state.active)
     bounds = []
     for _ in range(12):
@@ -166,16 +166,16 @@ def test_paper_is_the_published_program() -> None:
 def test_first_existence_is_held_and_divides_the_power_where_no_component_is_tracked() -> None:
     """Section VI.B: p = 0.5 at first, τ = (‖y‖²/M - ν)/(p L)."""
     printed = CoordinateSolver.paper(first_existence=0.5)
-    state = printed.initial_state(snapshot(1), MODEL.manifold(), None)
+    state = printed.initial_state(snapshot(1), MODEL.angle_manifold(), None)
     power = float((np.abs(snapshot(1)) ** 2).mean())
     np.testing.assert_allclose(state.rho, 0.5)
     np.testing.assert_allclose(state.tau, (power - state.nu) / (0.5 * len(state.rho)))
     state.active[0] = True
     state.update_rho()
     np.testing.assert_allclose(state.rho, 0.5)
-    program = CoordinateSolver.paper().initial_state(snapshot(1), MODEL.manifold(), None)
+    program = CoordinateSolver.paper().initial_state(snapshot(1), MODEL.angle_manifold(), None)
     assert program.rho[0] == (len(program.rho) // 2) / len(program.rho)
-    tracked = printed.initial_state(snapshot(1), MODEL.manifold(), PRIOR)
+    tracked = printed.initial_state(snapshot(1), MODEL.angle_manifold(), PRIOR)
     np.testing.assert_array_equal(tracked.rho[: len(PRIOR.existence)], PRIOR.existence)
 
 
@@ -189,9 +189,9 @@ def test_mixture_with_a_noise_floor_is_the_mixture_of_the_fast_form() -> None:
     """A floor far below the noise changes the form of the state, but not the result."""
     fast = CoordinateSolver(posterior="mixture", snr_db=20.0)
     general = fast.replace(max_snr_db=80.0)
-    a, b = (each.solve(snapshot(1), MODEL.manifold(), PRIOR) for each in (fast, general))
+    a, b = (each.solve(snapshot(1), MODEL.angle_manifold(), PRIOR) for each in (fast, general))
     assert isinstance(
-        fast.initial_state(snapshot(1), MODEL.manifold(), PRIOR), SingleSnapshotAscent
+        fast.initial_state(snapshot(1), MODEL.angle_manifold(), PRIOR), SingleSnapshotAscent
     )
     assert a.active.tolist() == b.active.tolist()
     np.testing.assert_allclose(a.theta[a.active], b.theta[b.active], atol=1e-3)
@@ -211,5 +211,5 @@ def test_initial_noise_without_a_prior_is_the_mean_of_the_small_eigenvalues() ->
     y = Y[0, :, 0]
     lags = np.array([np.vdot(y[: 11 - i], y[i:]) for i in range(11)]) / 11
     smallest = np.linalg.eigvalsh(toeplitz(lags))[:2]
-    state = CoordinateSolver().initial_state(Y, MODEL.manifold(), None)
+    state = CoordinateSolver().initial_state(Y, MODEL.angle_manifold(), None)
     assert state.nu[0] == pytest.approx(smallest.mean())

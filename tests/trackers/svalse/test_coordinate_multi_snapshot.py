@@ -38,7 +38,7 @@ def initialized(seed: int, sequential: bool = False, **changes: Any) -> MultiSna
     model = MODEL.replace(**changes)
     prior = PRIOR if sequential else None
     Y = simulated(seed, model)
-    state = MultiSnapshotAscent(CoordinateSolver(), Y, model.manifold(), prior)
+    state = MultiSnapshotAscent(CoordinateSolver(), Y, model.angle_manifold(), prior)
     state.initialize()
     return state
 
@@ -169,7 +169,7 @@ def test_general_form_on_a_line_agrees_with_the_fast_form(reference: Any) -> Non
     """Specification, section 11: equal K and iterations, angles to 1e-14; tolerance 100 times."""
     trial = create("svalse_fig4", n_steps=6).sample(np.random.default_rng(1))
     settings: dict[str, Any] = {"merge": MERGE_DISTANCE, "snr_db": 20.0}
-    manifold = trial.measurement.manifold(reference)  # type: ignore[union-attr]
+    manifold = trial.measurement.angle_manifold(reference)  # type: ignore[union-attr]
     prior = None
     for z in trial.measurements:
         Y = trial.measurement.snapshots(z)  # type: ignore[union-attr]

@@ -55,7 +55,7 @@ def slope_of(state: Evaluation, name: str, k: int, h: float, response: ExpectedR
 @pytest.mark.parametrize("model", [MODEL, GAPS])
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_gradients_equal_numerical_slopes(seed: int, model: ArraySnapshot) -> None:
-    state, response = scene(seed, model), ExpectedResponse(model.manifold())
+    state, response = scene(seed, model), ExpectedResponse(model.angle_manifold())
     g, curvature = slopes(response, state, *weights(state))
     of_s = 0.5 / state.components.variance[0] - 0.5 * curvature[0]
     for k in range(5):
@@ -71,7 +71,7 @@ def test_gradients_equal_numerical_slopes(seed: int, model: ArraySnapshot) -> No
 @pytest.mark.parametrize("model", [MODEL, GAPS])
 def test_hessian_equals_the_slope_of_the_gradient_to_a_hundredth(model: ArraySnapshot) -> None:
     """At 20 dB; the term left out is a thousandth."""
-    state, response = scene(0, model), ExpectedResponse(model.manifold())
+    state, response = scene(0, model), ExpectedResponse(model.angle_manifold())
     for _ in range(5):
         state = newton_step(response, state, NONE)
     v, P = weights(state)
@@ -126,7 +126,7 @@ def test_divergence_equals_the_integral_of_its_definition() -> None:
 @settings(deadline=None, max_examples=20)
 @given(st.integers(0, 10**6), st.booleans(), st.sampled_from([0.003, 0.01, 0.1, 0.5]))
 def test_newton_step_never_decreases_the_objective(seed: int, estimate_nu: bool, nu: float) -> None:
-    rng, response = np.random.default_rng(seed), ExpectedResponse(MODEL.manifold())
+    rng, response = np.random.default_rng(seed), ExpectedResponse(MODEL.angle_manifold())
     state = scene(seed)
     components = state.components.copy()
     components.mu[0] += 0.3 * rng.standard_normal(5)  # far from the top
@@ -140,7 +140,7 @@ def test_newton_step_never_decreases_the_objective(seed: int, estimate_nu: bool,
 
 
 def test_noise_and_power_converge_to_the_fixed_points_of_em() -> None:
-    state, response = scene(4), ExpectedResponse(MODEL.manifold())
+    state, response = scene(4), ExpectedResponse(MODEL.angle_manifold())
     for _ in range(40):
         state = newton_step(response, state, np.ones(1, dtype=np.bool_))
     A, w, M = state.A[0, 0], state.W[0, 0, :, 0], 15
@@ -159,8 +159,8 @@ def test_noise_and_power_converge_to_the_fixed_points_of_em() -> None:
 @settings(deadline=None, max_examples=15)
 @given(st.integers(0, 10**6), st.floats(0, 1))
 def test_removal_changes_the_criterion_by_its_gain(seed: int, kl_weight: float) -> None:
-    state, response = scene(seed), ExpectedResponse(MODEL.manifold())
-    gains = removal_gains(ExpectedResponse(MODEL.manifold()), state, kl_weight)[0]
+    state, response = scene(seed), ExpectedResponse(MODEL.angle_manifold())
+    gains = removal_gains(ExpectedResponse(MODEL.angle_manifold()), state, kl_weight)[0]
     for k in range(5):
         components = state.components.without(np.array([k])).first(4)
         rest = evaluation_of(response, state.Y, components, state.nu[0, 0])
@@ -169,7 +169,7 @@ def test_removal_changes_the_criterion_by_its_gain(seed: int, kl_weight: float) 
 
 
 def test_addition_changes_the_evidence_by_its_gain() -> None:
-    state, response = scene(0), ExpectedResponse(MODEL.manifold())
+    state, response = scene(0), ExpectedResponse(MODEL.angle_manifold())
     grid = CandidateGrid(response, 8, merge=0.0)
     gain = grid_evidence(grid, state)[0][0]
     for g in (3, 40, 77):
@@ -181,7 +181,7 @@ def test_addition_changes_the_evidence_by_its_gain() -> None:
 
 
 def test_candidates_keep_the_merge_distance_and_removed_components_return() -> None:
-    state, response = scene(0), ExpectedResponse(MODEL.manifold())
+    state, response = scene(0), ExpectedResponse(MODEL.angle_manifold())
     for _ in range(5):
         state = newton_step(response, state, NONE)
     components = state.components.without(np.array([3])).first(4)
@@ -215,7 +215,7 @@ def test_unused_slots_and_other_problems_have_no_effect() -> None:
     for i, state in enumerate(states):
         packed = state.components.packed[0]
         components.packed[i, :, : packed.shape[1]] = packed
-    response, K = ExpectedResponse(MODEL.manifold()), np.array([5, 3, 4])
+    response, K = ExpectedResponse(MODEL.angle_manifold()), np.array([5, 3, 4])
     y = np.concatenate([state.Y for state in states])
     nu, tau = np.full((3, 1), 0.01), np.full((3, 1), 0.2)
     batch = evaluate(response, y, components, K, nu, tau, np.zeros(3))
@@ -243,7 +243,7 @@ class Explicit(UniformLineManifold):
 
 
 def test_response_with_coefficients_has_equal_steps() -> None:
-    line = GAPS.manifold()
+    line = GAPS.angle_manifold()
     assert isinstance(line, UniformLineManifold)
     explicit = Explicit(line.grid_index, line.step, line.origin, line.reference)
     state = scene(0, GAPS)
@@ -261,7 +261,7 @@ def test_response_with_coefficients_has_equal_steps() -> None:
 def test_extent_of_a_filled_line_is_its_number_of_sensors() -> None:
     for n in (2, 5, 8, 15):
         for reference in ("middle", "first"):
-            line = ArraySnapshot(SensorArray.ula(n, 0.5), wavelength=1.0).manifold(
+            line = ArraySnapshot(SensorArray.ula(n, 0.5), wavelength=1.0).angle_manifold(
                 "first" if reference == "first" else "middle"
             )
             assert ExpectedResponse(line).extent == pytest.approx(n)
@@ -274,13 +274,13 @@ def test_batch_of_snapshots_equals_single_fits() -> None:
         doa = rng.uniform(-1, 1, 1 + n % 4)
         y = MODEL.replace(noise=0.02).simulate(doa, np.exp(2j * np.pi * rng.random(len(doa))), rng)
         Ys.append(y[None, :, None] * 10.0 ** (n - 6))
-        mu = MODEL.manifold().from_doa(doa[: n % 3]) + 0.02
+        mu = MODEL.angle_manifold().from_doa(doa[: n % 3]) + 0.02
         kappa, rho = np.full(len(mu), 100.0), np.full(len(mu), 0.75)
         age = np.arange(len(mu)) % 2
         known.append(ComponentPrior(mu, kappa, rho, 0.1, age, 15.0 + n) if n % 4 else None)
     Ys[5] = np.zeros((1, 15, 1), dtype=np.complex128)
     solver = NewtonSolver(merge=MERGE_DISTANCE, snr_db=20.0)  # also without a prior
-    manifold = MODEL.manifold()
+    manifold = MODEL.angle_manifold()
     together = solver.solve_batch(Ys, manifold, known)
     for Y, prediction, fit in zip(Ys, known, together, strict=True):
         alone = solver.solve(Y, manifold, prediction)

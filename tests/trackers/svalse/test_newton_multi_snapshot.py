@@ -51,9 +51,9 @@ def scene(
     model: ArraySnapshot, seed: int = 0, tempering: float = 1.0
 ) -> tuple[ExpectedResponse, Evaluation]:
     """Components beside three sources, some of which have a prior."""
-    rng, response = np.random.default_rng(seed), ExpectedResponse(model.manifold(), tempering)
+    rng, response = np.random.default_rng(seed), ExpectedResponse(model.angle_manifold(), tempering)
     components = Components.zeros(1, 3)
-    components.mu[0] = model.manifold().from_doa(DOA) + 0.02 * rng.standard_normal(3)
+    components.mu[0] = model.angle_manifold().from_doa(DOA) + 0.02 * rng.standard_normal(3)
     components.variance[0] = rng.uniform(5e-4, 3e-3, 3)
     components.prior_mu[0] = components.mu[0] + 0.1
     components.prior_kappa[0] = 0.0, 120.0, 60.0
@@ -117,11 +117,15 @@ def test_hessian_equals_the_slope_of_the_gradient_to_a_hundredth(model: ArraySna
 
 
 def test_mean_responses_and_norms_equal_a_dense_sum() -> None:
-    response, mu, s = ExpectedResponse(ELEMENTS.manifold()), np.array([[0.4]]), np.array([[0.02]])
+    response, mu, s = (
+        ExpectedResponse(ELEMENTS.angle_manifold()),
+        np.array([[0.4]]),
+        np.array([[0.02]]),
+    )
     theta = 0.4 + np.linspace(-1, 1, 4001)
     q = np.exp(-((theta - 0.4) ** 2) / 0.04)
     q /= q.sum()
-    a = ELEMENTS.manifold().steering(theta)[0]  # (F, M, n)
+    a = ELEMENTS.angle_manifold().steering(theta)[0]  # (F, M, n)
     np.testing.assert_allclose(response(mu, s)[0, :, 0, 0], a @ q, atol=1e-8)
     np.testing.assert_allclose(
         response.norms(mu, s)[0, :, 0, 0], (np.abs(a) ** 2).sum(axis=1) @ q, rtol=1e-8
@@ -201,7 +205,7 @@ def test_newton_step_never_decreases_the_objective(
 
 def test_backtracking_shortens_the_step_of_the_variances() -> None:
     """Far from the maximum, the fixed point of the variances alone would decrease F."""
-    rng, response = np.random.default_rng(70147), ExpectedResponse(MODEL.manifold())
+    rng, response = np.random.default_rng(70147), ExpectedResponse(MODEL.angle_manifold())
     state = of_a_line(70147)
     components = state.components.copy()
     components.mu[0] += 0.3 * rng.standard_normal(5)
@@ -238,7 +242,7 @@ def test_elbo_is_at_least_that_of_coordinate_ascent(numbers: dict[str, int]) -> 
         assert isinstance(tracker, SVALSE)
         model = tracker.measurement
         assert isinstance(model, ArraySnapshot)
-        manifold = model.manifold()
+        manifold = model.angle_manifold()
         for t, z in enumerate(trial.measurements):
             tracker.predict()
             if t % 3 == 1:

@@ -160,7 +160,7 @@ def test_elbo_is_at_least_that_of_coordinate_ascent() -> None:
             tracker.predict()
             known, Y = prior_of(tracker, y), y[None, :, None]
             if t % 3 == 0 and t > 0:
-                middle, first = LINE.manifold("middle"), LINE.manifold("first")
+                middle, first = LINE.angle_manifold("middle"), LINE.angle_manifold("first")
                 other = CoordinateSolver(tolerance=1e-5).solve(Y, first, known)
                 ours = bound(y, middle, known, NewtonSolver().solve(Y, middle, known))
                 gain.append(ours - bound(y, first, known, other))
@@ -282,7 +282,7 @@ def test_existence_of_most_detected_components_is_above_one_half() -> None:
 
 def test_active_components_are_detected() -> None:
     y = tone([[-0.5, 0.4]], noise=1e-3)[0]
-    manifold = LINE.manifold()
+    manifold = LINE.angle_manifold()
     fit = NewtonSolver(merge=0.0, snr_db=None).solve(y[None, :, None], manifold, None)
     tracker = VALSE(LINE)
     tracker.update(y)

@@ -57,7 +57,7 @@ def test_evidence_is_the_ratio_of_two_angular_gaussians() -> None:
 
 
 def test_evidence_does_not_depend_on_the_level_of_a_bin() -> None:
-    z, manifold = draw(), MODEL.manifold()
+    z, manifold = draw(), MODEL.angle_manifold()
     level = np.random.default_rng(1).exponential(size=(3, 4, 1)) * 1e50
     response, counted = scan_response(manifold, GRID, 3.0), np.ones((3, 4), dtype=bool)
     one, other = (
@@ -131,9 +131,9 @@ def test_of_two_sources_in_one_direction_the_one_with_a_label_is_kept() -> None:
 def test_power_of_a_source_is_the_mean_over_its_bins_those_of_others_included() -> None:
     w = np.array([[3.0, 0, 0, 0], [0, 2.0, 0, 1.0], [0, 0, 0, 0]])
     z = MODEL.wave([GRID.doa[7]], w[..., None])
-    Y = MODEL.manifold().steering(GRID.doa[[7]])[0, :, :, 0][:, :, None] * w[:, None]
+    Y = MODEL.angle_manifold().steering(GRID.doa[[7]])[0, :, :, 0][:, :, None] * w[:, None]
     unit, energy = unit_snapshots(Y, ALL_BINS)
-    response = scan_response(MODEL.manifold(), GRID, 3.0).at(np.array([7]))
+    response = scan_response(MODEL.angle_manifold(), GRID, 3.0).at(np.array([7]))
     power = mean_powers(response, unit, energy, energy > 0, np.array([1e-6, 1 - 1e-6]))
     assert z.shape == MODEL.shape
     assert power[0] == pytest.approx((9 + 4 + 1) / 12, rel=1e-3)

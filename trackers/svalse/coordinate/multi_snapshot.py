@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from arrivals.measurement_models.manifolds.manifold import Manifold
+from arrivals.measurement_models.manifolds.manifold import AngleManifold
 from arrivals.motion_models.bessel import inverse_bessel_ratio
 from arrivals.trackers.svalse.components import ComponentPosterior, ComponentPrior
 from arrivals.trackers.svalse.coordinate.angle_posterior import (
@@ -59,7 +59,7 @@ class MultiSnapshotAscent(MultiSnapshotAmplitudes):
         self,
         settings: CoordinateSolver,
         Y: Complex,
-        manifold: Manifold,
+        manifold: AngleManifold,
         prior: ComponentPrior | None,
     ) -> None:
         M = Y.shape[1]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from arrivals.measurement_models.manifolds.manifold import Manifold
+from arrivals.measurement_models.manifolds.manifold import AngleManifold
 from arrivals.trackers.svalse.components import ComponentPrior
 from arrivals.trackers.svalse.coordinate.angle_posterior import (
     AnglePosterior,
@@ -44,7 +44,7 @@ class SingleSnapshotAscent(MultiSnapshotAscent):
         self,
         settings: CoordinateSolver,
         Y: Complex,
-        manifold: Manifold,
+        manifold: AngleManifold,
         prior: ComponentPrior | None,
     ) -> None:
         super().__init__(settings, Y, manifold, prior)
@@ -52,7 +52,10 @@ class SingleSnapshotAscent(MultiSnapshotAscent):
 
     @staticmethod
     def applies(
-        settings: CoordinateSolver, Y: Complex, manifold: Manifold, prior: ComponentPrior | None
+        settings: CoordinateSolver,
+        Y: Complex,
+        manifold: AngleManifold,
+        prior: ComponentPrior | None,
     ) -> bool:
         """Return True if data and settings are those of the paper: one snapshot of a line."""
         line = manifold.coefficients is None and Y.shape[0] == Y.shape[2] == 1

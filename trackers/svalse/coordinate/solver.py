@@ -12,7 +12,7 @@ from typing import Literal, Self
 
 import numpy as np
 
-from arrivals.measurement_models.manifolds.manifold import Manifold
+from arrivals.measurement_models.manifolds.manifold import AngleManifold
 from arrivals.trackers.svalse.components import (
     ComponentPosterior,
     ComponentPrior,
@@ -110,7 +110,7 @@ class CoordinateSolver(SolverSettings):
             first_existence=first_existence,
         )
 
-    def check(self, manifold: Manifold, n_snapshots: int, n_moments: int) -> None:
+    def check(self, manifold: AngleManifold, n_snapshots: int, n_moments: int) -> None:
         """Raise ValueError if the mixture does not support such measurements."""
         if self.posterior == "quadrature":
             return
@@ -130,14 +130,14 @@ class CoordinateSolver(SolverSettings):
                 )
 
     def solve(
-        self, snapshots: Complex, manifold: Manifold, prior: ComponentPrior | None
+        self, snapshots: Complex, manifold: AngleManifold, prior: ComponentPrior | None
     ) -> ComponentPosterior:
         """Fit the snapshots of one step (sections III and IV, Fig. 3).
 
         Parameters
         ----------
         snapshots : ndarray, shape (n_bins, n_sensors, n_snapshots)
-        manifold : Manifold
+        manifold : AngleManifold
         prior : ComponentPrior or None
             None in VALSE.
         """
@@ -160,14 +160,14 @@ class CoordinateSolver(SolverSettings):
     def solve_batch(
         self,
         snapshots: Sequence[Complex],
-        manifold: Manifold,
+        manifold: AngleManifold,
         priors: Sequence[ComponentPrior | None],
     ) -> list[ComponentPosterior]:
         """Fit independent snapshots of one array, one after the other."""
         return [self.solve(Y, manifold, prior) for Y, prior in zip(snapshots, priors, strict=True)]
 
     def initial_state(
-        self, snapshots: Complex, manifold: Manifold, prior: ComponentPrior | None
+        self, snapshots: Complex, manifold: AngleManifold, prior: ComponentPrior | None
     ) -> MultiSnapshotAscent:
         """Return the state of a step, in the fast form for one snapshot of a line if it applies."""
         single = SingleSnapshotAscent.applies(self, snapshots, manifold, prior)

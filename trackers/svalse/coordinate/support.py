@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from arrivals.measurement_models.manifolds.manifold import Manifold
+from arrivals.measurement_models.manifolds.manifold import AngleManifold
 from arrivals.motion_models.von_mises import wrap
 from arrivals.trackers.svalse.components import ComponentPrior
 from arrivals.typing import Bool, Complex, Float, Int
@@ -78,7 +78,7 @@ class GreedySupport(ABC):
 
     Attributes
     ----------
-    manifold : Manifold
+    manifold : AngleManifold
     active : ndarray of bool, shape (L,)
         The support.
     mean : ndarray, shape (L,)
@@ -94,7 +94,7 @@ class GreedySupport(ABC):
     iterations : int
     """
 
-    manifold: Manifold
+    manifold: AngleManifold
     mean: Complex
 
     def __init__(self, initial: InitialSupport) -> None:

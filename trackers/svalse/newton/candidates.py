@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arrivals.measurement_models.manifolds.manifold import Manifold
+from arrivals.measurement_models.manifolds.manifold import AngleManifold
 from arrivals.trackers.svalse.newton.batch import BatchRecord, any_set
 from arrivals.trackers.svalse.newton.elbo import Components, Evaluation
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse, over_snapshots
@@ -34,7 +34,7 @@ class CandidateGrid:
     """
 
     def __init__(self, response: ExpectedResponse, points_per_sensor: int, merge: float) -> None:
-        self.manifold: Manifold = response.manifold
+        self.manifold: AngleManifold = response.manifold
         self.response = response
         n = int(np.ceil(points_per_sensor * max(response.extent, 4)))
         self.theta = -np.pi + 2 * np.pi * np.arange(n) / n

@@ -6,7 +6,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from arrivals.measurement_models.manifolds.manifold import Manifold
+from arrivals.measurement_models.manifolds.manifold import AngleManifold
 from arrivals.trackers.svalse.noise_initialization import NOISE_FLOOR
 from arrivals.typing import Bool, Complex, Float
 
@@ -18,7 +18,7 @@ class ExpectedResponse:
 
     Parameters
     ----------
-    manifold : Manifold
+    manifold : AngleManifold
         Without a second parameter.
     temper : float
         Number of snapshots that count as one: divides the evidence of each.
@@ -46,7 +46,7 @@ class ExpectedResponse:
 
     def __init__(
         self,
-        manifold: Manifold,
+        manifold: AngleManifold,
         tempering: float = 1.0,
         power_floor: float = 0.0,
         noise_floor: float = NOISE_FLOOR,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from arrivals.measurement_models.manifolds.manifold import Manifold
+from arrivals.measurement_models.manifolds.manifold import AngleManifold
 from arrivals.motion_models.bessel import bessel_ratio, log_i0
 from arrivals.trackers.svalse.components import (
     ComponentPosterior,
@@ -69,7 +69,7 @@ class StepInput:
         age = self.prior.age
         self.age = np.zeros(n, dtype=np.int64) if age is None else age[:n]
 
-    def snr_db(self, manifold: Manifold, settings: SolverSettings) -> float:
+    def snr_db(self, manifold: AngleManifold, settings: SolverSettings) -> float:
         """Return the signal-to-noise ratio at which the noise starts.
 
         That of the steps before, else that of the settings; if that is None, by the covariance of
@@ -218,7 +218,7 @@ def log_odds(rho: Float) -> Float:
 
 
 def solved_posterior(
-    state: SolverState, i: int, step: StepInput, manifold: Manifold, result: ComponentMarginals
+    state: SolverState, i: int, step: StepInput, manifold: AngleManifold, result: ComponentMarginals
 ) -> ComponentPosterior:
     """Return the posterior of the i-th row, whose active components have these marginals."""
     evaluation, K, n = state.evaluation, int(state.evaluation.K[i]), int(state.n_known[i])
@@ -269,7 +269,7 @@ def mean_amplitudes(W: Complex, power: Float) -> Complex:
     return np.asarray(np.sqrt((W.real**2 + W.imag**2).mean(axis=(0, 2))) + 0j)
 
 
-def front_angles(manifold: Manifold, mu: Float) -> Float:
+def front_angles(manifold: AngleManifold, mu: Float) -> Float:
     """Return the angles within ±π, of two with one direction the front one."""
     theta = np.angle(np.exp(1j * mu))
     return manifold.from_doa(manifold.to_doa(theta)) if manifold.front_back_ambiguous else theta
