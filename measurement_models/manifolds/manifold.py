@@ -135,15 +135,6 @@ class PointManifold(Manifold, Protocol):
     in the order 11, 12, 22. The phase at each sensor is counted so that the phase of the amplitude
     is uncorrelated with all unknowns. ‖a(x)‖² is the number of sensors.
 
-    Attributes
-    ----------
-    point_size : int
-        Numbers of a point.
-    is_linear : bool
-        True if phases are linear in the displacement: then (∂ᵢa)ᴴ∂ⱼa' = -(∂ᵢ∂ⱼa)ᴴa'.
-    spike_precision, slab_precision : float or None
-        Prior precisions of the second unknown of a plane and of a curved wave, where it has both.
-
     Examples
     --------
     >>> from arrivals.measurement_models import ArraySnapshot, SensorArray
@@ -151,10 +142,21 @@ class PointManifold(Manifold, Protocol):
     False
     """
 
-    point_size: int
-    is_linear: bool
-    spike_precision: float | None
-    slab_precision: float | None
+    @property
+    def point_size(self) -> int:
+        """Numbers of a point."""
+
+    @property
+    def is_linear(self) -> bool:
+        """True if phases are linear in the displacement: then (∂ᵢa)ᴴ∂ⱼa' = -(∂ᵢ∂ⱼa)ᴴa'."""
+
+    @property
+    def spike_precision(self) -> float | None:
+        """Prior precision of the second unknown of a plane wave, where waves may be curved."""
+
+    @property
+    def slab_precision(self) -> float | None:
+        """Prior precision of the second unknown of a curved wave, where it may be plane."""
 
     def responses(self, x: Float, covariance: Float) -> Complex:
         """Return ⟨a⟩, ∂ᵢ⟨a⟩ and ∂ᵢⱼ⟨a⟩, i ≤ j, at points (B, p, L): (B, F, 1+d+d(d+1)/2, L, M)."""

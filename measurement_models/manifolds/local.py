@@ -1,0 +1,159 @@
+"""Responses whose phases are linear locally: base, and the azimuth of horizontal waves."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from arrivals.measurement_models.arrays.plane_waves import PlaneWaves
+from arrivals.measurement_models.manifolds.manifold import UNIFORM_STD_OF_CIRCLE, CandidatePoints
+from arrivals.measurement_models.manifolds.points import PAIRS, SPACING_OF_ONE, PointResponse
+from arrivals.typing import Bool, Complex, Float
+
+
+@dataclass(frozen=True, eq=False)
+class LocalManifold(PointResponse):
+    """A response with derivatives Z = ∂ ln a and H = ∂∂ ln a that change from point to point.
+
+    The mean over N(x, S) is that of the second-order expansion of ln a,
+    ⟨a⟩ = a exp(½ Σ Sᵢⱼ (Zᵢ Zⱼ + Hᵢⱼ)).
+
+    Parameters
+    ----------
+    waves : PlaneWaves
+    unit : tuple of float
+    centre : tuple of float
+        As in `PointResponse`.
+    """
+
+    @abstractmethod
+    def expansion(self, x: Float) -> tuple[Complex, list[Complex], list[Complex]]:
+        """Return a (..., F, L, M) at points (..., p, L), the d Zᵢ, and the d(d+1)/2 Hᵢⱼ."""
+
+    def slope_change(self, Z: list[Complex], S: list[Float]) -> list[Complex]:
+        """Return ½ Σ Sᵢⱼ ∂Hᵢⱼ/∂xₖ for each k: zero unless a manifold has it."""
+        return []
+
+    def responses(self, x: Float, covariance: Float) -> Complex:
+        """Return the mean responses and their derivatives: (B, F, 1+d+d(d+1)/2, L, M)."""
+        a, Z, H = self.expansion(x)
+        d = len(Z)
+        S = [each[..., None, :, None] for each in np.moveaxis(covariance, -2, 0)]
+        second = [Z[i] * Z[j] + h for (i, j), h in zip(PAIRS[d], H, strict=True)]
+        # ⟨a⟩ = a exp(½ Σ Sᵢⱼ (Zᵢ Zⱼ + Hᵢⱼ)),  ∂ₖ ln ⟨a⟩ = Zₖ + Σ Sᵢⱼ Zᵢ Hⱼₖ + ½ Σ Sᵢⱼ ∂ₖHᵢⱼ
+        if d == 1:
+            damping = 0.5 * S[0] * second[0]
+            first = [Z[0] + S[0] * Z[0] * H[0]]
+        else:
+            damping = 0.5 * (S[0] * second[0] + S[2] * second[2]) + S[1] * second[1]
+            one, two = S[0] * Z[0] + S[1] * Z[1], S[1] * Z[0] + S[2] * Z[1]
+            first = [Z[0] + one * H[0] + two * H[1], Z[1] + one * H[1] + two * H[2]]
+        for each, change in zip(first, self.slope_change(Z, S), strict=False):
+            each += change
+        mean = a * np.exp(damping)
+        rows = np.stack([np.ones_like(mean), *first, *second], axis=-3)
+        rows *= mean[..., None, :, :]
+        return rows
+
+    def at(self, x: Float) -> tuple[Complex, Float]:
+        """Return a(x) (F, G, M) of points (p, G), and Σₘ |a|² Re Zᵢ* Zⱼ (F, d(d+1)/2, G)."""
+        a, Z, _ = self.expansion(x)
+        Z = [a * each for each in Z]
+        gram = [(Z[i].conj() * Z[j]).real.sum(axis=-1) for i, j in PAIRS[len(Z)]]
+        return a, np.stack(gram, axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class HorizontalWaves(LocalManifold):
+    """The azimuth of horizontal waves, of sensors in a plane or in space.
+
+    The response is that of `FourierManifold`, of isotropic elements, without its series.
+
+    Parameters
+    ----------
+    waves : PlaneWaves
+    unit : tuple of float
+    centre : tuple of float
+        As in `PointResponse`.
+
+    Examples
+    --------
+    >>> from arrivals.measurement_models.arrays.sensor_array import SensorArray
+    >>> circle = horizontal_waves(PlaneWaves(SensorArray.uca(8, 0.65), (1.0,)))
+    >>> circle.located(circle.from_doa([4.0]), np.zeros((1, 1)))["doa"].round(4)
+    array([-2.2832])
+    """
+
+    @cached_property
+    def levelled(self) -> Float:
+        """Horizontal positions from the centroid, m: (M, 2)."""
+        p = self.waves.array.positions[:, :2]
+        return np.asarray(p - p.mean(axis=0))
+
+    def from_doa(self, doa: ArrayLike) -> Float:
+        """Return the points (1, n) of azimuths (n,), rad."""
+        return np.asarray(doa, dtype=np.float64)[None] / self.scale
+
+    def direction(self, x: Float) -> Float:
+        """Return unit vectors to points (..., 1, L): (..., 3, L)."""
+        azimuth = x[..., 0, :] * self.unit[0]
+        return np.stack([np.cos(azimuth), np.sin(azimuth), 0 * azimuth], axis=-2)
+
+    def expansion(self, x: Float) -> tuple[Complex, list[Complex], list[Complex]]:
+        """Return the response and its derivatives along the azimuth."""
+        n = self.direction(x)[..., :2, :]
+        turned = np.stack([-n[..., 1, :], n[..., 0, :]], axis=-2)
+        k = np.asarray(1j * self.wavenumber)
+        phase = k * (n.swapaxes(-1, -2) @ self.levelled.T)[..., None, :, :]
+        slope = k * (turned.swapaxes(-1, -2) @ self.levelled.T)[..., None, :, :]
+        u = self.unit[0]
+        return np.exp(phase), [np.asarray(u * slope)], [np.asarray(-u * u * phase)]
+
+    def slope_change(self, Z: list[Complex], S: list[Float]) -> list[Complex]:
+        """Return ½ S ∂H = -½ S unit² Z."""
+        return [-0.5 * self.unit[0] ** 2 * S[0] * Z[0]]
+
+    def wrap(self, azimuth: Float) -> Float:
+        """Return azimuths in [-π, π)."""
+        return (azimuth + np.pi) % (2 * np.pi) - np.pi
+
+    def offset(self, x: Float, mean: Float) -> tuple[Float, Float | None]:
+        """Return the differences the shorter way round, and None for an identity."""
+        return self.wrap((x - mean) * self.unit[0]) / self.unit[0], None
+
+    def walk(self, x: Float, variance: float, curvature_variance: float | None = None) -> Float:
+        """Return the covariance of a step of some variance, rad²: (..., 1, L)."""
+        return np.full(x.shape, variance / self.unit[0] ** 2)
+
+    def new_candidates(self) -> CandidatePoints:
+        """Return an even grid of the circle."""
+        n = int(np.ceil(2 * np.pi / self.unit[0] / SPACING_OF_ONE))
+        grid = (-np.pi + 2 * np.pi * np.arange(n) / n) / self.unit[0]
+        log_measure = float(np.log(2 * np.pi / self.unit[0]))
+        return CandidatePoints(grid[None], log_measure, np.zeros(1))
+
+    def distance(self, x: Float, others: Float) -> Float:
+        """Return angles, rad, between (..., 1, L) and (1, G): (..., L, G)."""
+        apart = (x[..., 0, :, None] - others[0]) * self.unit[0]
+        return np.abs(self.wrap(apart))
+
+    def exists(self, x: Float, covariance: Float) -> Bool:
+        """Return True: every point is a direction."""
+        return np.ones(x.shape[-1], dtype=np.bool_)
+
+    def located(self, x: Float, covariance: Float) -> dict[str, Float]:
+        """Return doa and std of points (1, L)."""
+        std = np.minimum(self.unit[0] * np.sqrt(covariance[0]), UNIFORM_STD_OF_CIRCLE)
+        return {"doa": self.wrap(x[0] * self.unit[0]), "std": std}
+
+
+@lru_cache(maxsize=256)
+def horizontal_waves(waves: PlaneWaves) -> HorizontalWaves:
+    """Return the manifold of the azimuth of horizontal waves, without an element response."""
+    p = waves.array.positions[:, :2] - waves.centre[:2]
+    unit = ((waves.wavenumber**2).mean() * (p**2).sum(axis=1).mean() / 2) ** -0.5
+    return HorizontalWaves(waves, (float(unit),), tuple(waves.centre.tolist()))

@@ -1,0 +1,209 @@
+"""Base of responses as functions of points, and small symmetric matrices as upper triangles."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from typing import ClassVar, Self, cast
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from arrivals.measurement_models.arrays.plane_waves import PlaneWaves
+from arrivals.measurement_models.manifolds.manifold import UNIFORM_STD_OF_LINE, CandidatePoints
+from arrivals.typing import Bool, Complex, Float, Int
+
+PAIRS = {1: ((0, 0),), 2: ((0, 0), (0, 1), (1, 1))}  # of upper triangles, by number of unknowns
+SPACING_OF_ONE = 0.45  # of candidates, rad rms of the phases over the array
+SPACING_OF_TWO = 0.5
+MIN_COSINE = 0.1  # of the angle between a wave and broadside, where its inverse is taken
+
+
+@dataclass(frozen=True, eq=False)
+class PointResponse(ABC):
+    """Base of the responses of one array, of isotropic sensors, to points.
+
+    Parameters
+    ----------
+    waves : PlaneWaves
+        Array and wavelengths.
+    unit : tuple of float
+        Change of each unknown that turns the phases over the whole array by 1 rad rms.
+    centre : tuple of float
+        Point from which directions, and distances, are counted: the centroid of the whole array.
+
+    Notes
+    -----
+    Unit and centre stay as they are in the manifold of fewer sensors or bins: a point means the
+    same in all of them.
+    """
+
+    waves: PlaneWaves
+    unit: tuple[float, ...]
+    centre: tuple[float, ...]
+
+    is_linear: ClassVar[bool] = False
+
+    @property
+    def spike_precision(self) -> float | None:
+        """Prior precision of the second unknown of a plane wave; None without a choice."""
+        return None
+
+    @property
+    def slab_precision(self) -> float | None:
+        """Prior precision of the second unknown of a curved wave; None without a choice."""
+        return None
+
+    @property
+    def n_unknowns(self) -> int:
+        """Number of unknowns of a source."""
+        return len(self.unit)
+
+    @property
+    def point_size(self) -> int:
+        """Numbers of a point: one for each unknown."""
+        return self.n_unknowns
+
+    @property
+    def n_sensors(self) -> int:
+        """Number of sensors."""
+        return self.waves.array.n_sensors
+
+    @property
+    def n_bins(self) -> int:
+        """Number of frequency bins."""
+        return len(self.waves.wavelengths)
+
+    @cached_property
+    def positions(self) -> Float:
+        """Positions of the sensors from the centre, m: (n_sensors, dim)."""
+        return self.waves.array.positions - self.centre
+
+    @cached_property
+    def scale(self) -> Float:
+        """The units as a column, (d, 1)."""
+        return np.array(self.unit)[:, None]
+
+    @cached_property
+    def wavenumber(self) -> Float:
+        """2π/λ of the bins, rad/m: (F, 1, 1)."""
+        return self.waves.wavenumber[:, None, None]
+
+    def move(self, x: Float, step: Float) -> Float:
+        """Return the points after displacements: their sum."""
+        return x + step
+
+    def offset(self, x: Float, mean: Float) -> tuple[Float, Float | None]:
+        """Return the differences of points, and None for an identity as their derivative."""
+        return x - mean, None
+
+    def without(self, sensors: Sequence[int] | Int) -> Self:
+        """Return the manifold of the array without some sensors, cached."""
+        return cast(Self, _without(self, tuple(map(int, sensors)))) if len(sensors) else self
+
+    def only(self, bins: Sequence[int] | Int) -> Self:
+        """Return the manifold of some of the bins, cached."""
+        if len(bins) == self.n_bins:
+            return self
+        return cast(Self, _only(self, tuple(map(int, bins))))
+
+    @abstractmethod
+    def direction(self, x: Float) -> Float:
+        """Return unit vectors to points (..., p, L): (..., 3, L), or sin β, (..., 1, L)."""
+
+    def origin_phase(self, x: Float) -> Float:
+        """Return the phase that is left out of a response, rad: (L,), at the first bin."""
+        centroid = self.waves.centre
+        return np.asarray(
+            self.waves.wavenumber[0] * (centroid @ self.direction(x)[..., : len(centroid), :])
+        )
+
+    def size(self, x: Float) -> Float | float:
+        """Return ‖a‖ of unit amplitude at the centre, as a share of √M: (L,) or 1."""
+        return 1.0
+
+    def to_amplitude(self, w: ArrayLike, x: Float) -> Complex:
+        """Return amplitudes at the centre, phases at the origin; of several bins the size alone."""
+        w = np.asarray(w, dtype=np.complex128) / self.size(x)
+        if self.n_bins > 1:
+            return np.asarray(np.abs(w) + 0j)
+        return np.asarray(w * np.exp(-1j * self.origin_phase(x)))
+
+    @cached_property
+    def _candidates(self) -> CandidatePoints:
+        return self.new_candidates()
+
+    def candidates(self) -> CandidatePoints:
+        """Return the points at which sources may appear."""
+        return self._candidates
+
+    @abstractmethod
+    def new_candidates(self) -> CandidatePoints:
+        """Return the points at which sources may appear, made anew."""
+
+
+@lru_cache(maxsize=256)
+def _without(manifold: PointResponse, sensors: tuple[int, ...]) -> PointResponse:
+    return replace(manifold, waves=manifold.waves.without(sensors))
+
+
+@lru_cache(maxsize=256)
+def _only(manifold: PointResponse, bins: tuple[int, ...]) -> PointResponse:
+    return replace(manifold, waves=manifold.waves.only(bins))
+
+
+def matrices(triangles: Float) -> Float:
+    """Return symmetric 2 x 2 matrices (n, 2, 2) of upper triangles (3, n).
+
+    Examples
+    --------
+    >>> matrices(np.array([[1.0], [2.0], [3.0]]))
+    array([[[1., 2.],
+            [2., 3.]]])
+    """
+    return np.moveaxis(triangles[np.array([[0, 1], [1, 2]])], 2, 0)
+
+
+def cell_centres(unit: float, half_width: float, spacing: float) -> Float:
+    """Return an even grid of an unknown from -half_width to half_width, in its own scale."""
+    n = int(np.ceil(2 * half_width / (unit * spacing)))
+    return half_width * (-1 + 2 * (np.arange(n) + 0.5) / n)
+
+
+def sine_limits(sine: Float) -> Float:
+    """Return sines cut to ±1."""
+    return np.minimum(np.maximum(sine, -1.0), 1.0)
+
+
+def cosine_squared(sine: Float) -> Float:
+    """Return 1 - sin² of an angle, at least 0.01."""
+    return np.maximum(1 - sine * sine, MIN_COSINE**2)
+
+
+def line_direction(sine: Float, std: Float) -> tuple[Float, Float]:
+    """Return directions from broadside and their deviations, rad, from those of their sines.
+
+    A deviation is half the width of the directions of sin β ± std, at most that of a uniform one.
+
+    Examples
+    --------
+    >>> doa, std = line_direction(np.array([0.5, 1.2]), np.array([0.01, 0.01]))
+    >>> np.rad2deg(doa).round(2), np.rad2deg(std).round(2)
+    (array([30., 90.]), array([0.66, 4.05]))
+    """
+    sine = sine_limits(sine)
+    low, high = np.arcsin(sine_limits(sine + np.multiply.outer([-1.0, 1.0], std)))
+    return np.arcsin(sine), np.minimum((high - low) / 2, UNIFORM_STD_OF_LINE)
+
+
+def sine_exists(sine: Float, std: Float) -> Bool:
+    """Return which sines are within three standard deviations of a direction.
+
+    Examples
+    --------
+    >>> sine_exists(np.array([0.5, 1.02, 1.2]), np.array([0.01, 0.01, 0.01]))
+    array([ True,  True, False])
+    """
+    return np.asarray(np.abs(sine) <= 1 + 3 * std + 1e-9)

@@ -1,0 +1,215 @@
+"""Spherical waves on a line of sensors, exact, in sin β and 1/R."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from arrivals.measurement_models.arrays.plane_waves import PlaneWaves
+from arrivals.measurement_models.manifolds.line_phase import line_units
+from arrivals.measurement_models.manifolds.local import LocalManifold
+from arrivals.measurement_models.manifolds.manifold import CandidatePoints
+from arrivals.measurement_models.manifolds.points import (
+    SPACING_OF_ONE,
+    cell_centres,
+    cosine_squared,
+    sine_exists,
+    sine_limits,
+)
+from arrivals.measurement_models.manifolds.range_estimate import range_estimate
+from arrivals.typing import Bool, Complex, Float
+
+MIN_SQUARE = 1e-6  # of the distance of a sensor over R
+LIMITS = -0.2, 1.5  # of 1/R over the largest expected
+WALK_SHARE = 0.05  # of the largest 1/R: the default step
+
+
+@dataclass(frozen=True, eq=False)
+class SphericalLine(LocalManifold):
+    """A line of sensors and sources at any distance: a = R/r exp(jk(R - r)), ‖a‖² = M.
+
+    R is the distance of the source from the centre, r from a sensor. The prior of 1/R is
+    N(0, (½ max)²); candidates lie on a grid of sin β and of 1/R up to its largest.
+
+    Parameters
+    ----------
+    waves : PlaneWaves
+    unit : tuple of float
+    centre : tuple of float
+        As in `PointResponse`; the unit of 1/R is that of the curvature.
+    max_inverse : float
+        Largest 1/R expected, 1/m.
+
+    Notes
+    -----
+    A range is infinite where 1/R is within three standard deviations of zero.
+
+    Examples
+    --------
+    >>> from arrivals.measurement_models.arrays.sensor_array import SensorArray
+    >>> line = spherical_line(PlaneWaves(SensorArray.ula(16, 0.08), (0.17,)), max_inverse=2.0)
+    >>> x = line.from_doa([0.35], [0.5])
+    >>> float(line.located(x, 1e-4 * np.ones((3, 1)))["range"][0].round(6))
+    0.5
+    """
+
+    max_inverse: float
+
+    def from_doa(self, doa: ArrayLike, distance: ArrayLike = np.inf) -> Float:
+        """Return the points (2, n) of directions and distances (n,), rad and m."""
+        return np.stack(np.broadcast_arrays(np.sin(doa), 1 / np.asarray(distance))) / self.scale
+
+    def direction(self, x: Float) -> Float:
+        """Return sin β within ±1: (..., 1, L)."""
+        return sine_limits(x[..., :1, :] * self.unit[0])
+
+    def inverse_range(self, x: Float) -> Float:
+        """Return 1/R within the limits: (..., L)."""
+        low, high = (share * self.max_inverse for share in LIMITS)
+        return np.minimum(np.maximum(x[..., 1, :] * self.unit[1], low), high)
+
+    def relative_distance(self, x: Float) -> tuple[Float, Float, Float]:
+        """Return u = sin β and v = 1/R (..., L, 1), and t = r/R of the sensors (..., L, M)."""
+        u, v = self.direction(x)[..., 0, :, None], self.inverse_range(x)[..., None]
+        p = self.positions[:, 0]
+        # t = √(1 - 2puv + p²v²)
+        return u, v, np.sqrt(np.maximum(1 - 2 * p * u * v + (p * v) ** 2, MIN_SQUARE))
+
+    def expansion(self, x: Float) -> tuple[Complex, list[Complex], list[Complex]]:
+        """Return the response and its derivatives along sin β and 1/R."""
+        u, v, t = self.relative_distance(x)
+        p = self.positions[:, 0]
+        # derivatives of t along u and v
+        tu, tv = -p * v / t, (p * p * v - p * u) / t
+        tuu, tuv, tvv = -tu * tu / t, -(p + tu * tv) / t, (p * p - tv * tv) / t
+        # f = R - r = (2pu - p²v) / (1 + t)
+        f = (2 * p * u - p * p * v) / (1 + t)
+        fu, fv = p / t, -(p * p + f * tv) / (1 + t)
+        fvv = -(2 * fv * tv + f * tvv) / (1 + t)
+        # l = ln R/r
+        level = -np.log(t), -tu / t, -tv / t
+        bend = [(ti * tj / t - tij) / t for ti, tj, tij in
+                ((tu, tu, tuu), (tu, tv, tuv), (tv, tv, tvv))]  # fmt: skip
+        gain, change, second = normalized(level, bend)
+        k = 1j * self.wavenumber
+        phases = np.stack(np.broadcast_arrays(f, fu, fv, -fu * tu / t, -fu * tv / t, fvv))
+        phases -= phases.mean(axis=-1, keepdims=True)
+        f, fu, fv, fuu, fuv, fvv = k * phases[..., None, :, :]
+        one, two = self.unit
+        gain, change, second = (each[..., None, :, :] for each in (gain, change, second))
+        Z = [one * (fu + change[0]), two * (fv + change[1])]
+        H = [
+            one * one * (fuu + second[0]),
+            one * two * (fuv + second[1]),
+            two * two * (fvv + second[2]),
+        ]
+        return np.exp(gain + f), Z, H
+
+    def size(self, x: Float) -> Float:
+        """Return the root mean square of R/r over the sensors: (L,)."""
+        u, v, p = (
+            self.direction(x)[..., 0, :, None],
+            self.inverse_range(x)[..., None],
+            self.positions,
+        )
+        square = np.maximum(1 - 2 * p[:, 0] * u * v + (p[:, 0] * v) ** 2, MIN_SQUARE)
+        return np.asarray(np.sqrt((1 / square).mean(axis=-1)))
+
+    def origin_phase(self, x: Float) -> Float:
+        """Return the phase that is left out of a response, rad: (L,), at the first bin."""
+        u, v, p = (
+            self.direction(x)[0, :, None],
+            self.inverse_range(x)[:, None],
+            self.positions[:, 0],
+        )
+        t = np.sqrt(np.maximum(1 - 2 * p * u * v + (p * v) ** 2, MIN_SQUARE))
+        f = ((2 * p * u - p * p * v) / (1 + t)).mean(axis=1)
+        return np.asarray(self.waves.wavenumber[0] * (f + self.centre[0] * u[:, 0]))
+
+    def walk(self, x: Float, variance: float, curvature_variance: float | None = None) -> Float:
+        """Return the covariance of a step of some variance, rad², and of 1/R: (..., 3, L)."""
+        if curvature_variance is None:
+            curvature_variance = (WALK_SHARE * self.max_inverse) ** 2
+        along = variance * cosine_squared(self.direction(x)) / self.unit[0] ** 2
+        return np.concatenate(
+            [along, 0 * along, 0 * along + curvature_variance / self.unit[1] ** 2], axis=-2
+        )
+
+    def new_candidates(self) -> CandidatePoints:
+        """Return a grid of sin β and 1/R, about one unit apart in 1/R."""
+        u = cell_centres(self.unit[0], 1.0, SPACING_OF_ONE)
+        v = np.linspace(0, self.max_inverse, 1 + int(np.ceil(self.max_inverse / self.unit[1])))
+        points = np.stack([each.ravel() for each in np.meshgrid(u, v, indexing="ij")]) / self.scale
+        precision = (2 * self.unit[1] / self.max_inverse) ** 2
+        log_measure = np.log(2 / self.unit[0]) + 0.5 * np.log(2 * np.pi / precision)
+        prior = np.array([0.0, 0.0, precision])
+        return CandidatePoints(points, float(log_measure), prior, np.zeros(2))
+
+    def distance(self, x: Float, others: Float) -> Float:
+        """Return differences of direction, rad, of (..., 2, L) and (2, G): (..., L, G)."""
+        doa, other = (np.arcsin(self.direction(each)[..., 0, :]) for each in (x, others))
+        return np.asarray(np.abs(doa[..., None] - other))
+
+    def exists(self, x: Float, covariance: Float) -> Bool:
+        """Return which points (2, L) are within three standard deviations of a direction."""
+        return sine_exists(x[0] * self.unit[0], self.unit[0] * np.sqrt(covariance[0]))
+
+    def located(self, x: Float, covariance: Float) -> dict[str, Float]:
+        """Return doa, std, range, range_std and covariance of points (2, L)."""
+        inverse_range = x[1] * self.unit[1]
+        rates = np.zeros_like(inverse_range), np.full(inverse_range.shape, self.unit[1])
+        return range_estimate(self.direction(x)[0], self.unit[0], inverse_range, rates, covariance)
+
+
+def normalized(level: tuple[Float, Float, Float], bend: list[Float]) -> tuple[Float, Float, Float]:
+    """Return log gains, their 2 first and 3 second derivatives, for a mean square of 1.
+
+    ln g = l - ½ ln mean exp(2l), over the last axis.
+
+    Parameters
+    ----------
+    level : tuple of ndarray, shape (..., M)
+        l and its first derivatives.
+    bend : list of ndarray, shape (..., M)
+        Second derivatives 11, 12, 22.
+
+    Returns
+    -------
+    gain : ndarray, shape (..., M)
+    first : ndarray, shape (2, ..., M)
+    second : ndarray, shape (3, ..., M)
+    """
+    gain, one, two = level
+    weight = np.exp(2 * gain)
+    total = weight.sum(axis=-1, keepdims=True)
+    weight /= total
+
+    def mean(values: Float) -> Float:
+        return np.asarray((weight * values).sum(axis=-1, keepdims=True))
+
+    m1, m2 = mean(one), mean(two)
+    products = (one, one, m1, m1), (one, two, m1, m2), (two, two, m2, m2)
+    # ∂∂ ½ ln Σ exp 2l = ⟨l_ij⟩ + 2 (⟨l_i l_j⟩ - ⟨l_i⟩⟨l_j⟩)
+    second = [
+        each - mean(each) - 2 * (mean(a * b) - ma * mb)
+        for each, (a, b, ma, mb) in zip(bend, products, strict=True)
+    ]
+    size = 0.5 * np.log(total / gain.shape[-1])
+    return gain - size, np.stack([one - m1, two - m2]), np.stack(second)
+
+
+@lru_cache(maxsize=256)
+def spherical_line(waves: PlaneWaves, max_inverse: float) -> SphericalLine:
+    """Return the manifold of spherical waves on a line.
+
+    Parameters
+    ----------
+    waves : PlaneWaves
+        A line of isotropic sensors.
+    max_inverse : float
+        Largest 1/R, 1/m: the inverse of the distance of the nearest source.
+    """
+    return SphericalLine(waves, line_units(waves), tuple(waves.centre.tolist()), max_inverse)
