@@ -14,7 +14,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from arrivals.measurement_models import ArraySnapshot, Manifold
+from arrivals.measurement_models import AngleManifold, ArraySnapshot
 from arrivals.motion_models import BernoulliVonMises
 from arrivals.motion_models.bessel import log_i0
 from arrivals.scenarios import create
@@ -22,8 +22,9 @@ from arrivals.trackers import SVALSE
 from arrivals.trackers.svalse.components import ComponentPosterior, ComponentPrior
 from arrivals.trackers.svalse.coordinate.single_snapshot import SingleSnapshotAscent
 from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver
-from arrivals.trackers.svalse.newton.candidates import LOG_2PI
-from arrivals.trackers.svalse.newton.elbo import Components, evaluate  # fmt: skip
+from arrivals.trackers.svalse.newton.angle_chart import LOG_2PI
+from arrivals.trackers.svalse.newton.batch import Components
+from arrivals.trackers.svalse.newton.elbo import evaluate
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
 from arrivals.trackers.svalse.newton.solver import NewtonSolver
 from arrivals.trackers.svalse.newton.state import log_odds
@@ -64,7 +65,7 @@ class WatchedAscent(CoordinateSolver):
     last: list[Watched] = []  # noqa: RUF012
 
     def initial_state(
-        self, snapshots: Complex, manifold: Manifold, prior: ComponentPrior | None
+        self, snapshots: Complex, manifold: AngleManifold, prior: ComponentPrior | None
     ) -> SingleSnapshotAscent:
         """Return the state, and keep it."""
         self.last[:] = [Watched(self, snapshots, manifold, prior)]
@@ -82,7 +83,9 @@ def divergence(c: Complex, prior: complex) -> float:
     return float((np.exp(log_q) * (log_q - log_p)).mean() * 2 * np.pi)
 
 
-def bound(y: Complex, manifold: Manifold, known: ComponentPrior, fit: ComponentPosterior) -> float:
+def bound(
+    y: Complex, manifold: AngleManifold, known: ComponentPrior, fit: ComponentPosterior
+) -> float:
     """Return the ELBO of a fast fit, F, from its angles and variances."""
     on = np.flatnonzero(fit.active)
     components = Components.zeros(1, max(len(on), 1))

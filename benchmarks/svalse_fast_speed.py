@@ -22,8 +22,9 @@ from svalse_fast import ELECTRICAL, FIGURES, PAPER, row
 from arrivals.measurement_models import ArraySnapshot
 from arrivals.scenarios import create
 from arrivals.trackers import SVALSE, Tracker
-from arrivals.trackers.svalse.newton.candidates import LOG_2PI
-from arrivals.trackers.svalse.newton.elbo import Components, evaluate
+from arrivals.trackers.svalse.newton.angle_chart import LOG_2PI
+from arrivals.trackers.svalse.newton.batch import Components
+from arrivals.trackers.svalse.newton.elbo import evaluate
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
 from arrivals.trackers.svalse.newton.step import newton_step
 from arrivals.typing import Complex, Float

@@ -11,7 +11,7 @@ from arrivals.motion_models.base import MotionModel
 from arrivals.motion_models.move_stop import MoveStopWalk
 from arrivals.motion_models.von_mises import VonMisesWalk, wrap
 from arrivals.typing import Bool, Float
-from arrivals.validation import instance, number, probability, real, time_step
+from arrivals.validation import instance, not_negative, number, probability, real, time_step
 
 MIN_KAPPA = 1e-9
 PAPER_KAPPA = 148.0  # 1.5° at broadside of a half-wavelength line
@@ -34,6 +34,9 @@ class BernoulliVonMises(MotionModel):
     still : float
         Probability, in [0, 1), that a new source stands still; one that moves may stop, and one
         that stands still may move, as `MoveStopWalk` says. 0 for a walk that never stops.
+    walk_range : float, optional
+        Standard deviation of the step of 1/R per unit of time, 1/m, where sources have a range R;
+        None is a tenth of the largest 1/R that the measurement model expects.
 
     Raises
     ------
@@ -63,11 +66,14 @@ class BernoulliVonMises(MotionModel):
     p_deactivate: float = 0.25
     sigma_doa: float | None = None
     still: float = 0.0
+    walk_range: float | None = None
 
     def __post_init__(self) -> None:
         self.walk  # noqa: B018  (rejects invalid steps)
         if not 0 <= number("still", self.still) < 1:
             raise ValueError(f"still must lie in [0, 1); got {self.still}")
+        if self.walk_range is not None:
+            object.__setattr__(self, "walk_range", not_negative("walk_range", self.walk_range))
         probability("p_activate", self.p_activate)
         probability("p_deactivate", self.p_deactivate)
 

@@ -29,7 +29,7 @@ def padded(values: Float | Int | Bool, n: int, filler: float) -> Float:
 
     Parameters
     ----------
-    values : ndarray, shape (n_values,)
+    values : ndarray, shape (n_values, ...)
         Values.
     n : int
         Length of the result.
@@ -38,7 +38,7 @@ def padded(values: Float | Int | Bool, n: int, filler: float) -> Float:
 
     Returns
     -------
-    ndarray, shape (n,)
+    ndarray, shape (n, ...)
         Padded values.
 
     Examples
@@ -46,7 +46,7 @@ def padded(values: Float | Int | Bool, n: int, filler: float) -> Float:
     >>> padded(np.array([1.0, 2.0]), 4, np.nan)
     array([ 1.,  2., nan, nan])
     """
-    full = np.full(n, filler)
+    full = np.full((n, *values.shape[1:]), filler)
     full[: len(values[:n])] = values[:n]
     return full
 

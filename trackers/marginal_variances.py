@@ -1,4 +1,4 @@
-"""Marginal variances from an information matrix, and the factor for unknown noise."""
+"""Marginal variances and covariances, and the factor for unknown noise."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 
+from arrivals.trackers.symmetric import limited
 from arrivals.typing import Float
 
 MIN_EIGENVALUE = 1e-3  # of the matrix scaled to a unit diagonal
@@ -41,6 +42,45 @@ def marginal_variances(N: Float, largest: float) -> Float:
     # v_l = Σ V_li² / λ_i / d_l²
     variance = (V**2 / np.maximum(eigenvalues, MIN_EIGENVALUE)[..., None, :]).sum(axis=-1) / d**2
     return np.asarray(np.minimum(variance, largest))
+
+
+def marginal_covariances(N: Float, n_unknowns: int, largest: float) -> Float:
+    """Return the blocks of N⁻¹ of each source, their eigenvalues at most `largest`.
+
+    Parameters
+    ----------
+    N : ndarray, shape (..., d L, d L)
+        Information matrices, symmetric; all first unknowns, then all second ones.
+    n_unknowns : int
+        Unknowns d of a source, 1 or 2.
+    largest : float
+        As in `marginal_variances`.
+
+    Returns
+    -------
+    ndarray, shape (..., d(d+1)/2, L)
+        Upper triangles.
+
+    Examples
+    --------
+    >>> N = np.array([[2.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, 0.0], [1.0, 0.0, 2.0, 0.0],
+    ...               [0.0, 0.0, 0.0, 1.0]])
+    >>> marginal_covariances(N, 2, largest=10.0).round(4) + 0
+    array([[ 0.6667,  1.    ],
+           [-0.3333,  0.    ],
+           [ 0.6667,  1.    ]])
+    """
+    if n_unknowns == 1:
+        return marginal_variances(N, largest)[..., None, :]
+    # R = N / (d d'),  d_l = √max(N_ll, 1/largest)
+    d = np.sqrt(np.maximum(np.diagonal(N, axis1=-2, axis2=-1), 1 / largest))
+    eigenvalues, V = np.linalg.eigh(N / (d[..., :, None] * d[..., None, :]))
+    weight = 1 / np.maximum(eigenvalues, MIN_EIGENVALUE)[..., None, :]
+    first, second = np.split(V / d[..., None], 2, axis=-2)
+    pairs = ((first, first), (first, second), (second, second))
+    # (N⁻¹)_kl = Σ V_ki V_li / λ_i / (d_k d_l)
+    blocks = np.stack([(one * other * weight).sum(axis=-1) for one, other in pairs], axis=-2)
+    return limited(blocks, largest)
 
 
 def student_factor(freedom: Float) -> Float:

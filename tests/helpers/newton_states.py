@@ -6,7 +6,8 @@ from numpy.typing import ArrayLike
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.motion_models.bessel import log_i0
 from arrivals.trackers.svalse.components import ComponentPosterior, ComponentPrior
-from arrivals.trackers.svalse.newton.elbo import Components, Evaluation, evaluate
+from arrivals.trackers.svalse.newton.batch import Components
+from arrivals.trackers.svalse.newton.elbo import Evaluation, evaluate
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
 from arrivals.trackers.svalse.newton.state import log_odds
 from arrivals.trackers.svalse.svalse import SVALSE

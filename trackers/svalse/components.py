@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
-from arrivals.measurement_models.manifolds.manifold import Manifold
-from arrivals.motion_models.bernoulli_von_mises import MIN_KAPPA
-from arrivals.motion_models.move_stop import MoveStopWalk
-from arrivals.motion_models.von_mises import wrap
+from arrivals.measurement_models.manifolds.manifold import Manifold, is_point_manifold
 from arrivals.parameters import FrozenModel
 from arrivals.typing import Bool, Complex, Float, Int
 from arrivals.validation import count, not_negative, number, positive
 
 Settings = TypeVar("Settings", bound="SolverSettings")
-MIN_INFORMATION = 1e-3  # of the data, relative to the prior's, for an update of the modes
 MERGE_DISTANCE = float(np.deg2rad(1.5))  # rad of direction, of tracked components
 
 
@@ -28,7 +24,8 @@ class ComponentPrior:
     Parameters
     ----------
     mu, kappa : ndarray, shape (n_tracked,)
-        Von Mises densities of the angles of the tracked components; rad.
+        Von Mises densities of the angles of the tracked components; rad. Of a `PointManifold`
+        points (n_tracked, point_size) and the upper triangles of precisions.
     existence : ndarray, shape (n_tracked,)
         Probability that each is active.
     birth : float
@@ -94,6 +91,11 @@ class ComponentPosterior:
         Concentrations of the marginal densities, the noise known; those of the bound if None.
     modes : ndarray, shape (3, n_components, 2), optional
         Modes of a walk that may stand still, as in `MoveStopWalk`.
+    covariance : ndarray, shape (n_components, d(d+1)/2), optional
+        Of a `PointManifold`, in place of `resultant`: upper triangles of the stated covariances;
+        `theta` has points (n_components, point_size), `kappa` triangles of precisions.
+    curved : ndarray of bool, shape (n_components,), optional
+        Which components have the prior of a curved wave.
     """
 
     theta: Float
@@ -113,6 +115,8 @@ class ComponentPosterior:
     moments: Complex | None = None
     marginal_kappa: Float | None = None
     modes: Float | None = None
+    covariance: Float | None = None
+    curved: Bool | None = None
 
 
 class Solver(Protocol):
@@ -192,103 +196,23 @@ class SolverSettings(FrozenModel):
         return prior.snr_db if self.snr_db is None and prior is not None else self.snr_db
 
 
-def drifted(nuisance: Float) -> Float:
-    """Return densities (..., n) of a second unknown after a step, on its grid.
-
-    It stays with probability 0.9, and else goes to a neighbour; a trace is anywhere.
-
-    Examples
-    --------
-    >>> drifted(np.array([0.0, 1.0, 0.0])).round(4)
-    array([0.05  , 0.8999, 0.05  ])
-    """
-    left, right = nuisance[..., :1], nuisance[..., -1:]
-    wide = np.concatenate([left, nuisance, right], axis=-1)
-    shifted = 0.9 * nuisance + 0.05 * (wide[..., :-2] + wide[..., 2:])
-    return np.asarray((1 - 1e-4) * shifted + 1e-4 / nuisance.shape[-1])
-
-
-class ModeBelief(Protocol):
-    """Components with the modes of a walk that may stand still, as `SVALSE` has them."""
-
-    mu: Float
-    kappa: Float
-    modes: Float
-
-    @property
-    def tracked(self) -> Bool:
-        """Slots that hold a tracked component."""
-
-
-def with_modes(
-    walk: MoveStopWalk,
-    priors: Sequence[ModeBelief],
-    posteriors: Sequence[ComponentPosterior],
-) -> list[ComponentPosterior]:
-    """Return posteriors in which the modes of the walk have been updated, in one array program.
-
-    The data's part of each posterior, relative to its prior, is a measurement of the angle.
-
-    Parameters
-    ----------
-    walk : MoveStopWalk
-    priors : sequence of ModeBelief
-        Predicted components, one record for each posterior.
-    posteriors : sequence of ComponentPosterior
-
-    Returns
-    -------
-    list of ComponentPosterior
-        With `modes`, and the angles and variances of the mixtures.
-    """
-    n = [min(int(p.tracked.sum()), len(q.theta)) for p, q in zip(priors, posteriors, strict=True)]
-    first = [np.flatnonzero(p.tracked)[:m] for p, m in zip(priors, n, strict=True)]
-    mu = np.concatenate([p.mu[on] for p, on in zip(priors, first, strict=True)])
-    prior_kappa = np.concatenate([p.kappa[on] for p, on in zip(priors, first, strict=True)])
-    prior_variance = 1 / np.maximum(prior_kappa, MIN_KAPPA)
-    modes = np.concatenate([p.modes[:, on] for p, on in zip(priors, first, strict=True)], axis=1)
-    modes = walk.renewed(modes, prior_variance)
-    theta, active = (
-        np.concatenate([getattr(q, name)[:m] for q, m in zip(posteriors, n, strict=True)])
-        for name in ("theta", "active")
+def no_components(manifold: Manifold) -> ComponentPosterior:
+    """Return the posterior of a step without components."""
+    none, no_flag = np.zeros(0), np.zeros(0, dtype=np.bool_)
+    points, triangles = none, none
+    if is_point_manifold(manifold):
+        d = manifold.n_unknowns
+        points, triangles = np.zeros((0, manifold.point_size)), np.zeros((0, d * (d + 1) // 2))
+    return ComponentPosterior(
+        theta=points,
+        resultant=none,
+        kappa=triangles,
+        active=no_flag,
+        age=np.zeros(0, dtype=np.int64),
+        amplitude=np.zeros(0, dtype=np.complex128),
+        evidence=none,
+        noise=0.0,
+        power=0.0,
+        iterations=0,
+        converged=True,
     )
-    kappa = np.concatenate([_marginal(q)[:m] for q, m in zip(posteriors, n, strict=True)])
-    # D = 1/v - 1/v_p;  R = 1/D;  δ = wrap(θ - μ) R/v: the pseudo-measurement and its variance
-    D = kappa - 1 / prior_variance
-    informed = active & (MIN_INFORMATION / prior_variance < D)
-    R = 1 / np.where(informed, D, 1.0)
-    shift, variance, updated = walk.update(modes, wrap(theta - mu) * kappa * R, R)
-    modes = np.where(informed[:, None], updated, modes)
-    theta = wrap(mu + np.where(informed, shift, 0.0))
-    variance = np.where(informed, variance, prior_variance)
-    ends = np.cumsum(n)[:-1]
-    parts = zip(
-        posteriors,
-        np.split(theta, ends),
-        np.split(variance, ends),
-        np.split(modes, ends, axis=1),
-        strict=True,
-    )
-    return [_merged(*part) for part in parts]
-
-
-def _merged(
-    posterior: ComponentPosterior, theta: Float, variance: Float, modes: Float
-) -> ComponentPosterior:
-    """Return a posterior with other densities of its first components."""
-    m = len(theta)
-    old_theta, old_kappa = posterior.theta, _marginal(posterior)
-    # stated variance: V v_stated/v
-    ratio = -2 * np.log(posterior.resultant[:m]) * old_kappa[:m]
-    return replace(
-        posterior,
-        theta=np.concatenate([theta, old_theta[m:]]),
-        kappa=np.concatenate([1 / variance, old_kappa[m:]]),
-        resultant=np.concatenate([np.exp(-0.5 * variance * ratio), posterior.resultant[m:]]),
-        modes=np.concatenate([modes, np.zeros((3, len(old_kappa) - m, 2))], axis=1),
-    )
-
-
-def _marginal(posterior: ComponentPosterior) -> Float:
-    """Return the concentrations of the marginal densities."""
-    return posterior.kappa if posterior.marginal_kappa is None else posterior.marginal_kappa

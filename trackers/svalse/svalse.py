@@ -9,32 +9,41 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.direction_measurement import DirectionMeasurement
-from arrivals.measurement_models.manifolds.manifold import Reference
+from arrivals.measurement_models.manifolds.manifold import (
+    Reference,
+    is_angle_manifold,
+)
 from arrivals.measurement_models.observed import ObservedSnapshots, merge_noise
 from arrivals.motion_models.bernoulli_von_mises import BernoulliVonMises
-from arrivals.motion_models.bessel import bessel_ratio, bessel_ratios
+from arrivals.motion_models.bessel import bessel_ratios
 from arrivals.trackers.direction_tracker import padded
 from arrivals.trackers.registry import register
 from arrivals.trackers.svalse.components import (
     ComponentPosterior,
     ComponentPrior,
     Solver,
+    no_components,
+)
+from arrivals.trackers.svalse.coordinate.solver import PosteriorName
+from arrivals.trackers.svalse.prediction import (
+    DEFAULT_MOTION,
     drifted,
+    motion_on,
+    n_moments,
+    predicted_components,
     with_modes,
 )
-from arrivals.trackers.svalse.coordinate.solver import NO_COMPONENTS, PosteriorName
-from arrivals.trackers.svalse.valse import (
-    DEFAULT_SOLVER,
-    VALSE,
-    Engine,
-    circular_std,
+from arrivals.trackers.svalse.reporting import (
     detected,
     existence_of,
+    is_direction,
+    located,
+    prior_spread,
 )
+from arrivals.trackers.svalse.valse import DEFAULT_SOLVER, VALSE, Engine
 from arrivals.typing import Bool, Complex, Float, Int
 from arrivals.validation import instance, no_control, one_of, time_step
 
-DEFAULT_MOTION = BernoulliVonMises(sigma_doa=np.deg2rad(1.5), still=0.1)
 Memory = Literal["von_mises", "posterior"]
 CarriedExistence = Literal["active", "probability"]
 INITIAL_SNR_DB = 20.0  # of the first step, for one snapshot a step
@@ -81,7 +90,11 @@ class SVALSE(VALSE):
     ----------
     mu, kappa, existence, label : ndarray, shape (L,)
         Tracked components: mean angle, concentration, probability of being active, and label;
-        NaN, 0, 0 and -1 in unused slots. These are the belief, and may be assigned.
+        NaN, 0, 0 and -1 in unused slots. These are the belief, and may be assigned. With two
+        unknowns a source `mu` has points of the manifold, (L, point_size), and `kappa` the upper
+        triangles of precisions in its chart, (L, 3).
+    curved : ndarray of bool, shape (L,)
+        Which of them are curved waves, where sources have a range.
     age : ndarray of int, shape (L,)
         Steps since each was last active; 0 for those that are.
     expected_snr_db : float or None
@@ -136,35 +149,28 @@ class SVALSE(VALSE):
         self.motion = instance("motion", motion, BernoulliVonMises)
         self.memory = one_of("memory", memory, ("von_mises", "posterior"))
         self.carry_existence = one_of("carry_existence", carry_existence, ("active", "probability"))
-        if self.memory == "posterior" and motion is DEFAULT_MOTION:
-            self.motion = motion.replace(still=0.0)
-        elif self.memory == "posterior" and motion.still:
-            raise ValueError(f'still must be 0 where memory is "posterior"; got {motion.still}')
         super().__init__(
             measurement, solver=solver, engine=engine, posterior=posterior, reference=reference
         )
+        self.motion = motion_on(self.full_manifold, motion, self.memory)
 
     def reset(self) -> None:
         """Forget all components, labels and noise estimates."""
         self.n_labels, self.birth = 0, self.motion.p_activate
         self.expected_snr_db: float | None = None
         self.bin_noise = np.full(len(self.bin_noise), np.nan)
-        self._keep(NO_COMPONENTS, np.zeros(0, dtype=np.int64))
+        self._keep(no_components(self.full_manifold), np.zeros(0, dtype=np.int64))
         super().reset()
 
     @property
     def n_moments(self) -> int:
         """Number of moments that a density has after a step of the motion model; 0 if not kept."""
-        if self.memory == "von_mises":
-            return 0
-        manifold = self.measurement.manifold(self.reference)
-        slowest = manifold.slope(manifold.from_doa(np.pi / 2))
-        return int(7 * np.sqrt(float(self.motion.blur(np.inf, 1.0, slowest)))) + 8
+        return 0 if self.memory == "von_mises" else n_moments(self.full_manifold, self.motion)
 
     @property
     def tracked(self) -> Bool:
         """Slots that hold a tracked component, (L,)."""
-        return ~np.isnan(self.mu)
+        return ~np.isnan(self.mu if self.mu.ndim == 1 else self.mu[:, 0])
 
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
         """Predict the angles' densities, births and deaths, (62)-(65)."""
@@ -185,15 +191,11 @@ class SVALSE(VALSE):
     def predict_batch(self, trackers: Sequence[Self], dt: float) -> None:
         """Predict the beliefs of copies of this tracker by `dt`."""
         dt = time_step(dt)
-        mu, kappa, existence = (
-            np.stack([getattr(tracker, name) for tracker in trackers])
-            for name in ("mu", "kappa", "existence")
-        )
-        tracked = ~np.isnan(mu)
-        slope = self.measurement.manifold(self.reference).slope(np.where(tracked, mu, 0.0))
+        existence = np.stack([tracker.existence for tracker in trackers])
+        tracked = np.stack([tracker.tracked for tracker in trackers])
         # μ' = μ   (62);  A(κ') = A(κ) A(κ_r), of which (63) is the limit for large κ
-        modes = np.stack([tracker.modes for tracker in trackers], axis=1)
-        mu, kappa, modes = self.motion.predict_angles(mu, kappa, modes, dt, slope)
+        moved = predicted_components(self.full_manifold, self.motion, trackers, dt)
+        mu, kappa, modes, slope = moved
         # ρ' = (1 - p_d) ρ + p_a (1 - ρ)   (64)
         rho = np.where(tracked, self.motion.predict_existence(existence, dt), 0.0)
         # ρ' = p_a of a component that was not tracked   (65)
@@ -220,18 +222,18 @@ class SVALSE(VALSE):
 
     def report_prior(self) -> None:
         """Report the components that are expected before a measurement."""
-        manifold = self.measurement.manifold(self.reference)
+        manifold = self.full_manifold
         likely = np.flatnonzero(self.tracked & (self.existence >= 0.5) & (self.label >= 0))
-        std = circular_std(bessel_ratio(self.kappa[likely]))
-        real = ~np.isnan(manifold.to_doa(self.mu[likely], 3 * std))
-        likely, std = likely[real], std[real]
-        theta = self.mu[likely]
-        self.report(
-            manifold.to_doa(theta, slack=np.inf),
-            manifold.doa_std(theta, std),
+        spread = prior_spread(self.kappa[likely])
+        real = is_direction(manifold, self.mu[likely], spread)
+        likely, spread = likely[real], spread[real]
+        estimate = self.estimate_kind(
+            **located(manifold, self.mu[likely], spread, self.curved[likely]),
             existence=self.existence[likely],
+            amplitude=np.full(len(likely), complex(np.nan, np.nan)),
             label=self.label[likely],
         )
+        self.report_estimate(estimate)
 
     def observe(self, z: ArrayLike | None) -> ObservedSnapshots | None:
         """Return the valid data; None also if there are too few sensors for the components."""
@@ -282,10 +284,13 @@ class SVALSE(VALSE):
             existence = existence * existence_of(posterior)
         self.mu = padded(posterior.theta[order], n, np.nan)
         self.kappa = padded(posterior.kappa[order], n, 0.0)
+        curved = np.ones(len(age), dtype=np.bool_) if posterior.curved is None else posterior.curved
+        self.curved: Bool = padded(curved[order], n, 0.0) > 0
         self.existence: Float = padded(existence[order], n, 0.0)
         self.label: Int = padded(label[order], n, -1).astype(np.int64)
         self.age: Int = padded(age[order], n, 0).astype(np.int64)
-        weights = self.measurement.manifold(self.reference).nuisance_weights
+        manifold = self.full_manifold
+        weights = manifold.nuisance_weights if is_angle_manifold(manifold) else np.ones(1)
         self.nuisance = np.tile(weights, (n, 1))
         self.moments = np.zeros((n, self.n_moments), dtype=np.complex128)
         self.modes = np.zeros((3, n, 2))

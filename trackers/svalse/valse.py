@@ -22,7 +22,15 @@ from arrivals.trackers.svalse.components import (
 )
 from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver, PosteriorName
 from arrivals.trackers.svalse.newton.solver import NewtonSolver
-from arrivals.typing import Bool, Float, Int
+from arrivals.trackers.svalse.reporting import (
+    amplitudes,
+    detected,
+    estimate_kind,
+    existence_of,
+    located,
+    spread_of,
+)
+from arrivals.typing import Bool, Int
 from arrivals.validation import instance, no_control, one_of, time_step
 
 Engine = Literal["newton", "fast", "coordinate"]
@@ -108,13 +116,19 @@ class VALSE(BatchDirectionTracker):
         manifold = measurement.manifold(self.reference)
         self.solver.check(manifold, getattr(measurement, "n_snapshots", 1), self.n_moments)
         warn_of_ambiguity(measurement)
+        self.estimate_kind = estimate_kind(manifold)
         self.bin_noise = np.full(manifold.n_bins, np.nan)
         self.reset()
 
     @property
+    def full_manifold(self) -> Manifold:
+        """Response of all sensors at all frequencies."""
+        return self.measurement.manifold(self.reference)
+
+    @property
     def n_slots(self) -> int:
         """Largest number of components."""
-        n_sensors = self.measurement.manifold(self.reference).n_sensors
+        n_sensors = self.full_manifold.n_sensors
         return min(n_sensors, self.solver.max_components or n_sensors)
 
     @property
@@ -193,17 +207,18 @@ class VALSE(BatchDirectionTracker):
         label: Int | None = None,
     ) -> None:
         """Report the active components of a posterior as directions."""
-        theta, std = posterior.theta[active], circular_std(posterior.resultant[active])
-        self.report(
-            manifold.to_doa(theta, slack=np.inf),
-            manifold.doa_std(theta, std),
+        theta, n = posterior.theta[active], int(np.count_nonzero(active))
+        curved = None if posterior.curved is None else posterior.curved[active]
+        estimate = self.estimate_kind(
+            **located(manifold, theta, spread_of(posterior)[active], curved),
             existence=existence_of(posterior)[active],
-            amplitude=manifold.to_amplitude(posterior.amplitude[active], theta),
-            label=label,
+            amplitude=amplitudes(manifold, posterior.amplitude[active], theta),
+            label=np.full(n, -1) if label is None else label,
             converged=posterior.converged,
             iterations=posterior.iterations,
             noise=posterior.noise,
         )
+        self.report_estimate(estimate)
 
 
 def selected_solver(
@@ -233,25 +248,3 @@ def selected_solver(
             'pass engine="coordinate"'
         )
     return solver.replace(posterior=posterior)
-
-
-def detected(manifold: Manifold, posterior: ComponentPosterior) -> Bool:
-    """Return which components are active and belong, within three std, to a real direction."""
-    doa = manifold.to_doa(posterior.theta, slack=3 * circular_std(posterior.resultant))
-    return np.asarray(posterior.active & ~np.isnan(doa))
-
-
-def existence_of(posterior: ComponentPosterior) -> Float:
-    """Return the probabilities of existence of active components, from their log odds."""
-    return np.asarray(1 / (1 + np.exp(-np.maximum(posterior.evidence, -700))))
-
-
-def circular_std(resultant: ArrayLike) -> Float:
-    """Return the circular standard deviation √(-2 ln R), rad, of densities of resultant R.
-
-    Examples
-    --------
-    >>> circular_std([1.0, 0.5]).round(4) + 0
-    array([0.    , 1.1774])
-    """
-    return np.asarray(np.sqrt(-2 * np.log(np.maximum(resultant, 1e-300))))

@@ -8,7 +8,7 @@ import numpy as np
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.direction_measurement import DirectionMeasurement
-from arrivals.measurement_models.manifolds.manifold import AngleManifold
+from arrivals.measurement_models.manifolds.manifold import AngleManifold, angle_manifold
 from arrivals.trackers.wideband.direction_grid import DirectionGrid
 from arrivals.trackers.wideband.settings import MixtureSettings
 from arrivals.trackers.wideband.tracked_sources import TrackedSources
@@ -51,7 +51,7 @@ class Scan:
             and model.noise_coherence == "white"
         ):
             model = model.replace(noise_coherence="diffuse")
-        manifold = model.angle_manifold()
+        manifold = angle_manifold("wideband_mixture", model.manifold())
         # of a line, a direction from behind is one in front
         behind = manifold.to_doa(manifold.from_doa(np.array([0.75 * np.pi])), slack=np.inf)
         grid = DirectionGrid(bool(abs(behind[0]) <= np.pi / 2), settings.grid_step)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from arrivals.measurement_models import ArraySnapshot, Manifold, SensorArray
+from arrivals.measurement_models import AngleManifold, ArraySnapshot, SensorArray
 from arrivals.motion_models import BernoulliVonMises
 from arrivals.trackers import SBL, SSBL, SVALSE
 from arrivals.trackers.svalse.components import ComponentPrior
@@ -46,7 +46,7 @@ class PublishedProgram(CoordinateSolver):
     """The published program: the paper's settings, and its error."""
 
     def initial_state(
-        self, snapshots: Complex, manifold: Manifold, prior: ComponentPrior | None
+        self, snapshots: Complex, manifold: AngleManifold, prior: ComponentPrior | None
     ) -> SingleSnapshotAscent:
         """Return the solver state with the error."""
         return PublishedAscent(self, snapshots, manifold, prior)

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import toeplitz
 
-from arrivals.measurement_models import ArraySnapshot, Manifold, SensorArray
+from arrivals.measurement_models import AngleManifold, ArraySnapshot, SensorArray
 from arrivals.trackers.svalse.components import ComponentPrior
 from arrivals.trackers.svalse.coordinate.single_snapshot import SingleSnapshotAscent
 from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver
@@ -30,7 +30,7 @@ def snapshot(seed: int, array: SensorArray = ARRAY) -> Complex:
 
 
 def initialized(
-    seed: int, prior: ComponentPrior | None = None, manifold: Manifold | None = None
+    seed: int, prior: ComponentPrior | None = None, manifold: AngleManifold | None = None
 ) -> RecordingAscent:
     """State after initialization and the first selection of the support."""
     manifold = manifold or MODEL.angle_manifold()
@@ -47,7 +47,7 @@ class RecordingAscent(SingleSnapshotAscent):
         self,
         settings: CoordinateSolver,
         Y: Complex,
-        manifold: Manifold,
+        manifold: AngleManifold,
         prior: ComponentPrior | None,
     ) -> None:
         super().__init__(settings, Y, manifold, prior)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from arrivals.measurement_models import ArraySnapshot, ElementResponse, Manifold, SensorArray
+from arrivals.measurement_models import AngleManifold, ArraySnapshot, ElementResponse, SensorArray
 from arrivals.measurement_models.observed import ObservedSnapshots
 from arrivals.motion_models.bessel import bessel_ratios
 from arrivals.scenarios import create
@@ -158,7 +158,7 @@ class GeneralSolver(CoordinateSolver):
     """Coordinate ascent without the fast form for one snapshot."""
 
     def initial_state(
-        self, snapshots: Complex, manifold: Manifold, prior: ComponentPrior | None
+        self, snapshots: Complex, manifold: AngleManifold, prior: ComponentPrior | None
     ) -> MultiSnapshotAscent:
         """Return the general state."""
         return MultiSnapshotAscent(self, snapshots, manifold, prior)

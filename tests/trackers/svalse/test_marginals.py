@@ -14,9 +14,10 @@ from arrivals.motion_models.bessel import log_i0
 from arrivals.scenarios import create, mean_gospa
 from arrivals.trackers import SVALSE
 from arrivals.trackers.marginal_variances import student_factor
-from arrivals.trackers.svalse.newton.elbo import Components, Evaluation, evaluate
+from arrivals.trackers.svalse.newton.batch import Components
+from arrivals.trackers.svalse.newton.elbo import Evaluation, evaluate
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
-from arrivals.trackers.svalse.newton.marginals import angle_variances, marginals, noise_factor
+from arrivals.trackers.svalse.newton.marginals import component_covariances, marginals, noise_factor
 from arrivals.trackers.svalse.newton.step import newton_step
 from arrivals.typing import Float
 
@@ -50,17 +51,17 @@ def solved() -> Evaluation:
 def test_marginals_equal_the_specification(solved: Evaluation) -> None:
     result = marginals(RESPONSE, solved, kl_weight=0.5)
     for name, expected in {
-        "variance": [0.011587, 0.023324, 0.027124],
-        "stated_variance": [0.012723, 0.025762, 0.029720],
+        "covariance": [0.011587, 0.023324, 0.027124],
+        "stated_covariance": [0.012723, 0.025762, 0.029720],
     }.items():
-        np.testing.assert_allclose(np.sqrt(getattr(result, name)[0]), expected, rtol=1e-4)
+        np.testing.assert_allclose(np.sqrt(getattr(result, name)[0, 0]), expected, rtol=1e-4)
     np.testing.assert_allclose(result.log_odds[0], [22.3745, 13.7225, 17.4355], rtol=1e-4)
 
 
 def test_variances_equal_those_of_the_exact_posterior(solved: Evaluation) -> None:
     """Angles on a grid, amplitudes integrated out, the noise known: within 1 % (Laplace)."""
     nu, tau = float(solved.nu[0, 0]), float(solved.tau[0, 0])
-    std = np.sqrt(angle_variances(RESPONSE, solved)[0])
+    std = np.sqrt(component_covariances(RESPONSE, solved)[0, 0])
     axes = [
         m + np.linspace(-6, 6, 41) * s for m, s in zip(solved.components.mu[0], std, strict=True)
     ]
@@ -82,8 +83,10 @@ def test_unused_slots_change_nothing(solved: Evaluation) -> None:
     components = Components(np.concatenate([solved.components.packed, np.zeros((1, 7, 2))], axis=2))
     larger = evaluate(RESPONSE, solved.Y, components, solved.K, solved.nu, solved.tau, np.zeros(1))
     result, expected = (marginals(RESPONSE, each, 0.5) for each in (larger, solved))
-    for name in ("variance", "stated_variance", "log_odds"):
-        np.testing.assert_allclose(getattr(result, name)[:, :3], getattr(expected, name), rtol=1e-9)
+    for name in ("covariance", "stated_covariance", "log_odds"):
+        np.testing.assert_allclose(
+            getattr(result, name)[..., :3], getattr(expected, name), rtol=1e-9
+        )
 
 
 def test_separated_sources_have_the_variances_of_the_bound() -> None:
@@ -96,7 +99,7 @@ def test_separated_sources_have_the_variances_of_the_bound() -> None:
     state = evaluation_of(RESPONSE, y[None, None, :, None], components, nu=1e-3)
     for _ in range(20):
         state = newton_step(RESPONSE, state, np.array([False]))
-    variance = angle_variances(RESPONSE, state)
+    variance = component_covariances(RESPONSE, state)[:, 0]
     np.testing.assert_allclose(variance, state.components.variance, rtol=0.01)
 
 

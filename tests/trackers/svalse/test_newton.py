@@ -12,14 +12,15 @@ from newton_states import MODEL, evaluation_of, scene
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.measurement_models.manifolds.uniform_line import UniformLineManifold
 from arrivals.trackers.svalse.components import MERGE_DISTANCE, ComponentPrior
+from arrivals.trackers.svalse.newton.batch import Components
+from arrivals.trackers.svalse.newton.candidate_grid import AngleGrid
 from arrivals.trackers.svalse.newton.candidates import (
-    CandidateGrid,
     RemovedComponents,
     add_candidates,
     grid_evidence,
     removal_gains,
 )
-from arrivals.trackers.svalse.newton.elbo import Components, Evaluation, evaluate
+from arrivals.trackers.svalse.newton.elbo import Evaluation, evaluate
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
 from arrivals.trackers.svalse.newton.solver import NewtonSolver
 from arrivals.trackers.svalse.newton.step import (
@@ -57,14 +58,14 @@ def slope_of(state: Evaluation, name: str, k: int, h: float, response: ExpectedR
 def test_gradients_equal_numerical_slopes(seed: int, model: ArraySnapshot) -> None:
     state, response = scene(seed, model), ExpectedResponse(model.angle_manifold())
     g, curvature = slopes(response, state, *weights(state))
-    of_s = 0.5 / state.components.variance[0] - 0.5 * curvature[0]
+    of_s = 0.5 / state.components.variance[0] - 0.5 * curvature[0, 0]
     for k in range(5):
         s = float(state.components.variance[0, k])
         along_mu, along_s = (
             slope_of(state, "mu", k, 1e-4, response),
             slope_of(state, "variance", k, 0.01 * s, response),
         )
-        assert g[0, k] == pytest.approx(along_mu, abs=1e-7 * np.abs(g).max())
+        assert g[0, 0, k] == pytest.approx(along_mu, abs=1e-7 * np.abs(g).max())
         assert of_s[k] == pytest.approx(along_s, abs=1e-7 * np.abs(of_s).max())
 
 
@@ -79,7 +80,7 @@ def test_hessian_equals_the_slope_of_the_gradient_to_a_hundredth(model: ArraySna
     np.testing.assert_allclose(N, N.swapaxes(1, 2), atol=1e-9 * np.abs(N).max())
     for k in range(5):
         ends = [shifted(state, "mu", k, h, response) for h in (1e-6, -1e-6)]
-        up, down = (slopes(response, end, *weights(end))[0][0] for end in ends)
+        up, down = (slopes(response, end, *weights(end))[0][0, 0] for end in ends)
         np.testing.assert_allclose(N[0, :, k], (down - up) / 2e-6, atol=0.01 * np.abs(N).max())
 
 
@@ -170,7 +171,7 @@ def test_removal_changes_the_criterion_by_its_gain(seed: int, kl_weight: float) 
 
 def test_addition_changes_the_evidence_by_its_gain() -> None:
     state, response = scene(0), ExpectedResponse(MODEL.angle_manifold())
-    grid = CandidateGrid(response, 8, merge=0.0)
+    grid = AngleGrid(response, 8, merge=0.0)
     gain = grid_evidence(grid, state)[0][0]
     for g in (3, 40, 77):
         new = Components.zeros(1, 1)
@@ -186,7 +187,7 @@ def test_candidates_keep_the_merge_distance_and_removed_components_return() -> N
         state = newton_step(response, state, NONE)
     components = state.components.without(np.array([3])).first(4)
     rest = evaluation_of(response, state.Y, components, state.nu[0, 0])
-    grid = CandidateGrid(response, 8, merge=np.deg2rad(1.5))
+    grid = AngleGrid(response, 8, merge=np.deg2rad(1.5))
     excluded, room = np.zeros((1, len(grid.theta)), dtype=np.bool_), np.ones(1, dtype=np.int64)
     memory = state.components.with_slots(np.arange(5))
     gone = np.array([[False, False, False, True, False]])
@@ -198,7 +199,7 @@ def test_candidates_keep_the_merge_distance_and_removed_components_return() -> N
     assert fresh.components.slot[0, 0] == -1
     assert back.components.slot[0, 0] == 3  # its odds are better
     assert back.components.mu[0, 0] == pytest.approx(state.components.mu[0, 3], abs=0.1)
-    excluded[:] = grid.near(grid.manifold.to_doa(state.components.mu[0, 3]))
+    excluded[:] = grid.beside(state.components.point[:, :, 3:4])[0]
     elsewhere = add_candidates(
         grid, rest, odds, RemovedComponents(memory, gone, excluded), room, 0.5
     )
@@ -245,7 +246,7 @@ class Explicit(UniformLineManifold):
 def test_response_with_coefficients_has_equal_steps() -> None:
     line = GAPS.angle_manifold()
     assert isinstance(line, UniformLineManifold)
-    explicit = Explicit(line.grid_index, line.step, line.origin, line.reference)
+    explicit: Any = Explicit(line.grid_index, line.step, line.origin, line.reference)
     state = scene(0, GAPS)
     one, other = ExpectedResponse(line), ExpectedResponse(explicit)
     assert other.extent == pytest.approx(one.extent)
@@ -253,9 +254,8 @@ def test_response_with_coefficients_has_equal_steps() -> None:
     for _ in range(4):
         state, state2 = newton_step(one, state, NONE), newton_step(other, state2, NONE)
         np.testing.assert_allclose(state2.components.packed, state.components.packed, atol=1e-10)
-    np.testing.assert_allclose(
-        CandidateGrid(other, 4, 0.0).slope2, CandidateGrid(one, 4, 0.0).slope2
-    )
+    gram, expected = np.broadcast_arrays(AngleGrid(other).gram, AngleGrid(one).gram)
+    np.testing.assert_allclose(gram, expected)
 
 
 def test_extent_of_a_filled_line_is_its_number_of_sensors() -> None:

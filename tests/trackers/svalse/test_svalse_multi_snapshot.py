@@ -34,7 +34,7 @@ every_model = pytest.mark.parametrize("model", MODELS, ids=NAMES)
 @pytest.mark.parametrize("model", [CIRCLE, SEVERAL, ELEMENTS], ids=NAMES[:3])
 def test_circle_turned_by_grid_steps_turns_every_angle(model: ArraySnapshot) -> None:
     """By whole steps of the grid on which components are born; see the next for others."""
-    n = len(support_search(NewtonSolver(), model.manifold(), 1, with_prior=True).grid.theta)
+    n = support_search(NewtonSolver(), model.manifold(), 1, with_prior=True).grid.n_points
     turn, doa = 2 * np.pi * 5 / n, np.array([[0.3, -2.0, 1.6]] * 4)
     other, z = turned(model, turn), snapshots_of(model, doa)
     a, b = SVALSE(model, SLOW).run(z), SVALSE(other, SLOW).run(z)

@@ -17,7 +17,7 @@ from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver
 from arrivals.trackers.svalse.newton.elbo import evaluate
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
 from arrivals.trackers.svalse.newton.solver import NewtonSolver
-from arrivals.trackers.svalse.valse import detected
+from arrivals.trackers.svalse.reporting import detected
 from arrivals.typing import Complex, Float
 
 LINE = ArraySnapshot(SensorArray.ula(15, spacing=0.5), wavelength=1.0)

@@ -10,13 +10,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, Self
 
-import numpy as np
-
-from arrivals.measurement_models.manifolds.manifold import AngleManifold
+from arrivals.measurement_models.manifolds.manifold import (
+    AngleManifold,
+    Manifold,
+    angle_manifold,
+)
 from arrivals.trackers.svalse.components import (
     ComponentPosterior,
     ComponentPrior,
     SolverSettings,
+    no_components,
 )
 from arrivals.trackers.svalse.coordinate.multi_snapshot import MultiSnapshotAscent
 from arrivals.trackers.svalse.coordinate.single_snapshot import SingleSnapshotAscent
@@ -110,8 +113,9 @@ class CoordinateSolver(SolverSettings):
             first_existence=first_existence,
         )
 
-    def check(self, manifold: AngleManifold, n_snapshots: int, n_moments: int) -> None:
-        """Raise ValueError if the mixture does not support such measurements."""
+    def check(self, manifold: Manifold, n_snapshots: int, n_moments: int) -> None:
+        """Raise ValueError if the solver does not support such measurements."""
+        manifold = angle_manifold("CoordinateSolver", manifold)
         if self.posterior == "quadrature":
             return
         n_bins = len(manifold.nuisance_weights)
@@ -130,20 +134,22 @@ class CoordinateSolver(SolverSettings):
                 )
 
     def solve(
-        self, snapshots: Complex, manifold: AngleManifold, prior: ComponentPrior | None
+        self, snapshots: Complex, manifold: Manifold, prior: ComponentPrior | None
     ) -> ComponentPosterior:
         """Fit the snapshots of one step (sections III and IV, Fig. 3).
 
         Parameters
         ----------
         snapshots : ndarray, shape (n_bins, n_sensors, n_snapshots)
-        manifold : AngleManifold
+        manifold : Manifold
+            Of one angle.
         prior : ComponentPrior or None
             None in VALSE.
         """
         if not snapshots.any():
-            return NO_COMPONENTS
-        state = self.initial_state(snapshots, manifold, prior)
+            return no_components(manifold)
+        angle = angle_manifold("CoordinateSolver", manifold)
+        state = self.initial_state(snapshots, angle, prior)
         merge, limit = self.merge_distance(prior is not None), self.max_iterations
         x, converged = state.initialize(), False  # (66)-(68)
         while not converged and state.iterations < limit and not state.is_cycling(limit):
@@ -160,7 +166,7 @@ class CoordinateSolver(SolverSettings):
     def solve_batch(
         self,
         snapshots: Sequence[Complex],
-        manifold: AngleManifold,
+        manifold: Manifold,
         priors: Sequence[ComponentPrior | None],
     ) -> list[ComponentPosterior]:
         """Fit independent snapshots of one array, one after the other."""
@@ -173,18 +179,3 @@ class CoordinateSolver(SolverSettings):
         single = SingleSnapshotAscent.applies(self, snapshots, manifold, prior)
         kind = SingleSnapshotAscent if single else MultiSnapshotAscent
         return kind(self, snapshots, manifold, prior)
-
-
-NO_COMPONENTS = ComponentPosterior(
-    theta=np.zeros(0),
-    resultant=np.zeros(0),
-    kappa=np.zeros(0),
-    active=np.zeros(0, dtype=np.bool_),
-    age=np.zeros(0, dtype=np.int64),
-    amplitude=np.zeros(0, dtype=np.complex128),
-    evidence=np.zeros(0),
-    noise=0.0,
-    power=0.0,
-    iterations=0,
-    converged=True,
-)

@@ -1,9 +1,9 @@
-"""The ELBO of the snapshots of a step as a smooth function of all their angles.
+"""The ELBO of the snapshots of a step as a smooth function of all unknowns of the components.
 
-The angles have wrapped normal densities; amplitudes and their covariance are eliminated in closed
-form. Arrays have a leading axis of independent problems, (B, ...), then, where it matters, one of
-F frequency bins, and slots for L components of which the first K are in use. A bin has N
-snapshots.
+Their densities are normal in a chart, wrapped normal of an angle; amplitudes and their covariance
+are eliminated in closed form. Arrays have a leading axis of independent problems, (B, ...), then,
+where it matters, one of F frequency bins, and slots for L components of which the first K are in
+use. A bin has N snapshots.
 """
 
 from __future__ import annotations
@@ -12,95 +12,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from arrivals.trackers.svalse.newton.batch import BatchRecord
+from arrivals.trackers.svalse.newton.batch import BatchRecord, Components
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse, diagonals
+from arrivals.trackers.symmetric import identity, log_det, places
 from arrivals.typing import Bool, Complex, Float, Int
 
-MU, VARIANCE, PRIOR_MU, PRIOR_KAPPA, LOG_ODDS, KL_CONSTANT, SLOT = range(7)
 LOG_2PIE = float(np.log(2 * np.pi * np.e))
-
-
-@dataclass(eq=False)
-class Components(BatchRecord):
-    """Components of each problem in one array; its properties are views of shape (B, L).
-
-    Attributes
-    ----------
-    packed : ndarray, shape (B, 7, L)
-        The quantities in the order of the properties.
-    """
-
-    packed: Float
-
-    @classmethod
-    def zeros(cls, n_problems: int, n_components: int) -> Components:
-        """Return components of which all is zero.
-
-        Examples
-        --------
-        >>> components = Components.zeros(1, 2)
-        >>> components.mu[0, 1] = 0.5
-        >>> components.mu
-        array([[0. , 0.5]])
-        """
-        return cls(np.zeros((n_problems, 7, n_components)))
-
-    @property
-    def mu(self) -> Float:
-        """Mean of the angle, rad."""
-        return self.packed[:, MU]
-
-    @property
-    def variance(self) -> Float:
-        """Variance of the angle, rad²."""
-        return self.packed[:, VARIANCE]
-
-    @property
-    def prior_mu(self) -> Float:
-        """Mean of the predicted von Mises density, rad."""
-        return self.packed[:, PRIOR_MU]
-
-    @property
-    def prior_kappa(self) -> Float:
-        """Concentration of the predicted von Mises density."""
-        return self.packed[:, PRIOR_KAPPA]
-
-    @property
-    def log_odds(self) -> Float:
-        """Prior log odds of being active."""
-        return self.packed[:, LOG_ODDS]
-
-    @property
-    def kl_constant(self) -> Float:
-        """Logarithm of 2π I₀(κ) of the predicted density."""
-        return self.packed[:, KL_CONSTANT]
-
-    @property
-    def slot(self) -> Int:
-        """Index in the memory of the step; -1 while on trial. A copy: see `with_slots`."""
-        return self.packed[:, SLOT].astype(np.int64)
-
-    def copy(self) -> Components:
-        """Return a copy that may be written into."""
-        return Components(self.packed.copy())
-
-    def with_slots(self, slot: Int) -> Components:
-        """Return the components with other indices in the memory, (B, L)."""
-        changed = self.copy()
-        changed.packed[:, SLOT] = slot
-        return changed
-
-    def first(self, n: int) -> Components:
-        """Return the first n components of each problem."""
-        return Components(self.packed[:, :, :n])
-
-    def without(self, k: Int) -> Components:
-        """Return the components without the k-th of each problem, the last slot unused."""
-        L = self.packed.shape[2]
-        order = np.arange(L) + (np.arange(L) >= k[:, None])
-        rows = np.arange(len(k))[:, None]
-        kept = self.packed[rows, :, np.minimum(order, L - 1)]
-        return Components(np.asarray(kept.swapaxes(1, 2)))
 
 
 @dataclass(eq=False)
@@ -121,17 +38,17 @@ class Evaluation(BatchRecord):
         Σ ln(1-ρ) where ρ is estimated, else 0.
     A : ndarray, shape (B, F, L, n_sensors)
         Mean steering vectors â.
-    X : ndarray, shape (B, F, 3 or 4, L, L)
-        `ExpectedResponse.products`; the diagonals are ⟨‖a‖²⟩ in the first, and half its first and
-        second derivatives in the second and third.
-    h : ndarray, shape (B, F, 3, L, N)
-        âᴴY, (∂â)ᴴY, (∂²â)ᴴY.
+    X : ndarray, shape (B, F, P or P + d², L, L)
+        `ExpectedResponse.products`, P = 1 + d + d(d+1)/2 for d unknowns; the diagonals are ⟨‖a‖²⟩
+        in the first, and half its first and second derivatives in the following ones.
+    h : ndarray, shape (B, F, P, L, N)
+        âᴴY, (∂ᵢâ)ᴴY, (∂ᵢⱼâ)ᴴY, i ≤ j.
     uncertainty_loss : ndarray, shape (B, F, L)
         ⟨‖a‖²⟩ - ‖â‖².
-    prior_gradient : ndarray, shape (B, L)
-        κ exp(-s/2 + j(μ-μₚ)): the prior's part of gradient and curvature.
+    prior_gradient, prior_curvature : ndarray, shapes (B, d, L), (B, d(d+1)/2, L)
+        First and second derivatives of the prior's part of D.
     D : ndarray, shape (B, L)
-        KL divergence of each angle's density from its prior.
+        KL divergence of each component's density from its prior.
     log_prior : ndarray, shape (B,)
         Part of the odds and divergences in the ELBO.
     W, G : ndarray, shapes (B, F, L, N), (B, F, L, L)
@@ -153,7 +70,8 @@ class Evaluation(BatchRecord):
     X: Complex
     h: Complex
     uncertainty_loss: Float
-    prior_gradient: Complex
+    prior_gradient: Float
+    prior_curvature: Float
     D: Float
     log_prior: Float
     W: Complex
@@ -165,9 +83,20 @@ class Evaluation(BatchRecord):
         return len(self.K)
 
     @property
+    def n_unknowns(self) -> int:
+        """Unknowns d of a component."""
+        return self.components.layout.n_unknowns
+
+    @property
     def second_products(self) -> Complex:
-        """(∂â)ᴴ∂â off the diagonal, (B, F, L, L)."""
-        return self.X[:, :, 3] if self.X.shape[2] == 4 else -self.X[:, :, 2]
+        """(∂ᵢâ)ᴴ∂ⱼâ off the diagonal, (B, F, d, d, L, L)."""
+        d, L = self.n_unknowns, self.X.shape[-1]
+        first, last = 1 + d, 1 + d + d * (d + 1) // 2
+        if self.X.shape[2] > last:
+            return self.X[:, :, last:].reshape(*self.X.shape[:2], d, d, L, L)
+        if d == 1:
+            return -self.X[:, :, 2:, None]
+        return np.asarray(-self.X[:, :, first:][:, :, places(d)])
 
     def trimmed(self) -> Evaluation:
         """Return the same without slots that no problem uses."""
@@ -182,7 +111,8 @@ class Evaluation(BatchRecord):
             X=self.X[..., :L, :L],
             h=self.h[:, :, :, :L],
             uncertainty_loss=self.uncertainty_loss[:, :, :L],
-            prior_gradient=self.prior_gradient[:, :L],
+            prior_gradient=self.prior_gradient[..., :L],
+            prior_curvature=self.prior_curvature[..., :L],
             D=self.D[:, :L],
             W=self.W[:, :, :L],
             G=self.G[:, :, :L, :L],
@@ -203,25 +133,31 @@ def evaluate(
     log_prior_inactive: Float,
 ) -> Evaluation:
     """Return the evaluation of given components and variances."""
-    mu, s = components.mu, components.variance
-    L = mu.shape[1]
+    x, s = components.point, components.covariance
+    L = x.shape[2]
     used = np.arange(L) < K[:, None]
     partly_used = min(K.tolist()) < L
     if partly_used:
-        s = np.where(used, s, 1.0)
-    A, X, h, uncertainty_loss = response.products(Y, mu, s, used if partly_used else None)
-    # KL(q ‖ p) = ln 2πI₀(κ) - ½ ln 2πes - κ exp(-s/2) cos(μ-μₚ)
-    prior_gradient = components.prior_kappa * np.exp(1j * (mu - components.prior_mu) - 0.5 * s)
-    D = components.kl_constant - 0.5 * (LOG_2PIE + np.log(s)) - prior_gradient.real
+        s = np.where(used[:, None], s, identity(response.n_unknowns))
+    A, X, h, uncertainty_loss = response.products(Y, x, s, used if partly_used else None)
+    # KL(q ‖ p) = c - ½ ln det 2πe S + ⟨prior⟩;  c = ln 2πI₀(κ), ⟨prior⟩ = -κ exp(-s/2) cos(μ-μₚ)
+    # of an angle, c = ½ ln det 2π P⁻¹, ⟨prior⟩ = ½ (δᵀPδ + tr PS) of a point
+    value, prior_gradient, prior_curvature = response.chart.prior(
+        x, s, components.prior_mean, components.prior_precision
+    )
+    D = components.kl_constant - 0.5 * (response.n_unknowns * LOG_2PIE + log_det(s)) + value
     each = components.log_odds - D
     if partly_used:
-        prior_gradient, D, each = prior_gradient * used, D * used, each * used
+        D, each = D * used, each * used
+        prior_gradient = prior_gradient * used[:, None]
+        prior_curvature = prior_curvature * used[:, None]
     log_prior = log_prior_inactive + each.sum(axis=1)
     W, G, explained, F = amplitudes(response, X[:, :, 0], h[:, :, 0], used, K, nu, tau)
     return Evaluation(
         Y=Y, components=components, K=K, used=used, nu=nu, tau=tau,
         log_prior_inactive=log_prior_inactive, A=A, X=X, h=h, uncertainty_loss=uncertainty_loss,
-        prior_gradient=prior_gradient, D=D, log_prior=log_prior, W=W, G=G, explained=explained,
+        prior_gradient=prior_gradient, prior_curvature=prior_curvature, D=D,
+        log_prior=log_prior, W=W, G=G, explained=explained,
         F=F + log_prior,
     )  # fmt: skip
 

@@ -1,7 +1,7 @@
-"""Marginal variances of the angles and odds of existence, at the end of a step.
+"""Marginal covariances of the components and odds of existence, at the end of a step.
 
-The ELBO has the variance of each angle with all other angles held, `Components.variance`. The
-marginal ones follow from the joint Hessian of all angles; the noise, which the ELBO takes as
+The ELBO has the covariance of each component with all others held, `Components.covariance`. The
+marginal ones follow from the joint Hessian of all components; the noise, which the ELBO takes as
 known, is integrated out of what is reported. Neither is put back into the ELBO.
 """
 
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from arrivals.trackers.marginal_variances import marginal_variances, student_factor
+from arrivals.trackers.marginal_variances import marginal_covariances, student_factor
 from arrivals.trackers.svalse.newton.elbo import Evaluation
 from arrivals.trackers.svalse.newton.expected_response import (
     ExpectedResponse,
@@ -19,31 +19,31 @@ from arrivals.trackers.svalse.newton.expected_response import (
     over_snapshots,
 )
 from arrivals.trackers.svalse.newton.step import (
-    MAX_ANGLE_VARIANCE,
     negative_hessian,
     noise_freedom,
     slopes,
     weights,
 )
+from arrivals.trackers.symmetric import clamped, clamped_inverse, inverse
 from arrivals.typing import Complex, Float
 
 
 @dataclass(frozen=True, eq=False)
 class ComponentMarginals:
-    """What is kept and reported of the components of each problem, (B, L).
+    """What is kept and reported of the components of each problem.
 
     Attributes
     ----------
-    variance : ndarray
-        Marginal variances of the angles with known noise, rad²: the motion model widens them.
-    stated_variance : ndarray
-        Those with unknown noise, rad²: the reported ones.
-    log_odds : ndarray
+    covariance : ndarray, shape (B, d(d+1)/2, L)
+        Marginal covariances with known noise: the motion model widens them.
+    stated_covariance : ndarray, shape (B, d(d+1)/2, L)
+        Those with unknown noise: the reported ones.
+    log_odds : ndarray, shape (B, L)
         Log odds of existence, the noise integrated out, nats.
     """
 
-    variance: Float
-    stated_variance: Float
+    covariance: Float
+    stated_covariance: Float
     log_odds: Float
 
 
@@ -53,27 +53,28 @@ def marginals(
     """Return the marginals of the components of each problem."""
     freedom = 2 * noise_freedom(response, evaluation)
     w2 = evaluation.W.real**2 + evaluation.W.imag**2
-    variance = angle_variances(response, evaluation)
+    covariance = component_covariances(response, evaluation)
     factor = noise_factor(evaluation, w2, freedom)
     return ComponentMarginals(
-        variance,
-        stated_variances(evaluation, variance, factor),
+        covariance,
+        stated_covariances(response, evaluation, covariance, factor),
         existence_log_odds(response, evaluation, w2, freedom, kl_weight),
     )
 
 
-def angle_variances(response: ExpectedResponse, evaluation: Evaluation) -> Float:
-    """Return the diagonal of N⁻¹, rad², (B, L): the Laplace approximation, noise known.
+def component_covariances(response: ExpectedResponse, evaluation: Evaluation) -> Float:
+    """Return the blocks of N⁻¹ of each component: the Laplace approximation, noise known.
 
-    N is the negative Hessian of F with the amplitudes eliminated.
+    N is the negative Hessian of F with the amplitudes eliminated. The result has the shape
+    (B, d(d+1)/2, L).
     """
     v, P = weights(evaluation)
     curvature = slopes(response, evaluation, v, P)[1]
-    used = evaluation.used
     N = negative_hessian(response, evaluation, P, curvature)
+    used = np.tile(evaluation.used, response.n_unknowns)
     N = np.where(used[:, :, None] & used[:, None, :], N, 0.0)
     diagonals(N)[...] += ~used
-    return marginal_variances(N, MAX_ANGLE_VARIANCE)
+    return marginal_covariances(N, response.n_unknowns, response.chart.max_variance)
 
 
 def noise_factor(evaluation: Evaluation, w2: Float, freedom: Float) -> Float:
@@ -108,14 +109,16 @@ def snapshot_noise(evaluation: Evaluation) -> Float:
     return np.asarray(power / np.maximum(power.mean(axis=3, keepdims=True), 1e-300))
 
 
-def stated_variances(evaluation: Evaluation, variance: Float, factor: Float) -> Float:
-    """Return the reported variances, rad²: the data's information divided by `factor`.
+def stated_covariances(
+    response: ExpectedResponse, evaluation: Evaluation, covariance: Float, factor: Float
+) -> Float:
+    """Return the reported covariances: the data's information divided by `factor`.
 
-    v = [p + max(1/v - p, 0)/f]⁻¹, where p is the prior's part of the information.
+    S = [P + max(S⁻¹ - P, 0)/f]⁻¹, where P is the prior's part of the information.
     """
-    prior = evaluation.prior_gradient.real
-    information = prior + np.maximum(1 / variance - prior, 0.0) / factor
-    return np.asarray(1 / np.maximum(information, 1 / MAX_ANGLE_VARIANCE))
+    prior = evaluation.prior_curvature
+    information = prior + clamped(inverse(covariance) - prior, 0.0) / factor[:, None]
+    return clamped_inverse(information, 1 / response.chart.max_variance)
 
 
 def existence_log_odds(

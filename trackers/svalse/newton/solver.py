@@ -13,7 +13,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from arrivals.measurement_models.manifolds.manifold import Manifold
+from arrivals.measurement_models.manifolds.manifold import Manifold, is_angle_manifold
 from arrivals.trackers.svalse.components import (
     ComponentPosterior,
     ComponentPrior,
@@ -21,7 +21,7 @@ from arrivals.trackers.svalse.components import (
 )
 from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver
 from arrivals.trackers.svalse.newton.batch import all_set, any_set
-from arrivals.trackers.svalse.newton.candidates import CandidateGrid
+from arrivals.trackers.svalse.newton.candidate_grid import candidate_grid
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
 from arrivals.trackers.svalse.newton.marginals import marginals
 from arrivals.trackers.svalse.newton.state import (
@@ -42,7 +42,6 @@ from arrivals.typing import Complex
 from arrivals.validation import instance, probability
 
 FILL_SHARE = 0.5  # components added before the noise is estimated, per sensor of a filled line
-GRID_POINTS_PER_SENSOR = 4  # angles at which components may be added
 
 
 @dataclass(frozen=True)
@@ -76,6 +75,9 @@ class NewtonSolver(SolverSettings):
     kl_weight : float
         Share of the cost of localising a component, nats, that is charged in decisions on the
         support. 1 is the exact bound; less finds weaker sources, and more false ones below 10 dB.
+    merge_correlation : float, optional
+        Instead of a distance: correlation of the responses, in all bins, above which the later of
+        two active components is removed; in (0, 1]. It needs no scale.
     limits : IterationLimits
         Numbers of Newton steps and of changes of the support.
 
@@ -91,11 +93,17 @@ class NewtonSolver(SolverSettings):
     """
 
     kl_weight: float = 0.5
+    merge_correlation: float | None = None
     limits: IterationLimits = DEFAULT_LIMITS
 
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "kl_weight", probability("kl_weight", self.kl_weight))
+        if (
+            self.merge_correlation is not None
+            and not probability("merge_correlation", self.merge_correlation) > 0
+        ):
+            raise ValueError(f"merge_correlation must lie in (0, 1]; got {self.merge_correlation}")
         instance("limits", self.limits, IterationLimits)
 
     def solve(
@@ -141,15 +149,18 @@ class NewtonSolver(SolverSettings):
         list of ComponentPosterior
             In the order of the snapshots.
         """
-        whole_densities = any(prior is not None and prior.n_moments for prior in priors)
-        if whole_densities or len(manifold.nuisance_weights) > 1:
+        coordinate = any(prior is not None and prior.n_moments for prior in priors)
+        if is_angle_manifold(manifold):
+            coordinate |= len(manifold.nuisance_weights) > 1
+        if coordinate:
             return self.converted(CoordinateSolver).solve_batch(snapshots, manifold, priors)
         search = support_search(self, manifold, snapshots[0].shape[2], priors[0] is not None)
         steps = [
             StepInput(Y, prior, search.n_components)
             for Y, prior in zip(snapshots, priors, strict=True)
         ]
-        posteriors = [inactive_posterior(step) for step in steps]
+        chart = search.response.chart
+        posteriors = [inactive_posterior(step, chart) for step in steps]
         powered = [i for i, step in enumerate(steps) if not step.no_power]
         if powered and search.max_active > 0:
             solved = self._solve([steps[i] for i in powered], search)
@@ -164,7 +175,7 @@ class NewtonSolver(SolverSettings):
         order.
         """
         state = initial_state(
-            steps, search.response, self, len(search.grid.theta), search.n_components
+            steps, search.response, self, search.grid.n_points, search.n_components
         )
         state.steps_remaining[:] = np.where(state.estimate_rho, 0, self.limits.inner)
         state.tolerance[:] = self.limits.inner_tolerance
@@ -202,9 +213,9 @@ def solved_posteriors(
     if not any_set(state.done):
         return {}
     result = marginals(search.response, state.evaluation, search.kl_weight)
-    manifold, numbers = search.grid.manifold, state.problem.tolist()
+    chart, numbers = search.response.chart, state.problem.tolist()
     return {
-        numbers[i]: solved_posterior(state, i, steps[numbers[i]], manifold, result)
+        numbers[i]: solved_posterior(state, i, steps[numbers[i]], chart, result)
         for i in map(int, np.flatnonzero(state.done))
     }
 
@@ -248,7 +259,7 @@ def support_search(
     )
     return SupportSearch(
         response,
-        CandidateGrid(response, GRID_POINTS_PER_SENSOR, solver.merge_distance(with_prior)),
+        candidate_grid(response, solver.merge_distance(with_prior), solver.merge_correlation),
         limits=solver.limits,
         tolerance=solver.tolerance,
         max_iterations=solver.max_iterations,
@@ -256,5 +267,5 @@ def support_search(
         n_components=n,
         max_active=min(n, M - 1),
         fill_target=min(int(np.ceil(round(FILL_SHARE * response.extent, 6))), n, M - 1),
-        reestimate=n_all > 1 or manifold.coefficients is not None,
+        reestimate=n_all > 1 or not response.chart.is_plain,
     )

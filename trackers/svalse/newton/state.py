@@ -7,19 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from arrivals.measurement_models.manifolds.manifold import AngleManifold
-from arrivals.motion_models.bessel import bessel_ratio, log_i0
+from arrivals.measurement_models.manifolds.manifold import Manifold, is_angle_manifold
 from arrivals.trackers.svalse.components import (
     ComponentPosterior,
     ComponentPrior,
     SolverSettings,
 )
-from arrivals.trackers.svalse.newton.batch import BatchRecord
-from arrivals.trackers.svalse.newton.candidates import LOG_2PI, RemovedComponents
-from arrivals.trackers.svalse.newton.elbo import Components, Evaluation, evaluate
-from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
+from arrivals.trackers.svalse.newton.batch import BatchRecord, Components
+from arrivals.trackers.svalse.newton.candidates import RemovedComponents
+from arrivals.trackers.svalse.newton.elbo import Evaluation, evaluate
+from arrivals.trackers.svalse.newton.expected_response import Chart, ExpectedResponse
 from arrivals.trackers.svalse.newton.marginals import ComponentMarginals
-from arrivals.trackers.svalse.newton.step import MAX_ANGLE_VARIANCE
 from arrivals.trackers.svalse.noise_initialization import (
     NOISE_FLOOR,
     initial_noise,
@@ -32,6 +30,7 @@ MAX_AGE = 3  # steps that a component is tracked without being active
 SNR_WEIGHT = 0.3  # of the newest signal-to-noise ratio in the start of the next step
 DB = 10 / np.log(10)
 MIN_SNR_DB, MAX_SNR_DB = 0.7 * DB, 12 * DB  # at which the noise of the next step may start
+NEW_IN_FILL, MIN_FILL = 4, 8  # components that the fill stage may add to the active ones
 NO_PRIOR = ComponentPrior(np.zeros(0), np.zeros(0), np.zeros(0), 0.5)
 
 
@@ -69,7 +68,7 @@ class StepInput:
         age = self.prior.age
         self.age = np.zeros(n, dtype=np.int64) if age is None else age[:n]
 
-    def snr_db(self, manifold: AngleManifold, settings: SolverSettings) -> float:
+    def snr_db(self, manifold: Manifold, settings: SolverSettings) -> float:
         """Return the signal-to-noise ratio at which the noise starts.
 
         That of the steps before, else that of the settings; if that is None, by the covariance of
@@ -82,7 +81,7 @@ class StepInput:
         M, N = self.Y.shape[1:]
         if M * settings.tempering <= N:  # snapshots enough for a covariance
             return -10 * float(np.log10(noise_from_eigenvalues(self.Y)).mean())
-        if manifold.coefficients is not None or N > 1:
+        if N > 1 or not is_angle_manifold(manifold) or manifold.coefficients is not None:
             return 20.0
         return -10 * float(np.log10(initial_noise(self.Y[0, :, 0], manifold.harmonics, None)))
 
@@ -106,6 +105,8 @@ class SolverState(BatchRecord):
         True if ρ is estimated, since no component is tracked.
     filling, finished, done, on_trial, estimate_nu : ndarray of bool, shape (B,)
         In the fill stage; final steps taken; solved; components on trial; variances updated.
+    fill_target : ndarray of int, shape (B,)
+        Components at which the fill stage ends.
     steps_remaining : ndarray of int, shape (B,)
         Newton steps until the next change of the support.
     tolerance : ndarray, shape (B,)
@@ -130,6 +131,7 @@ class SolverState(BatchRecord):
     done: Bool
     on_trial: Bool
     estimate_nu: Bool
+    fill_target: Int
     steps_remaining: Int
     tolerance: Float
     record: Float
@@ -147,12 +149,12 @@ def initial_state(
     steps: Sequence[StepInput],
     response: ExpectedResponse,
     settings: SolverSettings,
-    n_angles: int,
+    n_points: int,
     n_components: int,
 ) -> SolverState:
     """Return the state in which all tracked components are active, with the initial noise."""
     B, half = len(steps), max(n_components // 2, 1)
-    components = tracked_components(steps, response.extent)
+    components = tracked_components(steps, response.chart)
     K = np.array([step.n_tracked for step in steps])
     estimate_rho = K == 0
     snr = np.array([step.snr_db(response.manifold, settings) for step in steps])
@@ -175,33 +177,34 @@ def initial_state(
     removed = RemovedComponents(
         memory=components,
         can_reactivate=np.zeros((B, components.packed.shape[2]), dtype=np.bool_),
-        excluded=np.zeros((B, n_angles), dtype=np.bool_),
+        excluded=np.zeros((B, n_points), dtype=np.bool_),
     )
     return SolverState(
         problem=np.arange(B), evaluation=evaluation, saved=evaluation, removed=removed, n_known=K,
         log_odds_new=log_odds(rho), estimate_rho=estimate_rho, filling=~off, finished=off.copy(),
-        done=off.copy(), on_trial=off.copy(), estimate_nu=off.copy(), steps_remaining=zero.copy(),
+        done=off.copy(), on_trial=off.copy(), estimate_nu=off.copy(),
+        fill_target=np.maximum(n_active + NEW_IN_FILL, MIN_FILL), steps_remaining=zero.copy(),
         tolerance=np.zeros(B), record=np.full(B, -np.inf), before=nan.copy(), rejected=nan.copy(),
         snr_db=snr, iterations=zero.copy(), n_changes=zero.copy(),
     )  # fmt: skip
 
 
-def tracked_components(steps: Sequence[StepInput], extent: float) -> Components:
+def tracked_components(steps: Sequence[StepInput], chart: Chart) -> Components:
     """Return the tracked components as they start."""
     L = max(1, *(step.n_tracked for step in steps))
-    components = Components.zeros(len(steps), L).with_slots(np.arange(L))
+    components = Components.zeros(len(steps), L, chart.layout).with_slots(np.arange(L))
     rho = np.full((len(steps), L), 0.5)
     for i, step in enumerate(steps):
         n = step.n_tracked
-        components.mu[i, :n] = step.prior.mu[:n]
-        components.prior_kappa[i, :n] = step.prior.kappa[:n]
+        components.point[i, :, :n] = step.prior.mu[:n].T
+        components.prior_precision[i, :, :n] = step.prior.kappa[:n].T
+        components.kl_constant[i, :n] = chart.prior_constant(
+            components.prior_precision[i : i + 1, :, :n]
+        )[0]
         rho[i, :n] = step.prior.existence[:n]
-    kappa = components.prior_kappa
-    widest = min(3.6 / extent**2, MAX_ANGLE_VARIANCE)
-    components.variance[...] = 1 / np.maximum(kappa, 1 / widest)
-    components.prior_mu[...] = components.mu
+    components.prior_mean[...] = components.point
+    components.covariance[...] = chart.start_covariance(components.prior_precision)
     components.log_odds[...] = log_odds(rho)
-    components.kl_constant[...] = LOG_2PI + log_i0(kappa)
     return components
 
 
@@ -218,16 +221,16 @@ def log_odds(rho: Float) -> Float:
 
 
 def solved_posterior(
-    state: SolverState, i: int, step: StepInput, manifold: AngleManifold, result: ComponentMarginals
+    state: SolverState, i: int, step: StepInput, chart: Chart, result: ComponentMarginals
 ) -> ComponentPosterior:
     """Return the posterior of the i-th row, whose active components have these marginals."""
     evaluation, K, n = state.evaluation, int(state.evaluation.K[i]), int(state.n_known[i])
     slot = evaluation.components.slot[i, :K]
-    memory = Components(state.removed.memory.packed[i : i + 1, :, :n].copy())
+    memory = state.removed.memory.like(state.removed.memory.packed[i : i + 1, :, :n].copy())
     memory.packed[0][:, slot] = evaluation.components.packed[i, :, :K]
-    mu, variance = memory.mu[0], memory.variance[0]
-    marginal, stated = variance.copy(), variance.copy()
-    marginal[slot], stated[slot] = result.variance[i, :K], result.stated_variance[i, :K]
+    marginal, stated = memory.covariance[0].copy(), memory.covariance[0].copy()
+    marginal[:, slot] = result.covariance[i, :, :K]
+    stated[:, slot] = result.stated_covariance[i, :, :K]
     amplitude, evidence = np.zeros(n, dtype=np.complex128), np.full(n, -np.inf)
     amplitude[slot] = mean_amplitudes(evaluation.W[i, :, :K], step.power)
     evidence[slot] = result.log_odds[i, :K]
@@ -239,10 +242,7 @@ def solved_posterior(
     noise, power = evaluation.nu[i] * step.power, evaluation.tau[i] * step.power
     snr_db = (1 - SNR_WEIGHT) * state.snr_db[i] + SNR_WEIGHT * newest
     return ComponentPosterior(
-        theta=front_angles(manifold, mu),
-        resultant=np.exp(-stated / 2),
-        kappa=1 / variance,
-        marginal_kappa=1 / marginal,
+        **chart.densities(memory, marginal, stated),
         active=age == 0,
         age=age,
         amplitude=amplitude,
@@ -269,20 +269,12 @@ def mean_amplitudes(W: Complex, power: Float) -> Complex:
     return np.asarray(np.sqrt((W.real**2 + W.imag**2).mean(axis=(0, 2))) + 0j)
 
 
-def front_angles(manifold: AngleManifold, mu: Float) -> Float:
-    """Return the angles within ±π, of two with one direction the front one."""
-    theta = np.angle(np.exp(1j * mu))
-    return manifold.from_doa(manifold.to_doa(theta)) if manifold.front_back_ambiguous else theta
-
-
-def inactive_posterior(step: StepInput) -> ComponentPosterior:
+def inactive_posterior(step: StepInput, chart: Chart) -> ComponentPosterior:
     """Return the posterior of a step without a source: tracked components age, all is noise."""
     prior, n = step.prior, step.n_tracked
     age = step.age + 1
     return ComponentPosterior(
-        theta=prior.mu[:n],
-        resultant=bessel_ratio(prior.kappa[:n]),
-        kappa=prior.kappa[:n],
+        **chart.prior_densities(prior.mu[:n], prior.kappa[:n]),
         active=np.zeros(n, dtype=np.bool_),
         age=np.where(age > MAX_AGE, -1, age),
         amplitude=np.zeros(n, dtype=np.complex128),

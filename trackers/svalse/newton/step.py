@@ -1,4 +1,4 @@
-"""One damped Newton step on all angles together, amplitudes eliminated.
+"""One damped Newton step on all unknowns together, amplitudes eliminated.
 
 The derivatives are those of the ELBO in `elbo`; η and B are the letters of the derivation, and
 equation numbers those of Park, Meyer and Gerstoft, JASA 153(1), 2023.
@@ -15,12 +15,12 @@ from arrivals.trackers.svalse.newton.expected_response import (
     diagonals,
     over_snapshots,
 )
+from arrivals.trackers.symmetric import between, clamped_inverse, full
 from arrivals.typing import Bool, Complex, Float
 
-MAX_ANGLE_VARIANCE = 0.3  # rad²: a wider wrapped normal density is no longer normal
 ROUNDING = 1e-7  # nats
-# Shares of the step of the angles, and of the logarithms of their variances, which in full can
-# decrease F however short the step of the angles.
+# Shares of the step of the unknowns, and of that of their covariances, which in full can
+# decrease F however short the step of the unknowns.
 BACKTRACKING = ((1 / 4, 1.0), (1 / 16, 1.0), (1 / 64, 1.0), (1 / 16, 1 / 16), (1 / 256, 1 / 256))
 MIN_FREEDOM_SHARE = 0.15  # of the data, that is left for the noise
 MIN_RELATIVE_CURVATURE = 1e-3  # smaller eigenvalues are clipped to this fraction of the largest
@@ -41,8 +41,8 @@ def newton_step(
     v, P = weights(evaluation)
     g, curvature = slopes(response, evaluation, v, P)  # (33)
     N = negative_hessian(response, evaluation, P, curvature)
-    d = ascent_direction(g, N, longest=2 / response.extent)
-    s = 1 / np.maximum(curvature, 1 / MAX_ANGLE_VARIANCE)
+    d = ascent_direction(g, N, longest=response.chart.longest_step)
+    s = clamped_inverse(curvature, 1 / response.chart.max_variance)
     best = take_step(response, evaluation, d, s)
     worse = decreased(best, evaluation)
     if any_set(worse):
@@ -63,63 +63,84 @@ def weights(evaluation: Evaluation) -> tuple[Complex, Complex]:
 def slopes(
     response: ExpectedResponse, evaluation: Evaluation, v: Complex, P: Complex
 ) -> tuple[Float, Float]:
-    """Return ∂F/∂μ and the curvature with the amplitudes held, -∂²F/∂μ², both (B, L).
+    """Return ∂F/∂x, (B, d, L), and the curvature with the amplitudes held, -∂²F/∂x∂x.
 
-    The fixed point of the variances is s = 1/curvature: ∂F/∂s = 1/2s - curvature/2.
+    The curvature is that of each component alone, (B, d(d+1)/2, L). The fixed point of the
+    covariances is S = curvature⁻¹: ∂F/∂S = S⁻¹/2 - curvature/2.
     """
+    d, n = response.n_unknowns, evaluation.h.shape[2]
     # Re (∂â)ᴴη and Re (∂²â)ᴴη, with ηₗ = 2/ν Σ w*ₗ y - 2 Σ Pₗₗ' âₗ' over all others   (33)
     alone = over_snapshots(v[:, :, None] * evaluation.h[:, :, 1:])
-    others = (P[:, :, None] * evaluation.X[:, :, 1:3]).sum(axis=4)
+    others = (P[:, :, None] * evaluation.X[:, :, 1:n]).sum(axis=4)
     both = 2 * response.total((alone - others).real)
-    prior = evaluation.prior_gradient
-    return both[:, 0] - prior.imag, prior.real - both[:, 1]
+    return both[:, :d] - evaluation.prior_gradient, evaluation.prior_curvature - both[:, d:]
 
 
 def negative_hessian(
     response: ExpectedResponse, evaluation: Evaluation, P: Complex, curvature: Float
 ) -> Float:
-    """Return -∂²F/∂μ∂μ' with the amplitudes eliminated, (B, L, L).
+    """Return -∂²F/∂x∂x' with the amplitudes eliminated, (B, dL, dL), unknowns first.
 
     One term of second order, tr(G ∂J G ∂J), is left out.
     """
-    TA, W = evaluation.X[:, :, 1], evaluation.W
-    # a matrix for each snapshot, row l: the derivative of h - (J + ν/τ I) w with respect to μₗ
-    B: Complex = np.multiply(TA.conj()[:, :, None], -W.swapaxes(2, 3)[..., None], order="C")
-    diagonals(B)[...] += (evaluation.h[:, :, 1] - TA @ W).swapaxes(2, 3)
+    d, W = response.n_unknowns, evaluation.W
+    B_, F, L, N = W.shape
+    TA = evaluation.X[:, :, 1 : 1 + d]
+    # a matrix for each snapshot, row (i, l): the derivative of h - (J + ν/τ I) w in xᵢ of l
+    rows = -W.swapaxes(2, 3)[:, :, :, None, :, None]
+    B: Complex = np.multiply(TA.conj()[:, :, None], rows, order="C")
+    own = evaluation.h[:, :, 1 : 1 + d] - TA @ W[:, :, None]
+    diagonals(B)[...] += np.moveaxis(own, 4, 2)
+    B = B.reshape(B_, F, N, d * L, L)
     gained = (B.conj() @ evaluation.G[:, :, None] @ B.swapaxes(3, 4)).real
-    gained = gained[:, :, 0] if gained.shape[2] == 1 else gained.sum(axis=2)
-    products = (P * evaluation.second_products).real
-    N = 2 * response.total(products - gained / evaluation.nu[:, :, None, None])
-    diagonals(N)[...] += curvature
-    return N
+    gained = gained[:, :, 0] if N == 1 else gained.sum(axis=2)
+    products = (P[:, :, None, None] * evaluation.second_products).real
+    products = products.swapaxes(3, 4).reshape(B_, F, d * L, d * L)
+    H = 2 * response.total(products - gained / evaluation.nu[:, :, None, None])
+    add_blocks(H, curvature)
+    return H
+
+
+def add_blocks(H: Float, blocks: Float) -> None:
+    """Add matrices of each component, (B, d(d+1)/2, L), to the block diagonal of (B, dL, dL)."""
+    L, d = blocks.shape[2], H.shape[1] // blocks.shape[2]
+    if d == 1:
+        diagonals(H)[...] += blocks[:, 0]
+        return
+    each = np.arange(L)
+    H.reshape(-1, d, L, d, L)[:, :, each, :, each] += np.moveaxis(full(blocks), 3, 0)
 
 
 def ascent_direction(g: Float, N: Float, longest: float) -> Float:
-    """Return the step N⁻¹ g with the eigenvalues of N made positive, its entries ≤ longest."""
+    """Return the step N⁻¹ g, (B, d, L), with the eigenvalues of N made positive.
+
+    No component moves by more than `longest`.
+    """
     eigenvalues, V = np.linalg.eigh(N)
     steep = np.abs(eigenvalues)
     steep = np.maximum(steep, MIN_RELATIVE_CURVATURE * steep.max(axis=1, keepdims=True) + 1e-300)
-    d = (V @ ((V.swapaxes(1, 2) @ g[:, :, None]) / steep[:, :, None]))[:, :, 0]
-    size = np.abs(d).max(axis=1, keepdims=True)
+    flat = g.reshape(len(g), -1, 1)
+    d = (V @ ((V.swapaxes(1, 2) @ flat) / steep[:, :, None])).reshape(g.shape)
+    size = np.abs(d) if g.shape[1] == 1 else np.sqrt((d**2).sum(axis=1, keepdims=True))
+    size = size.max(axis=2, keepdims=True)
     return np.asarray(d * np.minimum(1.0, longest / np.maximum(size, 1e-300)))
 
 
 def take_step(response: ExpectedResponse, old: Evaluation, d: Float, s: Float) -> Evaluation:
-    """Return the evaluation after a step d of the angles, with their variances s."""
+    """Return the evaluation after a step d of the unknowns, with their covariances s."""
     components = old.components.copy()
-    components.mu[...] += d
-    components.variance[...] = s
+    components.point[...] = response.chart.move(components.point, d)
+    components.covariance[...] = s
     return evaluate(response, old.Y, components, old.K, old.nu, old.tau, old.log_prior_inactive)
 
 
 def backtrack(response: ExpectedResponse, old: Evaluation, d: Float, s: Float) -> Evaluation:
     """Return the evaluation after the first shorter step that does not decrease F."""
     best, undecided = old, np.ones(len(old), dtype=np.bool_)
-    ratio = s / np.where(old.used, old.components.variance, s)
     for alpha, beta in BACKTRACKING:
         part = old.select(undecided)
-        variance = part.components.variance * ratio[undecided] ** beta
-        trial = take_step(response, part, alpha * d[undecided], variance)
+        covariance = between(part.components.covariance, s[undecided], beta)
+        trial = take_step(response, part, alpha * d[undecided], covariance)
         good = ~decreased(trial, part)
         rows = undecided.copy()
         rows[undecided] = good
@@ -183,8 +204,8 @@ def amplitude_traces(evaluation: Evaluation) -> Float:
 
 
 def uncertainty_losses(response: ExpectedResponse, evaluation: Evaluation, w2: Float) -> Float:
-    """Return the power lost by uncertain angles, (B, F), at most half of all the amplitudes'."""
-    most = 0.5 * response.tempering * evaluation.K[:, None] * evaluation.nu
+    """Return the power lost by uncertainty, (B, F), at most half of all the amplitudes' d."""
+    most = 0.5 * response.n_unknowns * response.tempering * evaluation.K[:, None] * evaluation.nu
     return np.asarray(np.minimum((w2 * evaluation.uncertainty_loss).sum(axis=2), most))
 
 

@@ -7,15 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from arrivals.parameters import FrozenModel
-from arrivals.trackers.svalse.newton.batch import any_set, enlarged
+from arrivals.trackers.svalse.newton.batch import Components, any_set, enlarged
+from arrivals.trackers.svalse.newton.candidate_grid import CandidateGrid
 from arrivals.trackers.svalse.newton.candidates import (
-    CandidateGrid,
     add_candidates,
-    first_duplicate,
     reestimation_gains,
     removal_gains,
 )
-from arrivals.trackers.svalse.newton.elbo import Components, evaluate
+from arrivals.trackers.svalse.newton.elbo import evaluate
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
 from arrivals.trackers.svalse.newton.state import SolverState, log_odds
 from arrivals.typing import Bool, Float, Int
@@ -77,7 +76,8 @@ class SupportSearch:
     n_components : int
         Components whose activity is estimated.
     max_active, fill_target : int
-        Largest number of active components, and that of the fill stage.
+        Largest number of active components, and that of the fill stage, which also ends at four
+        more than were active, or eight.
     reestimate : bool
         True if the gain of a removal includes that of updating the noise.
     """
@@ -125,16 +125,15 @@ class SupportSearch:
         return worse
 
     def merge(self, state: SolverState, rows: Bool) -> None:
-        """Remove every component too near to an earlier one, and exclude the angles near it."""
-        k = first_duplicate(self.grid, state.evaluation)
+        """Remove every component too near to an earlier one, and exclude the points near it."""
+        k = self.grid.first_duplicate(state.evaluation)
         while any_set(rows & (k >= 0)):
             near = rows & (k >= 0)
-            doa = self.grid.manifold.to_doa(state.evaluation.components.mu[near, k[near]])
             excluded = state.removed.excluded.copy()
-            excluded[near] |= self.grid.near(doa)
+            excluded[near] |= self.grid.exclusion(state.evaluation, near, k)
             state.removed = replace(state.removed, excluded=excluded)
             self.remove(state, near, k, can_reactivate=False)
-            k = first_duplicate(self.grid, state.evaluation)
+            k = self.grid.first_duplicate(state.evaluation)
 
     def remove_weakest(self, state: SolverState, rows: Bool) -> Bool:
         """Remove the component whose removal gains most, if it gains; return where one was."""
@@ -166,7 +165,8 @@ class SupportSearch:
     def add(self, state: SolverState, rows: Bool) -> Bool:
         """Add the best new components on trial; return where there are any."""
         now = state.evaluation
-        room = np.where(state.filling, self.fill_target, self.max_active) - now.K
+        fill_target = np.minimum(self.fill_target, state.fill_target)
+        room = np.where(state.filling, fill_target, self.max_active) - now.K
         unchanged = np.abs(now.F - state.rejected) < self.limits.inner_tolerance
         rows = rows & (room > 0) & ~unchanged
         if not any_set(rows):
@@ -270,4 +270,4 @@ def assign_slots(state: SolverState, rows: Bool) -> None:
     flags = removed.can_reactivate.copy()
     tracked = active & (slot < flags.shape[1])
     flags[np.nonzero(tracked)[0], slot[tracked]] = False
-    state.removed = replace(removed, memory=Components(packed), can_reactivate=flags)
+    state.removed = replace(removed, memory=removed.memory.like(packed), can_reactivate=flags)

@@ -1,0 +1,216 @@
+"""Motion of components between steps: of points, of a second unknown, of walks that may stop."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Protocol
+
+import numpy as np
+
+from arrivals.measurement_models.manifolds.manifold import (
+    Manifold,
+    PointManifold,
+    angle_manifold,
+    is_angle_manifold,
+    is_point_manifold,
+)
+from arrivals.motion_models.bernoulli_von_mises import MIN_KAPPA, BernoulliVonMises
+from arrivals.motion_models.move_stop import MoveStopWalk
+from arrivals.motion_models.von_mises import wrap
+from arrivals.trackers.svalse.components import ComponentPosterior
+from arrivals.trackers.symmetric import inverse
+from arrivals.typing import Bool, Float
+
+MIN_INFORMATION = 1e-3  # of the data, relative to the prior's, for an update of the modes
+DEFAULT_MOTION = BernoulliVonMises(sigma_doa=np.deg2rad(1.5), still=0.1)
+
+
+def motion_on(manifold: Manifold, motion: BernoulliVonMises, memory: str) -> BernoulliVonMises:
+    """Return the motion model for a manifold: the default one never stops with two unknowns.
+
+    Raises
+    ------
+    ValueError
+        If a walk that may stop, or a memory of whole densities, is not supported.
+    """
+    on_angle = is_angle_manifold(manifold)
+    if memory == "posterior" and not on_angle:
+        raise ValueError(f"memory must be 'von_mises' with two unknowns a source; got {memory!r}")
+    if on_angle and memory != "posterior":
+        return motion
+    if motion is DEFAULT_MOTION:
+        return motion.replace(still=0.0)
+    if motion.still:
+        where = "with two unknowns a source" if not on_angle else 'where memory is "posterior"'
+        raise ValueError(f"still must be 0 {where}; got {motion.still}")
+    return motion
+
+
+class TrackedComponents(Protocol):
+    """Components with the modes of a walk that may stand still, as `SVALSE` has them."""
+
+    mu: Float
+    kappa: Float
+    modes: Float
+    curved: Bool
+
+    @property
+    def tracked(self) -> Bool:
+        """Slots that hold a tracked component."""
+
+
+def n_moments(manifold: Manifold, motion: BernoulliVonMises) -> int:
+    """Return the number of moments that a density has after a step of the motion model."""
+    angles = angle_manifold("a memory of whole densities", manifold)
+    slowest = angles.slope(angles.from_doa(np.pi / 2))
+    return int(7 * np.sqrt(float(motion.blur(np.inf, 1.0, slowest)))) + 8
+
+
+def predicted_components(
+    manifold: Manifold,
+    motion: BernoulliVonMises,
+    trackers: Sequence[TrackedComponents],
+    dt: float,
+) -> tuple[Float, Float, Float, Float]:
+    """Return means, concentrations and modes after a step, and the slopes of the angles."""
+    mu, kappa = (np.stack([getattr(each, name) for each in trackers]) for name in ("mu", "kappa"))
+    modes = np.stack([each.modes for each in trackers], axis=1)
+    tracked = np.stack([each.tracked for each in trackers])
+    if is_point_manifold(manifold):
+        curved = np.stack([each.curved for each in trackers])
+        mu, kappa = predicted_points(manifold, motion, mu, kappa, curved, dt)
+        return mu, kappa, modes, np.ones(tracked.shape)
+    slope = angle_manifold("svalse", manifold).slope(np.where(tracked, mu, 0.0))
+    return *motion.predict_angles(mu, kappa, modes, dt, slope), slope
+
+
+def predicted_points(
+    manifold: PointManifold,
+    motion: BernoulliVonMises,
+    mu: Float,
+    kappa: Float,
+    curved: Bool,
+    dt: float,
+) -> tuple[Float, Float]:
+    """Return points and precisions after a step, P' = (P⁻¹ + Q)⁻¹ in the chart.
+
+    A plane wave stays one: its second unknown returns to its narrow prior.
+
+    Parameters
+    ----------
+    manifold : PointManifold
+    motion : BernoulliVonMises
+        Its step in direction is one along a great circle.
+    mu, kappa : ndarray, shapes (B, L, point_size), (B, L, d(d+1)/2)
+        Points, and upper triangles of precisions; NaN and 0 in unused slots.
+    curved : ndarray of bool, shape (B, L)
+        Which are curved waves.
+    dt : float
+        Length of the step.
+    """
+    unused = np.isnan(mu[..., :1])
+    x = np.where(unused, 0.0, mu).swapaxes(1, 2)
+    precision = np.where(
+        unused, np.eye(manifold.n_unknowns)[np.triu_indices(manifold.n_unknowns)], kappa
+    )
+    walk = motion.walk_range
+    Q = manifold.walk(x, float(motion.Q(dt)[0, 0]), None if walk is None else walk**2 * dt)
+    P = inverse(inverse(precision.swapaxes(1, 2)) + Q)
+    if manifold.spike_precision is not None:
+        S = inverse(P)
+        second = np.where(curved, 1 / S[:, 2], manifold.spike_precision)
+        P = np.stack([1 / S[:, 0], np.zeros_like(second), second], axis=1)
+        x = np.stack([x[:, 0], np.where(curved, x[:, 1], 0.0)], axis=1)
+    new = np.where(unused, np.nan, x.swapaxes(1, 2))
+    return new, np.where(unused, 0.0, P.swapaxes(1, 2))
+
+
+def drifted(nuisance: Float) -> Float:
+    """Return densities (..., n) of a second unknown after a step, on its grid.
+
+    It stays with probability 0.9, and else goes to a neighbour; a trace is anywhere.
+
+    Examples
+    --------
+    >>> drifted(np.array([0.0, 1.0, 0.0])).round(4)
+    array([0.05  , 0.8999, 0.05  ])
+    """
+    left, right = nuisance[..., :1], nuisance[..., -1:]
+    wide = np.concatenate([left, nuisance, right], axis=-1)
+    shifted = 0.9 * nuisance + 0.05 * (wide[..., :-2] + wide[..., 2:])
+    return np.asarray((1 - 1e-4) * shifted + 1e-4 / nuisance.shape[-1])
+
+
+def with_modes(
+    walk: MoveStopWalk,
+    priors: Sequence[TrackedComponents],
+    posteriors: Sequence[ComponentPosterior],
+) -> list[ComponentPosterior]:
+    """Return posteriors in which the modes of the walk have been updated, in one array program.
+
+    The data's part of each posterior, relative to its prior, is a measurement of the angle.
+
+    Parameters
+    ----------
+    walk : MoveStopWalk
+    priors : sequence of TrackedComponents
+        Predicted components, one record for each posterior.
+    posteriors : sequence of ComponentPosterior
+
+    Returns
+    -------
+    list of ComponentPosterior
+        With `modes`, and the angles and variances of the mixtures.
+    """
+    n = [min(int(p.tracked.sum()), len(q.theta)) for p, q in zip(priors, posteriors, strict=True)]
+    first = [np.flatnonzero(p.tracked)[:m] for p, m in zip(priors, n, strict=True)]
+    mu = np.concatenate([p.mu[on] for p, on in zip(priors, first, strict=True)])
+    prior_kappa = np.concatenate([p.kappa[on] for p, on in zip(priors, first, strict=True)])
+    prior_variance = 1 / np.maximum(prior_kappa, MIN_KAPPA)
+    modes = np.concatenate([p.modes[:, on] for p, on in zip(priors, first, strict=True)], axis=1)
+    modes = walk.renewed(modes, prior_variance)
+    theta, active = (
+        np.concatenate([getattr(q, name)[:m] for q, m in zip(posteriors, n, strict=True)])
+        for name in ("theta", "active")
+    )
+    kappa = np.concatenate([_marginal(q)[:m] for q, m in zip(posteriors, n, strict=True)])
+    # D = 1/v - 1/v_p;  R = 1/D;  δ = wrap(θ - μ) R/v: the pseudo-measurement and its variance
+    D = kappa - 1 / prior_variance
+    informed = active & (MIN_INFORMATION / prior_variance < D)
+    R = 1 / np.where(informed, D, 1.0)
+    shift, variance, updated = walk.update(modes, wrap(theta - mu) * kappa * R, R)
+    modes = np.where(informed[:, None], updated, modes)
+    theta = wrap(mu + np.where(informed, shift, 0.0))
+    variance = np.where(informed, variance, prior_variance)
+    ends = np.cumsum(n)[:-1]
+    parts = zip(
+        posteriors,
+        np.split(theta, ends),
+        np.split(variance, ends),
+        np.split(modes, ends, axis=1),
+        strict=True,
+    )
+    return [_merged(*part) for part in parts]
+
+
+def _merged(
+    posterior: ComponentPosterior, theta: Float, variance: Float, modes: Float
+) -> ComponentPosterior:
+    """Return a posterior with other densities of its first components."""
+    m = len(theta)
+    old_theta, old_kappa = posterior.theta, _marginal(posterior)
+    # stated variance: V v_stated/v
+    ratio = -2 * np.log(posterior.resultant[:m]) * old_kappa[:m]
+    return replace(
+        posterior,
+        theta=np.concatenate([theta, old_theta[m:]]),
+        kappa=np.concatenate([1 / variance, old_kappa[m:]]),
+        resultant=np.concatenate([np.exp(-0.5 * variance * ratio), posterior.resultant[m:]]),
+        modes=np.concatenate([modes, np.zeros((3, len(old_kappa) - m, 2))], axis=1),
+    )
+
+
+def _marginal(posterior: ComponentPosterior) -> Float:
+    """Return the concentrations of the marginal densities."""
+    return posterior.kappa if posterior.marginal_kappa is None else posterior.marginal_kappa
