@@ -1,4 +1,4 @@
-"""Bearings of a position from known stations."""
+"""Bearings of a position from known stations: azimuths, in space with elevations."""
 
 from __future__ import annotations
 
@@ -20,31 +20,38 @@ from arrivals.messages import shown
 from arrivals.typing import Float
 from arrivals.validation import constant, count, covariance, items, positive, real
 
+TINY = np.finfo(np.float64).tiny
+MIN_FLAT_SHARE = 1e-18  # of ρ² in r²: nearer to the pole, the slope of the azimuth falls to zero
+
 
 @dataclass(frozen=True, eq=False, init=False)
 class Bearing(MeasurementModel):
-    """Azimuths of a position in the plane from known sensors.
+    """Azimuths of a position in the plane from known sensors; in space, elevations too.
 
     Parameters
     ----------
-    sensor_positions : array_like, shape (n_sensors, 2)
-        Positions of the sensors, m.
-    noise : float or array_like, shape (n_sensors, n_sensors)
-        Variance of each bearing, or their covariance, rad².
-    position : tuple of two int, optional
-        Entries of the state that are x and y. If None, those that the motion model calls so; in
-        states without names (0, 1) of 2 or 3 entries, (0, 2) of more.
+    sensor_positions : array_like, shape (n_sensors, 2) or (n_sensors, 3)
+        Positions of the sensors, m. With three coordinates each sensor measures azimuth and
+        elevation, in this order.
+    noise : float or array_like, shape (dim_z, dim_z)
+        Variance of each angle, or their covariance, rad².
+    position : tuple of two or three int, optional
+        Entries of the state that are x, y and z. If None, those that the motion model calls so; in
+        states without names the first ones of fewer than two entries a coordinate, else every
+        second one.
 
     Raises
     ------
     ValueError
-        If a shape is wrong, the noise is not a covariance or `position` does not name two entries.
+        If a shape is wrong, the noise is not a covariance or `position` does not name as many
+        entries as the sensors have coordinates.
 
     Notes
     -----
-    Shapes: states (..., n), measurements (..., n_sensors). Units: rad, anticlockwise from the x
-    axis, in [-π, π]; residuals are wrapped. At a sensor's own position
-    the slope is zero.
+    Shapes: states (..., n), measurements (..., n_sensors), in space (..., 2 n_sensors). Units: rad,
+    azimuths anticlockwise from the x axis, in [-π, π], elevations from the plane of x and y;
+    residuals are wrapped. At a sensor's own position the slopes are zero, and that of the azimuth
+    is so straight above and below it, and limited nearby.
 
     References
     ----------
@@ -58,41 +65,53 @@ class Bearing(MeasurementModel):
     array([45., 90.])
     >>> bearings.residual([3.1, 0.0], [-3.1, 0.0]).round(4)
     array([-0.0832,  0.    ])
+    >>> sounder = Bearing([[0.0, 0.0, 0.0]], noise=0.01)
+    >>> np.rad2deg(sounder.h([3.0, 3.0, -18**0.5])).round(6)
+    array([ 45., -45.])
     """
 
     sensor_positions: Float
     noise: float | Float
-    position: tuple[int, int] | None
+    position: tuple[int, ...] | None
     _R: ClassVar[Float]  # of the object, yet no parameter
 
     def __init__(
         self,
         sensor_positions: ArrayLike,
         noise: float | ArrayLike,
-        position: tuple[int, int] | None = None,
+        position: tuple[int, ...] | None = None,
     ) -> None:
         positions = constant("sensor_positions", sensor_positions)
-        if positions.shape[1] != 2:
-            raise ValueError(f"sensor_positions must have shape (n, 2); got {positions.shape}")
-        noise = _bearing_noise(noise, len(positions))
+        n, n_dims = positions.shape
+        if n_dims not in (2, 3):
+            raise ValueError(
+                f"sensor_positions must have shape (n, 2) or (n, 3); got {positions.shape}"
+            )
+        dim_z = n * (n_dims - 1)
+        noise = _bearing_noise(noise, dim_z)
         object.__setattr__(self, "sensor_positions", positions)
         object.__setattr__(self, "noise", noise)
-        object.__setattr__(self, "position", _two_entries(position))
-        R = noise if isinstance(noise, np.ndarray) else noise * np.eye(len(positions))
+        object.__setattr__(self, "position", _entries(position, n_dims))
+        R = noise if isinstance(noise, np.ndarray) else noise * np.eye(dim_z)
         object.__setattr__(self, "_R", R)
 
     @property
+    def n_dims(self) -> int:
+        """Number of coordinates: 2, azimuths; 3, azimuths and elevations."""
+        return int(self.sensor_positions.shape[1])
+
+    @property
     def dim_z(self) -> int:
-        """One bearing a sensor."""
-        return len(self.sensor_positions)
+        """One angle a sensor, two in space."""
+        return len(self._R)
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """The names x and y, unless `position` is set."""
-        return ("x", "y") if self.position is None else ()
+        """The names x and y, in space z, unless `position` is set."""
+        return ("x", "y", "z")[: self.n_dims] if self.position is None else ()
 
     def for_state(self, names: Sequence[str]) -> Bearing:
-        """Return this model with `position` where the names have x and y.
+        """Return this model with `position` where the names have x, y and z.
 
         Parameters
         ----------
@@ -106,13 +125,12 @@ class Bearing(MeasurementModel):
         Raises
         ------
         TypeError
-            If the state has no x or no y.
+            If the state lacks a coordinate.
         """
         names = checked_names(names)
         if not names or self.position is not None:
             return self
-        x, y = locate(self, names)
-        return self.replace(position=(x, y))
+        return self.replace(position=locate(self, names))
 
     @property
     def R(self) -> Float:
@@ -120,41 +138,56 @@ class Bearing(MeasurementModel):
         return self._R.copy()
 
     def h(self, x: ArrayLike) -> Float:
-        """Return atan2(y - sy, x - sx) of states: (..., n) -> (..., n_sensors)."""
-        east, north = self._from_sensors(*self._state(x))
-        return np.arctan2(north, east)
+        """Return the angles of states, (..., n) -> (..., dim_z): atan2(Δy, Δx), atan2(Δz, ρ)."""
+        delta = self._from_sensors(*self._state(x))
+        azimuth = np.arctan2(delta[..., 1], delta[..., 0])
+        if self.n_dims == 2:
+            return azimuth
+        elevation = np.arctan2(delta[..., 2], np.hypot(delta[..., 0], delta[..., 1]))
+        return np.stack([azimuth, elevation], axis=-1).reshape(*azimuth.shape[:-1], self.dim_z)
 
     def H(self, x: ArrayLike) -> Float:
-        """Return the Jacobian of `h` at one state, (n_sensors, n): (-Δy, Δx)/r²."""
-        x, (i, j) = self._state(x)
+        """Return the Jacobian of `h` at one state, (dim_z, n).
+
+        Azimuth: (-Δy, Δx)/ρ²; elevation: (-Δx Δz/ρ, -Δy Δz/ρ, ρ)/r².
+        """
+        x, position = self._state(x)
         if x.ndim != 1:
             raise ValueError(f"x must have shape (n,); got {x.shape}")
-        east, north = self._from_sensors(x, (i, j))
-        square = np.maximum(east * east + north * north, np.finfo(np.float64).tiny)
-        H = np.zeros((self.dim_z, x.size))
-        H[:, i], H[:, j] = -north / square, east / square
-        return H
+        delta = self._from_sensors(x, position)
+        east, north = delta[:, 0], delta[:, 1]
+        square = np.maximum(east * east + north * north, TINY)
+        slope = np.zeros((len(delta), self.n_dims - 1, x.size))
+        if self.n_dims == 3:
+            up, flat = delta[:, 2], np.hypot(east, north)
+            range_squared = np.maximum(square + up * up, TINY)
+            square = np.maximum(square, MIN_FLAT_SHARE * range_squared)
+            slope[:, 1, position[0]] = -east / np.sqrt(square) * up / range_squared
+            slope[:, 1, position[1]] = -north / np.sqrt(square) * up / range_squared
+            slope[:, 1, position[2]] = flat / range_squared
+        slope[:, 0, position[0]], slope[:, 0, position[1]] = -north / square, east / square
+        return slope.reshape(self.dim_z, x.size)
 
     def residual(self, z: ArrayLike, z_pred: ArrayLike) -> Float:
         """Return z - z_pred, wrapped into [-π, π)."""
         z, z_pred = paired(z, z_pred)
         return np.asarray((z - z_pred + np.pi) % (2 * np.pi) - np.pi)
 
-    def _state(self, x: ArrayLike) -> tuple[Float, tuple[int, int]]:
-        """Return states (..., n), and the entries that are x and y."""
+    def _state(self, x: ArrayLike) -> tuple[Float, tuple[int, ...]]:
+        """Return states (..., n), and the entries that are coordinates."""
         x = real("x", x)
-        i, j = self.position or default_position(x.shape[-1] if x.ndim else 0)
-        last = max(i, j)
-        if x.ndim == 0 or x.shape[-1] <= last:
+        size = x.shape[-1] if x.ndim else 0
+        position = self.position or _default_entries(size, self.n_dims)
+        last = max(position)
+        if x.ndim == 0 or size <= last:
             column = x.ndim == 2 and x.shape[1] == 1 and len(x) > last
             got = f"the column {x.shape}: pass x.ravel()" if column else f"{x.shape}"
             raise ValueError(f"states must have shape (..., n), n > {last}; got {got}")
-        return x, (i, j)
+        return x, position
 
-    def _from_sensors(self, x: Float, position: tuple[int, int]) -> tuple[Float, Float]:
-        i, j = position
-        positions = self.sensor_positions
-        return x[..., i, None] - positions[:, 0], x[..., j, None] - positions[:, 1]
+    def _from_sensors(self, x: Float, position: tuple[int, ...]) -> Float:
+        """Return the vectors from the sensors, (..., n_sensors, n_dims)."""
+        return np.asarray(x[..., None, position] - self.sensor_positions)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Bearing):
@@ -165,17 +198,24 @@ class Bearing(MeasurementModel):
         return hash(self._content())
 
     def _content(self) -> tuple[object, ...]:
-        noise = np.asarray(self.noise)
-        return self.sensor_positions.tobytes(), noise.shape, noise.tobytes(), self.position
+        noise, places = np.asarray(self.noise), self.sensor_positions
+        return places.shape, places.tobytes(), noise.shape, noise.tobytes(), self.position
 
 
-def _two_entries(position: tuple[int, int] | None) -> tuple[int, int] | None:
+def _default_entries(n: int, n_dims: int) -> tuple[int, ...]:
+    if n_dims == 2:
+        return default_position(n)
+    return (0, 1, 2) if n < 6 else (0, 2, 4)
+
+
+def _entries(position: tuple[int, ...] | None, n_dims: int) -> tuple[int, ...] | None:
     if position is None:
         return None
     entries = tuple(count("position", entry, minimum=0) for entry in items("position", position))
-    if len(set(entries)) != 2 or len(entries) != 2:
-        raise ValueError(f"position must name two entries of the state; got {shown(position)}")
-    return entries[0], entries[1]
+    if not len(set(entries)) == len(entries) == n_dims:
+        number = "two" if n_dims == 2 else "three"
+        raise ValueError(f"position must name {number} entries of the state; got {shown(position)}")
+    return entries
 
 
 def _bearing_noise(noise: ArrayLike, n: int) -> float | Float:

@@ -12,6 +12,7 @@ from arrivals.motion_models.function import FunctionMotion
 from arrivals.motion_models.linear import ConstantVelocity, LinearMotion, RandomWalk
 from arrivals.motion_models.move_stop import MoveStopWalk
 from arrivals.motion_models.von_mises import VonMisesWalk, wrap
+from arrivals.motion_models.von_mises_fisher import VonMisesFisherWalk
 
 __all__ = [
     "MotionModel",
@@ -22,6 +23,7 @@ __all__ = [
     "CoordinatedTurn",
     # directions
     "VonMisesWalk",
+    "VonMisesFisherWalk",
     "BernoulliVonMises",
     "MoveStopWalk",
     "DirectionAmplitudeWalk",

@@ -39,6 +39,7 @@ from arrivals.motion_models import (
     LinearMotion,
     MotionModel,
     RandomWalk,
+    VonMisesFisherWalk,
     VonMisesWalk,
 )
 from arrivals.trackers import EKF, IMM, UKF, Particle, Tracker
@@ -49,6 +50,7 @@ TONE = Tones(0.1)
 LINE = DelayLine(4, 0.05, TONE, kappa=2.0)
 PHASOR = Phasor(4, 0.05, frequency=0.1)
 BEARING, RSS = Bearing(PLACES, noise=0.01), LogNormalRSS(PLACES, sigma=0.3, log_noise=0.0)
+SPATIAL = Bearing(np.c_[PLACES, [0.0, 2.0, 1.0]], noise=0.01)
 SNAPSHOT = ArraySnapshot(SensorArray.ula(5, spacing=0.5), wavelength=1.0, noise=0.1)
 SAMPLES = np.random.default_rng(0).standard_normal((3, 2))
 
@@ -64,6 +66,7 @@ def waveform(model: DelayLine | Phasor) -> LinearMotion:
 MOTIONS: dict[str, MotionModel] = {
     "RandomWalk": RandomWalk(0.01),
     "ConstantVelocity": ConstantVelocity(0.01),
+    "ConstantVelocity in space": ConstantVelocity(0.01, n_dims=3),
     "CoordinatedTurn": CoordinatedTurn(0.01, 0.001),
     "LinearMotion": LinearMotion(0.9 * np.eye(2), 0.1 * np.eye(2), names=["x", "y"]),
     "CombinedMotion": CombinedMotion(
@@ -76,6 +79,7 @@ MOTIONS: dict[str, MotionModel] = {
         swing, Q=0.01 * np.eye(2), names=["angle", "rate"], angles=[0]
     ),
     "VonMisesWalk": VonMisesWalk(50.0),
+    "VonMisesFisherWalk": VonMisesFisherWalk(50.0),
     "BernoulliVonMises": BernoulliVonMises(),
     "AutoregressiveSources": AutoregressiveSources([[0.9], [0.5]], 0.1),
     "DelayWalk": DelayWalk(1e-3),
@@ -85,6 +89,7 @@ MOTIONS: dict[str, MotionModel] = {
 MEASUREMENTS: dict[str, Callable[[int], MeasurementModel]] = {
     "LinearMeasurement": lambda n: LinearMeasurement(np.eye(n)[:1], [[0.1]]),
     "Bearing": lambda n: BEARING,
+    "Bearing in space": lambda n: SPATIAL,
     "LogNormalRSS": lambda n: RSS,
     "CombinedMeasurement": lambda n: CombinedMeasurement(BEARING, RSS),
     "CombinedMeasurement of snapshots": lambda n: CombinedMeasurement(SNAPSHOT, SNAPSHOT),

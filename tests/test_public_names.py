@@ -12,7 +12,8 @@ NAMES = {
     "motion_models": """
         AutoregressiveSources BernoulliVonMises CombinedMotion ConstantVelocity CoordinatedTurn
         DelayDrift DelayWalk DirectionAmplitudeWalk FunctionMotion LinearMotion LinearMotionModel
-        MotionModel MoveStopWalk RandomWalk VonMisesWalk select_order wrap yule_walker
+        MotionModel MoveStopWalk RandomWalk VonMisesFisherWalk VonMisesWalk select_order wrap
+        yule_walker
     """,
     "measurement_models": """
         AngleManifold ArrayManifold ArraySamples ArraySnapshot Autoregressive AveragedEnvelope

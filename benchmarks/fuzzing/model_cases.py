@@ -67,6 +67,7 @@ CLASSES: dict[str, tuple[Any, list[Arguments]]] = {
     "ConstantVelocity": (motions.ConstantVelocity, [{"q": 0.1, "n_dims": 2}]),
     "CoordinatedTurn": (motions.CoordinatedTurn, [{"q": 0.1, "q_turn": 0.02}]),
     "VonMisesWalk": (motions.VonMisesWalk, [{"kappa": 50.0}, {"sigma_doa": 0.1}]),
+    "VonMisesFisherWalk": (motions.VonMisesFisherWalk, [{"kappa": 50.0}, {"sigma_doa": 0.1}]),
     "BernoulliVonMises": (
         motions.BernoulliVonMises,
         [{"kappa": 50.0, "p_activate": 0.1, "p_deactivate": 0.2}, {"sigma_doa": 0.1}],
@@ -117,7 +118,9 @@ CLASSES: dict[str, tuple[Any, list[Arguments]]] = {
     "Bearing": (
         mm.Bearing,
         [{"sensor_positions": np.array(PLACES), "noise": 0.01, "position": (0, 1)},
-         {"sensor_positions": np.array(PLACES), "noise": 0.01 * np.eye(3)}],
+         {"sensor_positions": np.array(PLACES), "noise": 0.01 * np.eye(3)},
+         {"sensor_positions": [[0.0, 0.0, 0.0], [9.0, 1.0, 2.0]], "position": (0, 1, 2),
+          "noise": 0.01}],
     ),
     "FunctionMeasurement": (
         mm.FunctionMeasurement,

@@ -18,6 +18,7 @@ from arrivals.motion_models import (
     LinearMotion,
     MotionModel,
     RandomWalk,
+    VonMisesFisherWalk,
     VonMisesWalk,
 )
 from arrivals.typing import Float
@@ -33,6 +34,8 @@ MODELS = [
     BernoulliVonMises(),
     VonMisesWalk(sigma_doa=0.1),
     BernoulliVonMises(sigma_doa=0.1),
+    VonMisesFisherWalk(kappa=50.0),
+    VonMisesFisherWalk(sigma_doa=0.1),
 ]
 every_model = pytest.mark.parametrize("model", MODELS, ids=lambda m: f"{type(m).__name__}{m.dim_x}")
 
@@ -78,6 +81,9 @@ def test_samples_have_covariance_Q(model: MotionModel) -> None:
     x = np.tile(states(model), (20_000, 1))
     drawn = model.sample(x, np.random.default_rng(0)) - model.f(x)
     Q = model.Q()
+    if isinstance(model, VonMisesFisherWalk):  # in the tangent plane: unit vectors stay so
+        tangent = np.linalg.svd(model.f(x[:1]))[2][1:]
+        drawn, Q = drawn @ tangent.T, tangent @ Q @ tangent.T
     scale = np.sqrt(np.diag(Q))
     # Correlations have a standard error of at most sqrt(2/20000) = 0.01; kappa = 50 adds 0.0001.
     assert (abs(np.cov(drawn.T) - Q) < 0.06 * np.outer(scale, scale)).all()

@@ -8,6 +8,7 @@ from arrivals.motion_models import (
     CoordinatedTurn,
     LinearMotion,
     RandomWalk,
+    VonMisesFisherWalk,
     VonMisesWalk,
 )
 from arrivals.trackers import EKF, IMM, UKF, Kalman, Particle
@@ -19,6 +20,9 @@ POSITION = LinearMeasurement(np.eye(4)[::2], [[0.2, 0.05], [0.05, 0.1]])
 DECAY = LinearMotion([[0.9]], [[0.19]], control=[[1.0]])
 BEARING = Bearing([[0.0, 0.0], [10.0, 0.0], [3.0, 9.0]], noise=1e-3)
 BEARINGS_XY = Bearing([[0.0, 0.0], [10.0, 0.0]], noise=1e-3, position=(0, 1))
+SPACE = Bearing([[0.0, 0.0, 0.0], [10.0, 0.0, 2.0]], noise=1e-3)
+DIRECTION = LinearMeasurement(np.eye(3), 1e-3 * np.eye(3))
+NORTH, SOUTH = [0.0, 0.6, 0.8], [0.0, -0.1, 0.99]
 ANGLE = LinearMeasurement([[1.0]], [[0.01]])
 LINE = ArraySnapshot(SensorArray.ula(6, spacing=0.5), wavelength=1.0, noise=0.05)
 
@@ -38,6 +42,12 @@ def bearings(model: Bearing, position: tuple[float, float] = (5.0, 4.0)) -> Meas
 def snapshots() -> Measurements:
     doa = np.linspace(0.2, 0.4, 5)[:, None]
     return LINE.simulate(doa, [1.0], np.random.default_rng(4))
+
+
+def spatial_bearings() -> Measurements:
+    z = np.array([SPACE.sample([5.0, 4.0, 7.0], np.random.default_rng(seed)) for seed in range(5)])
+    z[2, 1] = np.nan
+    return z
 
 
 def imm() -> IMM:
@@ -60,6 +70,12 @@ TRACKERS: list[tuple[str, MakeTracker, Measurements]] = [
     ("ekf", lambda: EKF(VonMisesWalk(50.0), ANGLE, [3.1], [[0.1]]), np.array([[3.1], [-3.1]])),
     ("ukf", lambda: UKF(RandomWalk(0.01), BEARINGS_XY, X[::2], np.eye(2)), bearings(BEARINGS_XY)),
     ("ukf", lambda: UKF(VonMisesWalk(50.0), ANGLE, [3.1], [[0.1]]), np.array([[3.1], [-3.1]])),
+    ("ekf", lambda: EKF(RandomWalk(0.1, 3), SPACE, [5.0, 4.0, 6.0], np.eye(3)), spatial_bearings()),
+    (
+        "ukf",
+        lambda: UKF(VonMisesFisherWalk(50.0), DIRECTION, NORTH, 0.1 * np.eye(3)),
+        np.array([NORTH, SOUTH]),
+    ),
     (
         "particle",
         lambda: Particle(RandomWalk(0.1), BEARINGS_XY, X[::2], np.eye(2), n_particles=200, rng=1),
