@@ -27,12 +27,24 @@ class SphereEstimate(DirectionEstimate):
 
     Parameters
     ----------
-    doa, std : ndarray, shape (n_sources,)
-        Azimuth and its standard deviation, rad; that of a uniform azimuth at the zenith.
-    existence, amplitude, label, converged, iterations, noise
-        As in `DirectionEstimate`.
+    doa : ndarray, shape (n_sources,)
+        Azimuth, rad.
+    std : ndarray, shape (n_sources,)
+        Standard deviation of the azimuth, rad; that of a uniform azimuth at the zenith.
+    existence : ndarray, shape (n_sources,)
+        Probability of existence; NaN if the method does not estimate it.
+    amplitude : ndarray, shape (n_sources,)
+        Complex amplitude at the origin of the array's coordinates; NaN if not estimated.
+    label : ndarray of int, shape (n_sources,)
+        Identity of a tracked source; -1 for methods that do not track.
+    converged : bool
+        False if an iterative method stopped before it met its tolerance.
+    iterations : int
+        Number of iterations of this step; 0 for methods without iteration.
+    noise : float
+        Estimated noise variance of one sensor; NaN if the method does not estimate it.
     elevation : ndarray, shape (n_sources,)
-        Elevation from the horizontal plane, rad.
+        Elevation over the xy plane, rad.
     covariance : ndarray, shape (n_sources, 2, 2)
         Covariance in the tangent plane, rad²: elevation, and azimuth along its circle, which is
         cos(elevation) times the azimuth. NaN if the method does not estimate it.
@@ -62,10 +74,16 @@ class SphereEstimate(DirectionEstimate):
     )  # fmt: skip
 
     def rows(self) -> list[tuple[Any, ...]]:
-        """Return label, azimuth and elevation with deviations, degrees, existence, level in dB."""
-        height = np.rad2deg([self.elevation, np.sqrt(self.covariance[:, 0, 0])]).T.tolist()
+        """Return label, azimuth and elevation with deviations, degrees, existence, level in dB.
+
+        Returns
+        -------
+        list of tuple
+            One row per source.
+        """
+        elevation = np.rad2deg([self.elevation, np.sqrt(self.covariance[:, 0, 0])]).T.tolist()
         return [
-            (*row[:3], *each, *row[3:]) for row, each in zip(super().rows(), height, strict=True)
+            (*row[:3], *each, *row[3:]) for row, each in zip(super().rows(), elevation, strict=True)
         ]
 
     def unknowns(self) -> tuple[Float, Float]:
@@ -79,14 +97,28 @@ class RangeEstimate(DirectionEstimate):
 
     Parameters
     ----------
-    doa, std, existence, amplitude, label, converged, iterations, noise
-        As in `DirectionEstimate`.
+    doa : ndarray, shape (n_sources,)
+        Directions of arrival, rad.
+    std : ndarray, shape (n_sources,)
+        Standard deviations, rad; NaN if the method does not estimate them.
+    existence : ndarray, shape (n_sources,)
+        Probability of existence; NaN if the method does not estimate it.
+    amplitude : ndarray, shape (n_sources,)
+        Complex amplitude at the origin of the array's coordinates; NaN if not estimated.
+    label : ndarray of int, shape (n_sources,)
+        Identity of a tracked source; -1 for methods that do not track.
+    converged : bool
+        False if an iterative method stopped before it met its tolerance.
+    iterations : int
+        Number of iterations of this step; 0 for methods without iteration.
+    noise : float
+        Estimated noise variance of one sensor; NaN if the method does not estimate it.
     range : ndarray, shape (n_sources,)
         Distance from the centroid of the sensors, m; infinite of a plane wave.
     range_std : ndarray, shape (n_sources,)
-        Its standard deviation, m: R² times that of 1/R; NaN of a plane wave.
+        Standard deviation of the range, m: R² times that of 1/R; NaN of a plane wave.
     covariance : ndarray, shape (n_sources, 2, 2)
-        Covariance of direction and 1/R, rad and 1/m.
+        Covariance of direction and 1/R, rad and 1/m; NaN if the method does not estimate it.
 
     Examples
     --------
@@ -113,7 +145,13 @@ class RangeEstimate(DirectionEstimate):
     )  # fmt: skip
 
     def rows(self) -> list[tuple[Any, ...]]:
-        """Return label, direction and its deviation, degrees, range and its, m, existence, dB."""
+        """Return label, direction and range with deviations, degrees and m, existence, level in dB.
+
+        Returns
+        -------
+        list of tuple
+            One row per source; the range of a plane wave is not finite.
+        """
         ranges = zip(self.range.tolist(), self.range_std.tolist(), strict=True)
         return [
             (*row[:3], *each, *row[3:]) for row, each in zip(super().rows(), ranges, strict=True)
