@@ -17,7 +17,7 @@ from arrivals.scenarios.experiments.methods import Method, methods
 from arrivals.scenarios.experiments.results_file import Results, code_mark
 from arrivals.scenarios.experiments.study import Study
 from arrivals.scenarios.experiments.workers import report_worker_failure
-from arrivals.scenarios.metrics.registry import CPU, METRICS, Metric
+from arrivals.scenarios.metrics.registry import CPU, METRICS, RANGE_METRICS, Metric
 from arrivals.scenarios.registry import create
 from arrivals.validation import count, items, one_of
 
@@ -68,8 +68,9 @@ def monte_carlo(
     seed : int
         Seed of all runs.
     metrics : sequence of str, or mapping of str to callable, optional
-        Names in `METRICS` of `arrivals.scenarios.metrics`, or functions of (trial, run); all of
-        `METRICS` if None. Degrees where the truth is directions, metres where it is positions.
+        Names in `METRICS` or `RANGE_METRICS` of `arrivals.scenarios.metrics`, or functions of
+        (trial, run); all of `METRICS` if None. Degrees where the truth is directions, metres where
+        it is positions.
     out : path, optional
         A CSV file to which results are appended, or a folder in which each configuration has its
         own file. Finished runs in it are not computed again; new runs are added.
@@ -196,7 +197,8 @@ def _metrics(metrics: Metrics | None) -> dict[str, Metric]:
         return METRICS
     if isinstance(metrics, Mapping):
         return dict(metrics)
-    return {one_of("metrics", name, tuple(METRICS)): METRICS[name] for name in metrics}
+    known = METRICS | RANGE_METRICS
+    return {one_of("metrics", name, tuple(known)): known[name] for name in metrics}
 
 
 def _finished(results: Results, n_methods: int) -> set[tuple[str, int]]:

@@ -10,12 +10,13 @@ from arrivals.scenarios.metrics.consistency import (
 )
 from arrivals.scenarios.metrics.gospa import Gospa, gospa, mean_gospa, mean_rmse, ospa, rmse
 from arrivals.scenarios.metrics.position_errors import huber, scores
-from arrivals.scenarios.metrics.registry import METRICS
+from arrivals.scenarios.metrics.registry import METRICS, RANGE_METRICS
 from arrivals.scenarios.metrics.separation import nmse, sdr
 from arrivals.scenarios.metrics.unlabelled_rmse import best_assignment_rmse
 
 __all__ = [
     "METRICS",
+    "RANGE_METRICS",
     "Gospa",
     "Reliability",
     "best_assignment_rmse",

@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from arrivals.scenarios.metrics.distances import Distance, tangent_errors
 from arrivals.typing import Float, Int
-from arrivals.validation import LARGEST, positive, real
+from arrivals.validation import LARGEST, one_of, positive, real
 
 
 class Matches(NamedTuple):
@@ -19,7 +20,8 @@ class Matches(NamedTuple):
     step, source, slot : ndarray of int, shape (n_pairs,)
         Time step, column of the truth and column of the estimates.
     error : ndarray, shape (n_pairs,) or (n_pairs, dim)
-        Estimate minus truth, in the unit of the arguments; wrapped if there is a period.
+        Estimate minus truth, in the unit of the arguments; wrapped if there is a period. Along
+        great circles it lies in the tangent plane: elevation, azimuth along its circle.
     """
 
     step: Int
@@ -29,7 +31,11 @@ class Matches(NamedTuple):
 
 
 def matches(
-    truth: ArrayLike, estimate: ArrayLike, c: float, period: float | None = None
+    truth: ArrayLike,
+    estimate: ArrayLike,
+    c: float,
+    period: float | None = None,
+    distance: Distance = "euclidean",
 ) -> Matches:
     """Assign estimates nearer than `c` to true points, in each step, as GOSPA with p = 1.
 
@@ -41,6 +47,8 @@ def matches(
         Cut-off, in the same unit.
     period : float, optional
         Period of the angles; differences are wrapped.
+    distance : {"euclidean", "great_circle"}
+        As in `gospa`.
 
     Returns
     -------
@@ -70,12 +78,18 @@ def matches(
         raise ValueError(
             "truth and estimate must be finite, or NaN for absent points; got infinity"
         )
-    error = f[:, None] - t[:, :, None]
-    if period is not None:
+    on_sphere = one_of("distance", distance, ("euclidean", "great_circle")) == "great_circle"
+    if on_sphere and t.ndim == 2:
+        raise ValueError(f"truth must have azimuth and elevation, (..., 2); got {t.shape}")
+    if on_sphere:
+        error = tangent_errors(t[:, :, None], f[:, None], period)
+    else:
+        error = f[:, None] - t[:, :, None]
+    if not on_sphere and period is not None:
         half = positive("period", period) / 2
         error = (error + half) % period - half
-    distance = np.abs(error) if error.ndim == 3 else np.linalg.norm(error, axis=-1)
-    cost = np.where(np.isnan(distance), np.inf, distance)
+    apart = np.abs(error) if error.ndim == 3 else np.linalg.norm(error, axis=-1)
+    cost = np.where(np.isnan(apart), np.inf, apart)
     bounded = np.minimum(cost, positive("c", c))
     rows = []
     for step in range(len(t)):

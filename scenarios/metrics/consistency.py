@@ -84,14 +84,14 @@ def coverage(error: ArrayLike, std: ArrayLike, level: float = 0.95) -> float:
 
 
 def position_nees(error: ArrayLike, covariance: ArrayLike) -> float:
-    """Average eᵀ P⁻¹ e over positions and their dimensions: 1 if the covariances are right.
+    """Average eᵀ P⁻¹ e over errors and their dimensions: 1 if the covariances are right.
 
     Parameters
     ----------
     error : array_like, shape (n, dim)
-        m.
+        m, or rad in the tangent plane of directions on the sphere.
     covariance : array_like, shape (n, dim, dim)
-        As stated, m².
+        As stated, m² or rad².
 
     Returns
     -------

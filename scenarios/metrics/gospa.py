@@ -8,8 +8,9 @@ from dataclasses import astuple, dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from arrivals.scenarios.metrics.distances import Distance, assigned, distances
 from arrivals.typing import Float
-from arrivals.validation import LARGEST, items, number, positive, real
+from arrivals.validation import items, number, positive
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,7 @@ def gospa(
     p: float = 1.0,
     alpha: float = 2.0,
     period: float | None = None,
+    distance: Distance = "euclidean",
 ) -> Gospa:
     """Compute the generalised optimal sub-pattern assignment metric: errors, missed and false.
 
@@ -59,6 +61,9 @@ def gospa(
         unpaired points; below, a pair beyond the cut-off costs c^p, half missed and half false.
     period : float, optional
         Period of the angles, such as 2π for rad; differences are wrapped.
+    distance : {"euclidean", "great_circle"}
+        Great circles are between points (n, 2) of azimuth and elevation; `period` is required then,
+        as the full turn: 360, or 2π for rad.
 
     Returns
     -------
@@ -85,21 +90,32 @@ def gospa(
     (15.0, 10.0)
     >>> gospa([-179], [178], c=10, period=360).distance
     3.0
+
+    Azimuths 90 degrees apart are 7 degrees apart near the zenith.
+
+    >>> sphere = {"period": 360, "distance": "great_circle"}
+    >>> round(gospa([[0, 85]], [[90, 85]], c=10, **sphere).distance, 2)
+    7.07
     """
     p = _exponent(p, c := positive("c", c))
     if not positive("alpha", alpha) <= 2:
         raise ValueError(f"alpha must lie in (0, 2]; got {alpha}")
-    d = _distances(truth, estimate, period)
-    pairs = _assigned(d, c, p)
+    d = distances(truth, estimate, period, distance)
+    pairs = assigned(d, c, p)
     n_cut, surplus = np.sum(pairs >= c), d.shape[0] - d.shape[1]
-    distance = float(np.sum(pairs[pairs < c] ** p))
+    detected = float(np.sum(pairs[pairs < c] ** p))
     missed = float(c**p * (n_cut / 2 + max(surplus, 0) / alpha))
     false = float(c**p * (n_cut / 2 + max(-surplus, 0) / alpha))
-    return Gospa((distance + missed + false) ** (1 / p), distance, missed, false)
+    return Gospa((detected + missed + false) ** (1 / p), detected, missed, false)
 
 
 def ospa(
-    truth: ArrayLike, estimate: ArrayLike, c: float, p: float = 1.0, period: float | None = None
+    truth: ArrayLike,
+    estimate: ArrayLike,
+    c: float,
+    p: float = 1.0,
+    period: float | None = None,
+    distance: Distance = "euclidean",
 ) -> float:
     """Compute the OSPA metric: the error per point; an unpaired point counts as `c`.
 
@@ -113,6 +129,8 @@ def ospa(
         Exponent, at least 1.
     period : float, optional
         Period of the angles; differences are wrapped.
+    distance : {"euclidean", "great_circle"}
+        As in `gospa`.
 
     Returns
     -------
@@ -134,13 +152,19 @@ def ospa(
     >>> ospa([10, 20], [12], c=10)
     6.0
     """
-    d, p = _distances(truth, estimate, period), _exponent(p, c := positive("c", c))
+    d, p = distances(truth, estimate, period, distance), _exponent(p, c := positive("c", c))
     size, surplus = max(d.shape), abs(d.shape[0] - d.shape[1])
-    powers = np.sum(np.minimum(_assigned(d, c, p), c) ** p) + c**p * surplus
+    powers = np.sum(np.minimum(assigned(d, c, p), c) ** p) + c**p * surplus
     return float((powers / size) ** (1 / p)) if size else 0.0  # (3)
 
 
-def rmse(truth: ArrayLike, estimate: ArrayLike, c: float, period: float | None = None) -> float:
+def rmse(
+    truth: ArrayLike,
+    estimate: ArrayLike,
+    c: float,
+    period: float | None = None,
+    distance: Distance = "euclidean",
+) -> float:
     """Compute the RMSE per true point: a missed point counts as `c`, false points as zero.
 
     Parameters
@@ -151,6 +175,8 @@ def rmse(truth: ArrayLike, estimate: ArrayLike, c: float, period: float | None =
         Cut-off, same unit.
     period : float, optional
         Period of the angles; differences are wrapped.
+    distance : {"euclidean", "great_circle"}
+        As in `gospa`.
 
     Returns
     -------
@@ -169,10 +195,10 @@ def rmse(truth: ArrayLike, estimate: ArrayLike, c: float, period: float | None =
     >>> rmse([10, 20, 40], [], c=10), rmse([], [1, 2], c=10)
     (10.0, 0.0)
     """
-    c, d = positive("c", c), _distances(truth, estimate, period)
+    c, d = positive("c", c), distances(truth, estimate, period, distance)
     if not len(d):
         return 0.0
-    pairs = np.minimum(_assigned(d, c, 2.0), c)
+    pairs = np.minimum(assigned(d, c, 2.0), c)
     return float(np.sqrt((np.sum(pairs**2) + c**2 * (len(d) - len(pairs))) / len(d)))  # (74)
 
 
@@ -183,6 +209,7 @@ def mean_gospa(
     p: float = 1.0,
     alpha: float = 2.0,
     period: float | None = None,
+    distance: Distance = "euclidean",
 ) -> Gospa:
     """Average GOSPA and its parts over time steps.
 
@@ -193,6 +220,8 @@ def mean_gospa(
     c, p, alpha : float
         As in `gospa`.
     period : float, optional
+        As in `gospa`.
+    distance : {"euclidean", "great_circle"}
         As in `gospa`.
 
     Returns
@@ -210,7 +239,7 @@ def mean_gospa(
     >>> mean_gospa([[0, 50], [1, np.nan]], [[2, np.nan], [1, np.nan]], c=10)
     Gospa(total=3.5, distance=1.0, missed=2.5, false=0.0)
     """
-    steps = [gospa(t, f, c, p, alpha, period) for t, f in _steps(truth, estimate)]
+    steps = [gospa(t, f, c, p, alpha, period, distance) for t, f in _steps(truth, estimate)]
     return Gospa(*np.mean([astuple(step) for step in steps], axis=0).tolist())
 
 
@@ -219,6 +248,7 @@ def mean_rmse(
     estimate: Sequence[ArrayLike] | Float,
     c: float,
     period: float | None = None,
+    distance: Distance = "euclidean",
 ) -> float:
     """Average the root mean square errors of time steps.
 
@@ -230,6 +260,8 @@ def mean_rmse(
         As in `rmse`.
     period : float, optional
         As in `rmse`.
+    distance : {"euclidean", "great_circle"}
+        As in `gospa`.
 
     Returns
     -------
@@ -246,7 +278,7 @@ def mean_rmse(
     >>> mean_rmse([[0], [1]], [[2], [np.nan]], c=10)
     6.0
     """
-    return float(np.mean([rmse(t, f, c, period) for t, f in _steps(truth, estimate)]))
+    return float(np.mean([rmse(t, f, c, period, distance) for t, f in _steps(truth, estimate)]))
 
 
 def _exponent(p: float, c: float) -> float:
@@ -265,36 +297,3 @@ def _steps(
         got = f"{len(truth)} and {len(estimate)}"
         raise ValueError(f"truth and estimate must have the same number of steps, >= 1; got {got}")
     return list(zip(truth, estimate, strict=True))
-
-
-def _points(name: str, value: ArrayLike) -> Float:
-    """Return the rows without NaN of points (n, dim), of angles (n,) as (n, 1)."""
-    points = real(name, value)
-    if points.ndim not in (1, 2):
-        raise ValueError(f"{name} must have shape (n,) or (n, dim); got {points.shape}")
-    if np.any(np.abs(points) >= LARGEST):
-        raise ValueError(f"{name} must be finite, or NaN for absent points; got an infinite value")
-    points = points[:, None] if points.ndim == 1 else points
-    return np.asarray(points[~np.any(np.isnan(points), axis=1)])
-
-
-def _distances(truth: ArrayLike, estimate: ArrayLike, period: float | None) -> Float:
-    """Return Euclidean distances (n_true, n_estimates), wrapped if there is a period."""
-    t, f = _points("truth", truth), _points("estimate", estimate)
-    if t.shape[1] != f.shape[1]:
-        if t.size and f.size:
-            sizes = f"{t.shape[1]} and {f.shape[1]}"
-            raise ValueError(f"truth and estimate must have the same dimension; got {sizes}")
-        return np.zeros((len(t), len(f)))
-    difference = np.abs(t[:, None] - f)
-    if period is not None:
-        difference = difference % positive("period", period)
-        difference = np.minimum(difference, period - difference)
-    return np.asarray(np.linalg.norm(difference, axis=-1))
-
-
-def _assigned(d: Float, c: float, p: float) -> Float:
-    """Return distances of the pairs with the smallest sum of min(d, c)^p."""
-    from scipy.optimize import linear_sum_assignment
-
-    return np.asarray(d[linear_sum_assignment(np.minimum(d, c) ** p)])

@@ -1,6 +1,7 @@
 """Metrics of studies: functions of a trial and a run.
 
-Directions are scored in degrees, positions in metres, according to the trial's truth.
+Directions are scored in degrees, on the sphere along great circles, and positions in metres,
+according to the trial's truth.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from arrivals.scenarios.metrics.consistency import (
     position_coverage,
     position_nees,
 )
+from arrivals.scenarios.metrics.distances import Distance
 from arrivals.scenarios.metrics.gospa import Gospa, mean_gospa, mean_rmse, ospa
 from arrivals.trackers.run import Run
 from arrivals.typing import Bool, Float
@@ -34,14 +36,17 @@ class Sets(NamedTuple):
     Parameters
     ----------
     truth, estimate : ndarray, shapes (n_steps, n_sources[, 2]) and (n_steps, n_slots[, 2])
-        Truth and estimates.
+        Truth and estimates: directions, azimuths and elevations, or positions.
     period : float or None
-        Period of directions in the plane, degrees.
+        Period of directions in the plane and on the sphere, degrees.
+    distance : {"euclidean", "great_circle"}
+        Along great circles for azimuths and elevations.
     """
 
     truth: Float
     estimate: Float
     period: float | None
+    distance: Distance = "euclidean"
 
 
 def sets(trial: Trial, run: Run) -> Sets:
@@ -50,13 +55,23 @@ def sets(trial: Trial, run: Run) -> Sets:
     Raises
     ------
     ValueError
-        If the run has no estimates of that kind.
+        If the run has no estimates of that kind, or only one of them has elevations.
     """
     noun, name = ("positions", "position") if trial.truth.ndim == 3 else ("directions", "doa")
     if name not in run.fields:
         raise ValueError(f"the trial's truth has {noun}; a run of {run.kind.__name__}s has none")
     if name == "position":
         return Sets(trial.truth, np.asarray(run.fields[name]), None)
+    if (trial.elevation is None) != ("elevation" not in run.fields):
+        has, run_has = ("none", "some") if trial.elevation is None else ("some", "none")
+        raise ValueError(
+            f"truth and run must both have elevations, or neither; the trial's truth has {has}, "
+            f"a run of {run.kind.__name__}s {run_has}"
+        )
+    if trial.elevation is not None:
+        truth = np.rad2deg(np.stack([trial.truth, trial.elevation], axis=-1))
+        estimate = np.rad2deg(np.stack([run.fields["doa"], run.fields["elevation"]], axis=-1))
+        return Sets(truth, estimate, 360.0, "great_circle")
     period = 360.0 if trial.measurement.array.dim > 1 else None  # type: ignore[union-attr]  # directions have an array
     return Sets(np.rad2deg(trial.truth), np.rad2deg(run.fields[name]), period)
 
@@ -64,27 +79,27 @@ def sets(trial: Trial, run: Run) -> Sets:
 @lru_cache(maxsize=1)  # shared by the metrics of its parts
 def gospa_of(trial: Trial, run: Run) -> Gospa:
     """Return GOSPA and its parts, degrees or m, averaged over the steps."""
-    truth, estimate, period = sets(trial, run)
-    return mean_gospa(truth, estimate, c=CUT_OFF, period=period)
+    truth, estimate, period, distance = sets(trial, run)
+    return mean_gospa(truth, estimate, c=CUT_OFF, period=period, distance=distance)
 
 
 @lru_cache(maxsize=1)
 def pairs_of(trial: Trial, run: Run) -> Matches:
     """Return the pairs of truth and estimates, errors in rad or m."""
-    truth, estimate, period = sets(trial, run)
-    pairs = matches(truth, estimate, CUT_OFF, period)
-    return pairs if truth.ndim == 3 else pairs._replace(error=np.deg2rad(pairs.error))
+    truth, estimate, period, distance = sets(trial, run)
+    pairs = matches(truth, estimate, CUT_OFF, period, distance)
+    return pairs if trial.truth.ndim == 3 else pairs._replace(error=np.deg2rad(pairs.error))
 
 
 def _rmse(trial: Trial, run: Run) -> float:
-    truth, estimate, period = sets(trial, run)
-    return mean_rmse(truth, estimate, CUT_OFF, period)
+    truth, estimate, period, distance = sets(trial, run)
+    return mean_rmse(truth, estimate, CUT_OFF, period, distance)
 
 
 def _ospa(trial: Trial, run: Run) -> float:
-    truth, estimate, period = sets(trial, run)
-    steps = [ospa(t, f, CUT_OFF, period=period) for t, f in zip(truth, estimate, strict=True)]
-    return float(np.mean(steps))
+    truth, estimate, period, distance = sets(trial, run)
+    steps = zip(truth, estimate, strict=True)
+    return float(np.mean([ospa(t, f, CUT_OFF, period=period, distance=distance) for t, f in steps]))
 
 
 def _cardinality(trial: Trial, run: Run) -> float:
@@ -94,7 +109,7 @@ def _cardinality(trial: Trial, run: Run) -> float:
 
 
 def _stated(trial: Trial, run: Run) -> tuple[Float, Float]:
-    """Return errors and stated deviations (n,), rad, or covariances (n, 2, 2), m²."""
+    """Return errors and stated deviations (n,), rad, or covariances (n, 2, 2), m² or rad²."""
     pairs = pairs_of(trial, run)
     spread = run.fields["std" if pairs.error.ndim == 1 else "covariance"]
     if run.n_found.any() and np.isnan(spread).all():
@@ -187,6 +202,29 @@ def _converged(trial: Trial, run: Run) -> float:
     return float(np.mean(run.converged))
 
 
+def _ranges(trial: Trial, run: Run) -> tuple[Float, Float]:
+    """Return true and estimated ranges, m, of the detected sources that have a finite one."""
+    if trial.range is None or "range" not in run.fields:
+        missing = "the trial's truth" if trial.range is None else f"a run of {run.kind.__name__}s"
+        raise ValueError(f"errors in range require ranges of truth and run; {missing} has none")
+    pairs = pairs_of(trial, run)
+    truth, estimate = trial.range[pairs.step, pairs.source], run.range[pairs.step, pairs.slot]
+    near = np.isfinite(truth)
+    return truth[near], np.asarray(estimate[near])
+
+
+def _range_error(trial: Trial, run: Run) -> float:
+    truth, estimate = _ranges(trial, run)
+    found = np.isfinite(estimate)
+    error = np.abs(estimate[found] / truth[found] - 1)
+    return float(np.median(error)) if found.any() else np.nan
+
+
+def _range_found(trial: Trial, run: Run) -> float:
+    estimate = _ranges(trial, run)[1]
+    return float(np.isfinite(estimate).mean()) if estimate.size else np.nan
+
+
 METRICS: dict[str, Metric] = {
     "gospa": _gospa,
     "distance": _distance,
@@ -207,4 +245,5 @@ METRICS: dict[str, Metric] = {
     "track_length": _track_length,
     "converged": _converged,
 }
+RANGE_METRICS: dict[str, Metric] = {"range_error": _range_error, "range_found": _range_found}
 CPU = "cpu_ms"  # processor time of a step, measured by the runner: not reproducible by the seed

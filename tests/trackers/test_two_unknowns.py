@@ -1,5 +1,6 @@
 """Estimates of azimuth and elevation, or direction and range: rows, runs, files and states."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -76,22 +77,18 @@ def test_state_has_both_unknowns_of_each_slot_and_blocks_of_covariance() -> None
 
 
 def test_covariance_of_azimuth_comes_first_in_the_state() -> None:
-    flat = SphereEstimate(
-        *[np.ones(1)] * 3, np.ones(1, complex), np.zeros(1, int),
-        elevation=np.full(1, 0.2), covariance=np.array([[[4.0, 1.0], [1.0, 9.0]]]),
-    )  # fmt: skip
+    covariance = np.array([[[4.0, 1.0], [1.0, 9.0]]])
+    flat = replace(sphere_estimate(40, 20), covariance=covariance)
     tracker = GivenEstimates(flat, kind=SphereEstimate)
     tracker.update(0)
-    np.testing.assert_array_equal(tracker.x[:2], [1.0, 0.2])
+    np.testing.assert_allclose(tracker.x[:2], np.deg2rad([40, 20]))
     np.testing.assert_array_equal(tracker.P[:2, :2], [[9.0, 1.0], [1.0, 4.0]])
 
 
 def test_deviations_that_are_not_estimated_are_empty_cells(tmp_path: Path) -> None:
-    one = np.ones(1)
-    unknown = np.full((1, 2, 2), np.nan)
-    estimate = SphereEstimate(
-        0 * one, np.nan * one, np.nan * one, one + 0j, np.array([-1]),
-        elevation=0 * one, covariance=unknown,
-    )  # fmt: skip
+    nan = np.full(1, np.nan)
+    estimate = replace(
+        sphere_estimate(0, 0, [-1]), std=nan, existence=nan, covariance=np.full((1, 2, 2), np.nan)
+    )
     run_of([estimate], SphereEstimate).to_csv(tmp_path / "tracks.csv")
-    assert (tmp_path / "tracks.csv").read_text() == SPHERE + "0,0,-1,0,,0,,,0\n"
+    assert (tmp_path / "tracks.csv").read_text() == SPHERE + "0,0,-1,0,,0,,,20\n"

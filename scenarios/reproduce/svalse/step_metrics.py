@@ -24,9 +24,11 @@ def gospa_steps(trial: Trial, run: Run) -> Float:
     >>> gospa_steps(trial, trial.tracker("cbf").run(trial.measurements)).shape
     (3,)
     """
-    truth, estimate, period = sets(trial, run)
+    truth, estimate, period, distance = sets(trial, run)
     steps = zip(truth, estimate, strict=True)
-    return np.array([gospa(t, f, CUT_OFF, period=period).total for t, f in steps])
+    return np.array(
+        [gospa(t, f, CUT_OFF, period=period, distance=distance).total for t, f in steps]
+    )
 
 
 def gospa_std(trial: Trial, run: Run) -> float:
@@ -50,7 +52,7 @@ def found_near_endfire(trial: Trial, run: Run) -> float:
 
 def ghosts(trial: Trial, run: Run) -> float:
     """Return the share of sources just stopped that still have an estimate of their own."""
-    truth, estimate, _ = sets(trial, run)
+    truth, estimate, *_ = sets(trial, run)
     pairs = pairs_of(trial, run)
     free = estimate.copy()
     free[pairs.step, pairs.slot] = np.nan

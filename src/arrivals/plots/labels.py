@@ -19,6 +19,8 @@ METRIC_LABELS = {  # {} is the unit of errors
     "label_switches": "label switches",
     "track_length": "length of tracks, steps",
     "converged": "share of converged steps",
+    "range_error": "median relative error in range",
+    "range_found": "share of sources with a range",
     "cpu_ms": "processor time of a step, ms",
 }
 UNITS = {
