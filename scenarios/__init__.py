@@ -5,6 +5,8 @@ The classes of the scenes are in `arrivals.scenarios.simulations`; `create` make
 
 from arrivals.plots.arrays import plot_array
 from arrivals.plots.bearing_time import plot_bearing_time
+from arrivals.plots.ranges import plot_range
+from arrivals.plots.sky import plot_sky
 from arrivals.recordings.networks import Network, calibrate, read_network
 from arrivals.recordings.readers import read
 from arrivals.recordings.recording import Recording
@@ -47,6 +49,8 @@ __all__ = [
     "ospa",
     "plot_array",
     "plot_bearing_time",
+    "plot_range",
+    "plot_sky",
     "read",
     "read_network",
     "register",

@@ -35,8 +35,8 @@ NAMES = {
     "scenarios": """
         Gospa Method Network Recording Reliability Scenario Study Trial ar_signals available
         best_assignment_rmse calibrate create exact_detection find gospa grid mean_gospa mean_rmse
-        monte_carlo network_detection nmse ospa plot_array plot_bearing_time read read_network
-        register reliability rmse rss_bound sdr
+        monte_carlo network_detection nmse ospa plot_array plot_bearing_time plot_range plot_sky
+        read read_network register reliability rmse rss_bound sdr
     """,
 }
 PACKAGES = sorted({f.resolve() for top in FOLDERS for f in (ROOT / top).rglob("__init__.py")})

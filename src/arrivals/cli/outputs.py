@@ -79,11 +79,12 @@ def write_table(result: Run, path: str | None) -> None:
 
 
 def draw(path: str | None, result: Run, **picture: Any) -> None:
-    """Draw the tracks over time to a file, if there is a path."""
+    """Draw the tracks to a file, if there is a path: over time, or on the sky."""
     if path:
-        from arrivals.plots.bearing_time import plot_bearing_time, save
+        from arrivals.plots.bearing_time import save
+        from arrivals.plots.runs import plot
 
-        save(plot_bearing_time(result, **picture), path)
+        save(plot(result, **picture), path)
 
 
 @contextmanager

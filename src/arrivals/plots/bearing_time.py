@@ -109,37 +109,47 @@ def _name_axes(ax: Axes, line: bool, steps: bool) -> None:
 
 def _draw_tracks(ax: Axes, at: Float, run: Run) -> None:
     """Draw each label as a line through successive steps, and isolated directions as dots."""
+    step, slot, joined = track_order(run)
+    point = np.stack([at[step], np.rad2deg(run.doa[step, slot])], 1)
+    furthest = 180 if (np.abs(point[:, 1]) > 90).any() else 90  # not across ±180°, on lines ±90°
+    near = np.abs(np.diff(point[:, 1])) < furthest
+    draw_tracks(ax, point, track_colours(run, step, slot), joined & near)
+
+
+def track_order(run: Run) -> tuple[Int, Int, Bool]:
+    """Return steps and slots of the directions by label and step, and which neighbours are joined.
+
+    Of more than 6000 steps, every n-th is taken. Neighbours are joined, (n - 1,), if they have one
+    label and successive steps.
+    """
+    every = max(1, -(-len(run) // N_STEPS))
+    step, slot = np.nonzero(~np.isnan(run.doa[::every]))
+    label = run.label[::every][step, slot]
+    order = np.lexsort([step, label])
+    step, slot, label = step[order], slot[order], label[order]
+    joined = (np.diff(label) == 0) & (label[1:] >= 0) & (np.diff(step) == 1)
+    return step * every, slot, np.asarray(joined)
+
+
+def draw_tracks(ax: Axes, point: Float, colour: Float, joined: Bool) -> None:
+    """Draw points (n, 2): lines between neighbours that are joined, dots elsewhere."""
     from matplotlib.collections import LineCollection
 
-    some = slice(None, None, max(1, -(-len(at) // N_STEPS)))
-    at, doas, labels, existence = at[some], run.doa[some], run.label[some], run.existence[some]
-    step, slot = np.nonzero(~np.isnan(doas))
-    order = np.lexsort([step, labels[step, slot]])
-    step, slot = step[order], slot[order]
-    label, point = labels[step, slot], np.stack([at[step], np.rad2deg(doas[step, slot])], 1)
-    colour = _colours(label, existence[step, slot])
-    joined = _joined(step, label, point[:, 1])
     lines = list(np.stack([point[:-1][joined], point[1:][joined]], axis=1))
     for width, paint in ((3.4, "white"), (1.7, colour[1:][joined])):
         ax.add_collection(LineCollection(lines, colors=paint, linewidths=width, zorder=3))
-    alone = np.ones(len(step), dtype=np.bool_)
+    alone = np.ones(len(point), dtype=np.bool_)
     alone[:-1][joined] = False
     alone[1:][joined] = False
     x, y = point[alone].T
     ax.scatter(x, y, s=9, c=colour[alone], edgecolors="white", linewidths=0.4, zorder=2)
 
 
-def _joined(step: Int, label: Int, degrees: Float) -> Bool:
-    """Return True for neighbours, sorted by label and step, that belong to one line."""
-    same = (np.diff(label) == 0) & (label[1:] >= 0) & (np.diff(step) == 1)
-    furthest = 180 if (np.abs(degrees) > 90).any() else 90  # not across ±180°, on lines ±90°
-    return np.asarray(same & (np.abs(np.diff(degrees)) < furthest))
-
-
-def _colours(label: Int, existence: Float) -> Float:
+def track_colours(run: Run, step: Int, slot: Int) -> Float:
     """Return RGBA rows: the colour from the label, the opacity from the existence."""
     from matplotlib.colors import to_rgba_array
 
+    label, existence = run.label[step, slot], run.existence[step, slot]
     palette = to_rgba_array((*PALETTE, NEUTRAL))
     colour = palette[np.where(label < 0, -1, label % len(PALETTE))]
     colour[:, 3] = np.where(np.isnan(existence), 1.0, np.clip(existence, 0.0, 1.0))

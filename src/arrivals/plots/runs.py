@@ -1,4 +1,4 @@
-"""Plot of any run: directions over time, or positions on a map."""
+"""Plot of any run: directions over time or on the sky, ranges over time, positions on a map."""
 
 from __future__ import annotations
 
@@ -7,11 +7,15 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from arrivals.plots.bearing_time import plot_bearing_time
 from arrivals.plots.maps import plot_map
+from arrivals.plots.ranges import plot_range
+from arrivals.plots.sky import plot_sky
 from arrivals.trackers.run import Run
 from arrivals.typing import Float
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+OVER_TIME = ("time", "snapshots", "measurement", "dynamic_range_db")  # not drawn on the sky
 
 
 class PlacedRuns(Protocol):
@@ -31,19 +35,24 @@ class PlacedRuns(Protocol):
 
 
 def plot(run: Run | PlacedRuns, **more: Any) -> Axes:
-    """Draw the directions of a run over time, or positions on a map.
+    """Draw the directions of a run over time or on the sky, or positions on a map.
+
+    Runs with elevations are drawn by `plot_sky`; of runs with ranges, directions are above by
+    `plot_bearing_time`, and ranges below by `plot_range`.
 
     Parameters
     ----------
     run : Run, or the result of `arrivals.locate`
         Run of a tracker of directions or of positions, or several of positions.
     **more : object
-        Arguments of `plot_bearing_time` or of `plot_map`; the times are those of the run.
+        Arguments of these functions; the times are those of the run. Times and snapshots are not
+        drawn on the sky.
 
     Returns
     -------
     matplotlib Axes
-        Axes of a new figure without a window; `ax.figure.savefig("tracks.png")` writes it.
+        Axes of a new figure without a window, of the ranges if there are any;
+        `ax.figure.savefig("tracks.png")` writes it.
 
     Examples
     --------
@@ -55,6 +64,21 @@ def plot(run: Run | PlacedRuns, **more: Any) -> Axes:
     """
     if not isinstance(run, Run):
         return plot_map(run.runs, **{"sensors": run.sensors, "truth": run.truth} | more)
+    if "elevation" in run.fields:
+        return plot_sky(run, **{key: more[key] for key in more if key not in OVER_TIME})
+    if "range" in run.fields:
+        return _plot_directions_and_ranges(run, **{"time": run.time} | more)
     if "doa" in run.fields:
         return plot_bearing_time(run, **{"time": run.time} | more)
     return plot_map(run, **more)
+
+
+def _plot_directions_and_ranges(run: Run, *, time: Any, **more: Any) -> Axes:
+    from matplotlib.figure import Figure
+
+    if "ax" in more:
+        return plot_range(run, time=time, ax=more["ax"])
+    figure = Figure(figsize=(9.0, 7.0), layout="constrained")
+    above, below = figure.subplots(2, sharex=True, height_ratios=(4, 3))
+    plot_bearing_time(run, time=time, ax=above, **more).set_xlabel("")
+    return plot_range(run, time=time, ax=below)
