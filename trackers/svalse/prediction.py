@@ -67,6 +67,11 @@ def n_moments(manifold: Manifold, motion: BernoulliVonMises) -> int:
     return int(7 * np.sqrt(float(motion.blur(np.inf, 1.0, slowest)))) + 8
 
 
+def nuisance_weights(manifold: Manifold) -> Float:
+    """Return the prior of the values of a second parameter; [1.0] as a rule."""
+    return manifold.nuisance_weights if is_angle_manifold(manifold) else np.ones(1)
+
+
 def predicted_components(
     manifold: Manifold,
     motion: BernoulliVonMises,

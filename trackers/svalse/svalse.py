@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 from arrivals.measurement_models.direction_measurement import DirectionMeasurement
 from arrivals.measurement_models.manifolds.manifold import (
     Reference,
-    is_angle_manifold,
 )
 from arrivals.measurement_models.observed import ObservedSnapshots, merge_noise
 from arrivals.motion_models.bernoulli_von_mises import BernoulliVonMises
@@ -30,6 +29,7 @@ from arrivals.trackers.svalse.prediction import (
     drifted,
     motion_on,
     n_moments,
+    nuisance_weights,
     predicted_components,
     with_modes,
 )
@@ -289,9 +289,7 @@ class SVALSE(VALSE):
         self.existence: Float = padded(existence[order], n, 0.0)
         self.label: Int = padded(label[order], n, -1).astype(np.int64)
         self.age: Int = padded(age[order], n, 0).astype(np.int64)
-        manifold = self.full_manifold
-        weights = manifold.nuisance_weights if is_angle_manifold(manifold) else np.ones(1)
-        self.nuisance = np.tile(weights, (n, 1))
+        self.nuisance = np.tile(nuisance_weights(self.full_manifold), (n, 1))
         self.moments = np.zeros((n, self.n_moments), dtype=np.complex128)
         self.modes = np.zeros((3, n, 2))
         if posterior.modes is not None:
