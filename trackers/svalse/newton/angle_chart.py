@@ -41,6 +41,7 @@ class AngleChart:
     """
 
     layout = ONE_ANGLE
+    has_curvature = False
 
     def __init__(self, manifold: AngleManifold) -> None:
         self.manifold, self.n_bins = manifold, manifold.n_bins

@@ -43,12 +43,13 @@ class BatchRecord:
         """Return the rows that are set."""
         if all_set(rows):
             return self
-        return self._at(np.flatnonzero(rows))
+        return self.take(np.flatnonzero(rows))
 
-    def _at(self, index: Int) -> Self:
+    def take(self, index: Int) -> Self:
+        """Return rows by their indices, which may repeat."""
         return type(self)(
             **{
-                name: part._at(index) if isinstance(part, BatchRecord) else part.take(index, axis=0)
+                name: part.take(index) if isinstance(part, BatchRecord) else part.take(index, 0)
                 for name, part in vars(self).items()
             }
         )
@@ -153,7 +154,8 @@ class Components(BatchRecord):
         """
         return cls(np.zeros((n_problems, layout.n_rows, n_components)), layout)
 
-    def _at(self, index: Int) -> Components:
+    def take(self, index: Int) -> Components:
+        """Return rows by their indices, which may repeat."""
         return self.like(self.packed.take(index, axis=0))
 
     def _replaced(self, index: Int, other: Self) -> Components:

@@ -47,6 +47,7 @@ class PointChart:
         self.n_sensors, self.extent = manifold.n_sensors, float(manifold.n_sensors)
         self.layout = Layout(manifold.n_unknowns, manifold.point_size)
         self.norm2: Float = np.full((self.n_bins, 1), self.extent)
+        self.has_curvature = manifold.spike_precision is not None
         self.is_linear, self.is_plain = manifold.is_linear, False
         self.longest_step, self.max_variance = LONGEST_STEP, MAX_VARIANCE
 
@@ -119,9 +120,17 @@ class PointChart:
             "curved": self.is_curved(kappa.T),
         }
 
+    @property
+    def wave_precisions(self) -> tuple[float, float]:
+        """Prior precisions of the second unknown of plane and of curved waves."""
+        spike, slab = self.manifold.spike_precision, self.manifold.slab_precision
+        assert spike is not None
+        assert slab is not None
+        return spike, slab
+
     def is_curved(self, precision: Float) -> Bool:
-        """Return which components have the prior of a curved wave, (L,)."""
+        """Return which components of precisions (..., q, L) are curved waves, (..., L)."""
         spike = self.manifold.spike_precision
         if spike is None:
-            return np.ones(precision.shape[-1], dtype=np.bool_)
+            return np.ones(precision.shape[:-2] + precision.shape[-1:], dtype=np.bool_)
         return np.asarray(precision[..., 2, :] < 0.5 * spike)

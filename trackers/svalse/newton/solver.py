@@ -78,6 +78,8 @@ class NewtonSolver(SolverSettings):
     merge_correlation : float, optional
         Instead of a distance: correlation of the responses, in all bins, above which the later of
         two active components is removed; in (0, 1]. It needs no scale.
+    curved_probability : float
+        Prior probability that a wave is curved, where sources have a range.
     limits : IterationLimits
         Numbers of Newton steps and of changes of the support.
 
@@ -94,6 +96,7 @@ class NewtonSolver(SolverSettings):
 
     kl_weight: float = 0.5
     merge_correlation: float | None = None
+    curved_probability: float = 0.2
     limits: IterationLimits = DEFAULT_LIMITS
 
     def __post_init__(self) -> None:
@@ -268,4 +271,5 @@ def support_search(
         max_active=min(n, M - 1),
         fill_target=min(int(np.ceil(round(FILL_SHARE * response.extent, 6))), n, M - 1),
         reestimate=n_all > 1 or not response.chart.is_plain,
+        curved_probability=solver.curved_probability,
     )

@@ -107,6 +107,8 @@ class SolverState(BatchRecord):
         In the fill stage; final steps taken; solved; components on trial; variances updated.
     fill_target : ndarray of int, shape (B,)
         Components at which the fill stage ends.
+    may_switch, had_final : ndarray of bool, shape (B,)
+        Changes between plane and curved waves are tried; final steps were taken once.
     steps_remaining : ndarray of int, shape (B,)
         Newton steps until the next change of the support.
     tolerance : ndarray, shape (B,)
@@ -132,6 +134,8 @@ class SolverState(BatchRecord):
     on_trial: Bool
     estimate_nu: Bool
     fill_target: Int
+    may_switch: Bool
+    had_final: Bool
     steps_remaining: Int
     tolerance: Float
     record: Float
@@ -183,6 +187,7 @@ def initial_state(
         problem=np.arange(B), evaluation=evaluation, saved=evaluation, removed=removed, n_known=K,
         log_odds_new=log_odds(rho), estimate_rho=estimate_rho, filling=~off, finished=off.copy(),
         done=off.copy(), on_trial=off.copy(), estimate_nu=off.copy(),
+        may_switch=np.full(B, response.chart.has_curvature), had_final=off.copy(),
         fill_target=np.maximum(n_active + NEW_IN_FILL, MIN_FILL), steps_remaining=zero.copy(),
         tolerance=np.zeros(B), record=np.full(B, -np.inf), before=nan.copy(), rejected=nan.copy(),
         snr_db=snr, iterations=zero.copy(), n_changes=zero.copy(),

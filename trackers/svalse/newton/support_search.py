@@ -17,6 +17,7 @@ from arrivals.trackers.svalse.newton.candidates import (
 from arrivals.trackers.svalse.newton.elbo import evaluate
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
 from arrivals.trackers.svalse.newton.state import SolverState, log_odds
+from arrivals.trackers.svalse.newton.wave_switch import switch_waves
 from arrivals.typing import Bool, Float, Int
 from arrivals.validation import count, not_negative
 
@@ -80,6 +81,8 @@ class SupportSearch:
         more than were active, or eight.
     reestimate : bool
         True if the gain of a removal includes that of updating the noise.
+    curved_probability : float
+        Prior probability that a wave is curved, where components have a range.
     """
 
     response: ExpectedResponse
@@ -92,6 +95,7 @@ class SupportSearch:
     max_active: int
     fill_target: int
     reestimate: bool
+    curved_probability: float
 
     def next_change(self, state: SolverState) -> None:
         """Accept or reject the trial components, then set the next change and Newton steps."""
@@ -103,7 +107,9 @@ class SupportSearch:
             self.merge(state, open_)
         removed = self.remove_weakest(state, open_ & ~state.filling)
         added = self.add(state, open_ & ~removed)
-        self.finish(state, ~(removed | added), stop)
+        idle = ~(removed | added)
+        switched = self.switch(state, idle & state.may_switch & ~state.filling & ~stop)
+        self.finish(state, idle & ~switched, stop)
         state.on_trial = added
         steps_left = self.max_iterations - state.iterations
         np.minimum(state.steps_remaining, steps_left, out=state.steps_remaining)
@@ -190,6 +196,24 @@ class SupportSearch:
             self.set_steps(state, added, n)
         return added
 
+    def switch(self, state: SolverState, rows: Bool) -> Bool:
+        """Change one component from plane to curved, or back, if it gains; return where one was."""
+        if not any_set(rows):
+            return rows
+        part = state.select(rows)
+        evaluation, changed = switch_waves(
+            self.response, part.evaluation, part.estimate_nu, self.limits.inner,
+            self.curved_probability, self.kl_weight,
+        )  # fmt: skip
+        state.evaluation = state.evaluation.replace_rows(rows, evaluation)
+        state.iterations = state.iterations + self.limits.inner * rows
+        switched = rows.copy()
+        switched[rows] = changed
+        state.may_switch = state.may_switch & ~(rows & ~switched)
+        count_change(state, switched)
+        self.set_steps(state, switched, self.limits.removal)
+        return switched
+
     def finish(self, state: SolverState, idle: Bool, stop: Bool) -> None:
         """End the fill stage, take the final steps, or finish in rows without a gain."""
         state.done = idle & ((state.finished & ~state.filling) | stop)
@@ -200,7 +224,9 @@ class SupportSearch:
             self.end_fill_stage(state, filled)
         final = idle & ~filled
         if any_set(final):
-            state.finished = state.finished | final
+            first = final & ~state.had_final
+            state.may_switch = state.may_switch | (first & self.response.chart.has_curvature)
+            state.finished, state.had_final = state.finished | final, state.had_final | final
             self.set_steps(state, final, self.limits.final, self.tolerance)
 
     def end_fill_stage(self, state: SolverState, rows: Bool) -> None:
