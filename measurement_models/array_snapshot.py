@@ -27,15 +27,20 @@ from arrivals.measurement_models.manifolds.manifold import (
     Reference,
     angle_manifold,
 )
+from arrivals.measurement_models.manifolds.two_unknowns import (
+    Unknowns,
+    check_unknowns,
+    is_planar,
+    two_unknowns_manifold,
+)
 from arrivals.measurement_models.manifolds.uniform_line import grid_line
 from arrivals.measurement_models.manifolds.whitened import whitened_manifold
 from arrivals.measurement_models.snapshot_likelihood import (
     of_state,
 )
 from arrivals.measurement_models.snapshot_noise import SnapshotNoise
-from arrivals.measurements import numbers
 from arrivals.typing import Complex
-from arrivals.validation import count, instance, one_of, positive, real
+from arrivals.validation import count, instance, one_of, positive
 
 
 @dataclass(frozen=True)
@@ -76,6 +81,16 @@ class ArraySnapshot(SnapshotNoise):
         (n_sensors, n_sensors), Hermitian and positive definite with ones on the diagonal.
     white : float
         White share of the variance of "diffuse" noise, at least 1e-8.
+    unknowns : {"azimuth", "sphere", "range"}
+        What is unknown of a source: its direction, from broadside on a line and else the azimuth
+        of a horizontal wave; azimuth and elevation; or direction and range, on a line. The latter
+        two are for isotropic elements and white noise. An array in a plane has the same response
+        to a direction and its mirror image: `half_space`.
+    nearest : float, optional
+        Distance of the nearest source of unknown range from the centroid, m; a quarter of the
+        Fraunhofer distance 2 extent²/λ of the shortest wavelength if None. From there on,
+        wavefronts are parabolic, and plane unless the data support a curvature, which has a
+        standard deviation of 1/nearest a priori. Below, they are spherical.
 
     Notes
     -----
@@ -98,6 +113,8 @@ class ArraySnapshot(SnapshotNoise):
     True
     >>> ArraySnapshot(SensorArray.uca(8, 0.65), [1.0, 1.2], n_snapshots=10).shape
     (2, 10, 8)
+    >>> ArraySnapshot(SensorArray.uca(8, 0.65), 1.0, unknowns="sphere").manifold().n_unknowns
+    2
     """
 
     array: SensorArray
@@ -111,6 +128,8 @@ class ArraySnapshot(SnapshotNoise):
     angle: Literal["auto", "doa"] = "auto"
     noise_coherence: Literal["white", "diffuse"] | ArrayLike | NoiseCoherence = "white"
     white: float = 0.1
+    unknowns: Unknowns = "azimuth"
+    nearest: float | None = None
 
     def __post_init__(self) -> None:
         instance("array", self.array, SensorArray)
@@ -127,6 +146,7 @@ class ArraySnapshot(SnapshotNoise):
         coherence = coherence_of("noise_coherence", self.noise_coherence, self.n_bins, self.array)
         object.__setattr__(self, "noise_coherence", coherence)
         self.waves  # noqa: B018  (refuses parts that do not fit each other)
+        check_unknowns(self.waves, self.unknowns, self.nearest, self.coherence is None)
 
     @property
     def wavelengths(self) -> tuple[float, ...]:
@@ -143,6 +163,7 @@ class ArraySnapshot(SnapshotNoise):
 
         `white_noise` is True for a method that takes the noise for white.
         """
+        self.check_one_unknown(method)
         if white_noise and self.coherence is not None:
             raise ValueError(f"{method} requires noise_coherence='white'; got coherent noise")
         if not (self.is_single and self.response is None):
@@ -170,28 +191,32 @@ class ArraySnapshot(SnapshotNoise):
         return self.is_single and self.response is None and self.coherence is None
 
     @property
+    def half_space(self) -> bool:
+        """True if directions on the sphere are those of a half: sensors in a plane.
+
+        The half is that of elevations from 0 to 90 degrees; of a plane that is not horizontal, the
+        side of its normal, which points upwards.
+        """
+        return self.unknowns == "sphere" and is_planar(self.array)
+
+    def check_one_unknown(self, method: str) -> None:
+        """Raise a ValueError for a method of one unknown a source, if there are two."""
+        if self.unknowns != "azimuth":
+            raise ValueError(f"{method} requires unknowns='azimuth'; got {self.unknowns!r}")
+
+    @property
     def waves(self) -> PlaneWaves:
         """Response of the array to plane waves."""
         parts = self.response, self.slowness, self.elevation
         return PlaneWaves(self.array, self.wavelengths, *parts)
 
-    def steering_vector(self, doa: ArrayLike) -> Complex:
-        """Return responses to `doa` (...), rad: (..., n_sensors), or (..., n_bins, n_sensors).
-
-        The waves are horizontal and of the nominal slowness.
-        """
-        doa = real("doa", doa)
-        a = self.array.steering_vector(doa[..., None], np.asarray(self.wavelengths))
-        if self.response is not None:
-            a = a * np.moveaxis(self.response(doa), 0, -2)
-        return a if self.n_bins > 1 else np.asarray(a[..., 0, :])
-
     def manifold(self, reference: Reference = "middle") -> Manifold:
-        """Return the response as a Fourier series of an angle.
+        """Return the response, as a Fourier series of an angle or as a function of points.
 
-        For lines on a uniform grid of at most half of one wavelength the angle is the electrical
-        one and the series is that of the sensors; for every other array, and where the noise is
-        coherent, it is the direction.
+        With two unknowns a source it is a `PointManifold`; with one, a series. For lines on a
+        uniform grid of at most half of one wavelength the angle is the electrical one and the
+        series is that of the sensors; for every other array, and where the noise is coherent, it
+        is the direction.
 
         Raises
         ------
@@ -201,7 +226,8 @@ class ArraySnapshot(SnapshotNoise):
         """
         if reference not in self._manifolds:
             one_of("reference", reference, ("middle", "first"))
-            check_directions(self.waves)
+            if self.unknowns == "azimuth":
+                check_directions(self.waves)
             self._manifolds[reference] = self._new_manifold(reference)
         return self._manifolds[reference]
 
@@ -216,6 +242,10 @@ class ArraySnapshot(SnapshotNoise):
         return angle_manifold("this method", self.manifold(reference))
 
     def _new_manifold(self, reference: Reference) -> Manifold:
+        if self.unknowns != "azimuth":
+            if reference != "middle":
+                raise ValueError(f"reference must be 'middle' with two unknowns; got {reference!r}")
+            return two_unknowns_manifold(self.waves, self.unknowns, self.nearest)
         if self.coherence is not None:
             return whitened_manifold(self.waves, self.coherence, reference)
         line = None
@@ -228,36 +258,12 @@ class ArraySnapshot(SnapshotNoise):
         return {}  # those made so far, by reference: the model does not change
 
     def ambiguity(self) -> tuple[float, float] | None:
-        """Return the first two directions, rad, of equal response at every frequency, or None."""
-        return ambiguous_pair(self.waves)
+        """Return the first two directions, rad, of equal response at every frequency, or None.
 
-    def wave(self, doa: ArrayLike, amplitude: ArrayLike) -> Complex:
-        """Return noiseless measurements of sources at `doa` (..., n_sources), as in `simulate`."""
-        doa, amplitude = np.atleast_1d(real("doa", doa)), numbers("amplitude", amplitude)
-        active = ~np.isnan(doa)
-        A = self.steering_vector(np.where(active, doa, 0.0))  # (..., K, [F], M)
-        if self.n_bins > 1:
-            A = np.swapaxes(A, -2, -3)
-        axes = tuple(range(doa.ndim - 1, doa.ndim + len(self.shape) - 2))  # bins, snapshots
-        if self.n_snapshots > 1:
-            A = np.expand_dims(A, -3)
-        try:
-            w = np.where(np.expand_dims(active, axes), amplitude, 0.0)
-            return np.asarray((w[..., None, :] @ A)[..., 0, :])
-        except (ValueError, RuntimeError):
-            shapes = f"{doa.shape} and {amplitude.shape}"
-            raise ValueError(f"doa and amplitude must have shapes that fit; got {shapes}") from None
-
-    def simulate(self, doa: ArrayLike, amplitude: ArrayLike, rng: np.random.Generator) -> Complex:
-        """Draw measurements (..., *shape) of sources at `doa` (..., n_sources), rad.
-
-        Amplitudes are complex, at the origin of coordinates, and are broadcast to
-        (..., bins and snapshots as in `shape`, n_sources); a source of NaN direction is inactive.
+        On the sphere None: pairs are not searched there, and the mirror images of an array in a
+        plane are left out by `half_space`.
         """
-        instance("rng", rng, np.random.Generator)
-        wave = self.wave(doa, amplitude)
-        shape = np.broadcast_shapes(wave.shape, self.shape)
-        return np.asarray(wave + self.draw_noise(shape, rng))
+        return None if self.unknowns == "sphere" else ambiguous_pair(self.waves)
 
     @property
     def dim_z(self) -> int:
@@ -266,6 +272,7 @@ class ArraySnapshot(SnapshotNoise):
 
     def response_to(self, doa: ArrayLike) -> Complex:
         """Return a(β) of directions (...), rad: (..., n_sensors); for a single snapshot a step."""
+        self.check_one_unknown("the Gaussian interface")
         if not self.is_single:
             raise ValueError(
                 "Gaussian interface must have one snapshot a step at one wavelength; got "
@@ -287,4 +294,5 @@ class ArraySnapshot(SnapshotNoise):
 
     def for_likelihood(self, names: Sequence[str]) -> MeasurementModel:
         """Return this model for `log_likelihood`; amplitudes that are no states are integrated."""
+        self.check_one_unknown("a filter of states")
         return self if tuple(names) in ((), ("doa",)) else of_state(self, names)

@@ -36,7 +36,7 @@ class DirectionMeasurement(Protocol):
         """Return the part of a measurement that has valid data; None if all of it is missing."""
 
     def manifold(self, reference: Reference = "middle") -> Manifold:
-        """Return the response as a Fourier series of an angle."""
+        """Return the response, as a Fourier series of an angle or as a function of points."""
 
     def steering_vector(self, doa: ArrayLike) -> Complex:
         """Return responses to directions (...), rad: (..., [n_bins,] n_sensors)."""

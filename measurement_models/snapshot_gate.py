@@ -46,7 +46,7 @@ class SnapshotGate:
 
     @abstractmethod
     def manifold(self, reference: Reference = "middle") -> Manifold:
-        """Return the response as a Fourier series of an angle."""
+        """Return the response, as a Fourier series of an angle or as a function of points."""
 
     def snapshot(self, z: ArrayLike | None, n_snapshots: int | None = None) -> Complex:
         """Return a measurement as complex numbers, NaN where one is missing.

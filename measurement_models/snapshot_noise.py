@@ -24,11 +24,12 @@ from arrivals.measurement_models.snapshot_likelihood import (
     log_known,
     log_marginal,
 )
+from arrivals.measurement_models.snapshot_waves import SnapshotWaves
 from arrivals.typing import Bool, Complex, Float
 from arrivals.validation import real
 
 
-class SnapshotNoise(SnapshotGate, SingleSourceSnapshot):
+class SnapshotNoise(SnapshotWaves, SnapshotGate, SingleSourceSnapshot):
     """Mixin of models of complex snapshots: noise of covariance `noise` Γ, white or coherent.
 
     Attributes
@@ -51,10 +52,6 @@ class SnapshotNoise(SnapshotGate, SingleSourceSnapshot):
     @abstractmethod
     def waves(self) -> PlaneWaves:
         """Response of the array to plane waves."""
-
-    @abstractmethod
-    def wave(self, doa: ArrayLike, amplitude: ArrayLike) -> Complex:
-        """Return noiseless measurements of sources."""
 
     @cached_property
     def coherence(self) -> NoiseCoherence | None:
@@ -160,7 +157,12 @@ class SnapshotNoise(SnapshotGate, SingleSourceSnapshot):
         return replace(observed, snapshots=L @ observed.snapshots)
 
     def log_likelihood(
-        self, z: ArrayLike, doa: ArrayLike, amplitude: ArrayLike | None = None
+        self,
+        z: ArrayLike,
+        doa: ArrayLike,
+        amplitude: ArrayLike | None = None,
+        elevation: ArrayLike | None = None,
+        distance: ArrayLike | None = None,
     ) -> Float:
         """Return ln p(z | β) for directions (..., n_sources), rad.
 
@@ -176,6 +178,9 @@ class SnapshotNoise(SnapshotGate, SingleSourceSnapshot):
             Directions, rad.
         amplitude : array_like, shape (..., n_sources), optional
             Complex amplitudes where they are known: then z ~ CN(Σ w a, noise Γ).
+        elevation, distance : array_like, shape (..., n_sources), optional
+            Elevations, rad, and distances from the centroid, m, of the sources: waves are
+            horizontal, and plane, if None.
 
         Returns
         -------
@@ -186,9 +191,15 @@ class SnapshotNoise(SnapshotGate, SingleSourceSnapshot):
         Y = self.snapshots(z)
         W = self.gap_whitening(Y)
         if amplitude is not None:
-            return log_known(self.snapshot(z), self.wave(doa, amplitude), self.noise, W)
-        a = self.waves.steering(doa.ravel())
-        a = a.reshape(*a.shape[:3], *doa.shape)
+            expected = self.wave(doa, amplitude, elevation, distance)
+            return log_known(self.snapshot(z), expected, self.noise, W)
+        if elevation is None and distance is None:
+            a = self.waves.steering(doa.ravel())
+            a = a.reshape(*a.shape[:3], *doa.shape)
+        else:
+            a = self.steering_vector(doa, elevation, distance)
+            a = a.reshape(*doa.shape, self.n_bins, self.shape[-1])
+            a = np.moveaxis(a, (-2, -1), (0, 1))[None]
         return log_marginal(Y, a, self.noise, self.power, W)
 
     @property

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.arrays.element_response import ElementResponse
-from arrivals.measurement_models.arrays.sensor_array import SensorArray
+from arrivals.measurement_models.arrays.sensor_array import SensorArray, direction
+from arrivals.measurement_models.arrays.sphere import unit_vectors
 from arrivals.messages import shown
 from arrivals.parameters import FrozenModel
 from arrivals.typing import Complex, Float, Int
@@ -122,6 +123,52 @@ class PlaneWaves(FrozenModel):
         if response is not None and response.n_bins is not None:
             response = ElementResponse(response.gains[np.asarray(bins)])
         return self.replace(wavelengths=[self.wavelengths[f] for f in bins], response=response)
+
+
+def source_paths(
+    array: SensorArray, doa: Float, elevation: Float | None = None, distance: Float | None = None
+) -> tuple[Float, Float]:
+    """Return how much nearer to a source than the origin sensors are, m, and their gains.
+
+    Parameters
+    ----------
+    array : SensorArray
+        Positions of the sensors.
+    doa : ndarray, shape (...)
+        Directions, rad.
+    elevation : ndarray, shape (...), optional
+        Elevations, rad; horizontal waves if None. Not for a line.
+    distance : ndarray, shape (...), optional
+        Distances R of the sources from the centroid, m; plane waves if None. Path and gain are
+        counted from the centroid then, R - r and R/r, and the path from there to the origin is
+        that of a plane wave.
+
+    Returns
+    -------
+    path, gain : ndarray, shape (..., n_sensors)
+
+    Examples
+    --------
+    >>> path, gain = source_paths(SensorArray([0.0, 2.0]), np.array(np.pi / 2), None, np.array(4.0))
+    >>> path.round(6), gain.round(6)
+    (array([0., 2.]), array([0.8     , 1.333333]))
+    """
+    n = direction(doa, array.dim)
+    if elevation is not None:
+        if array.dim == 1:
+            raise ValueError("elevation must be None for a line: its directions are cones")
+        n = unit_vectors(doa, elevation)[..., : array.dim]
+    if distance is None:
+        return n @ array.positions.T, np.ones(1)
+    if not (distance > 0).all():
+        raise ValueError(f"distance must be positive; got {shown(distance)}")
+    centre = array.positions.mean(axis=0)
+    p = array.positions - centre
+    along, v = n @ p.T, 1 / distance[..., None]
+    square = (p**2).sum(axis=1)
+    # t = r/R = √(1 - 2 n·p/R + p²/R²),  R - r = (2 n·p - p²/R) / (1 + t)
+    t = np.sqrt(np.maximum(1 - 2 * along * v + square * v * v, 1e-300))
+    return (n @ centre)[..., None] + (2 * along - square * v) / (1 + t), 1 / t
 
 
 def frequency_bins(wavelength: float | Sequence[float]) -> float | tuple[float, ...]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.arrays.plane_waves import PlaneWaves
+from arrivals.measurement_models.manifolds.located import range_estimate
 from arrivals.measurement_models.manifolds.manifold import CandidatePoints
 from arrivals.measurement_models.manifolds.phase import PhaseManifold
 from arrivals.measurement_models.manifolds.points import (
@@ -19,7 +20,6 @@ from arrivals.measurement_models.manifolds.points import (
     sine_exists,
     sine_limits,
 )
-from arrivals.measurement_models.manifolds.range_estimate import range_estimate
 from arrivals.typing import Bool, Float
 
 SPIKE_STD = 0.05  # of the curvature of a plane wave, rad rms of the phases over the array

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.arrays.plane_waves import PlaneWaves
 from arrivals.measurement_models.arrays.sphere import unit_vectors
+from arrivals.measurement_models.manifolds.located import tangent_estimate
 from arrivals.measurement_models.manifolds.manifold import CandidatePoints
 from arrivals.measurement_models.manifolds.points import (
     MIN_COSINE,
@@ -21,7 +22,6 @@ from arrivals.measurement_models.manifolds.points import (
     cell_centres,
     sine_limits,
 )
-from arrivals.measurement_models.manifolds.tangent import tangent_estimate
 from arrivals.typing import Bool, Complex, Float
 
 

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from arrivals.measurement_models.arrays.plane_waves import PlaneWaves
 from arrivals.measurement_models.manifolds.line_phase import line_units
 from arrivals.measurement_models.manifolds.local import LocalManifold
+from arrivals.measurement_models.manifolds.located import range_estimate
 from arrivals.measurement_models.manifolds.manifold import CandidatePoints
 from arrivals.measurement_models.manifolds.points import (
     SPACING_OF_ONE,
@@ -19,7 +20,6 @@ from arrivals.measurement_models.manifolds.points import (
     sine_exists,
     sine_limits,
 )
-from arrivals.measurement_models.manifolds.range_estimate import range_estimate
 from arrivals.typing import Bool, Complex, Float
 
 MIN_SQUARE = 1e-6  # of the distance of a sensor over R

@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 from arrivals.measurement_models.arrays.plane_waves import PlaneWaves
 from arrivals.measurement_models.arrays.sphere import fibonacci_sphere, unit_vectors
 from arrivals.measurement_models.manifolds.local import LocalManifold
+from arrivals.measurement_models.manifolds.located import tangent_estimate
 from arrivals.measurement_models.manifolds.manifold import CandidatePoints
 from arrivals.measurement_models.manifolds.points import SPACING_OF_TWO, sine_limits
-from arrivals.measurement_models.manifolds.tangent import tangent_estimate
 from arrivals.typing import Bool, Complex, Float
 
 FEWEST_CANDIDATES = 100

@@ -115,6 +115,7 @@ class SBL(BatchDirectionTracker):
         solver: FixedPointSolver = FixedPointSolver(),  # noqa: B008  (models are immutable)
     ) -> None:
         self.measurement = instance("measurement", measurement, ArraySnapshot)
+        measurement.check_one_unknown(type(self).__name__)
         if measurement.slowness is not None or measurement.elevation is not None:
             raise ValueError(
                 f"slowness and elevation must be None for {type(self).__name__}; got a grid: music "

@@ -36,6 +36,7 @@ def uniform_line(model: ArraySnapshot) -> UniformLineManifold:
             "noise_coherence must be 'white' for a method of a uniform grid; got coherent noise: "
             "music and mvdr whiten it"
         )
+    model.check_one_unknown("a method of a uniform grid")
     line, limit = model.manifold(), model.array.alias_limit
     if limit is not None and model.wavelengths[0] < limit * (1 - 1e-6):
         raise ValueError(
