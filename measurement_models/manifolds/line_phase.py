@@ -14,6 +14,7 @@ from arrivals.measurement_models.manifolds.manifold import CandidatePoints
 from arrivals.measurement_models.manifolds.phase import PhaseManifold
 from arrivals.measurement_models.manifolds.points import (
     SPACING_OF_ONE,
+    WALK_SHARE,
     cell_centres,
     cosine_squared,
     line_direction,
@@ -23,7 +24,6 @@ from arrivals.measurement_models.manifolds.points import (
 from arrivals.typing import Bool, Float
 
 SPIKE_STD = 0.05  # of the curvature of a plane wave, rad rms of the phases over the array
-WALK_SHARE = 0.1  # of the slab's standard deviation: the default step of the curvature
 
 
 @dataclass(frozen=True, eq=False)

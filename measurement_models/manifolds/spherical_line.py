@@ -15,6 +15,7 @@ from arrivals.measurement_models.manifolds.located import range_estimate
 from arrivals.measurement_models.manifolds.manifold import CandidatePoints
 from arrivals.measurement_models.manifolds.points import (
     SPACING_OF_ONE,
+    WALK_SHARE,
     cell_centres,
     cosine_squared,
     sine_exists,
@@ -24,7 +25,6 @@ from arrivals.typing import Bool, Complex, Float
 
 MIN_SQUARE = 1e-6  # of the distance of a sensor over R
 LIMITS = -0.2, 1.5  # of 1/R over the largest expected
-WALK_SHARE = 0.05  # of the largest 1/R: the default step
 
 
 @dataclass(frozen=True, eq=False)

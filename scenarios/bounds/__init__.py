@@ -4,6 +4,7 @@ from arrivals.scenarios.bounds.delay import band_bound, exact_bound, tone_bound
 from arrivals.scenarios.bounds.detection import exact_detection, network_detection
 from arrivals.scenarios.bounds.signal_strength import rss_bound
 from arrivals.scenarios.bounds.snapshot import line_bound, snapshot_bound
+from arrivals.scenarios.bounds.two_unknowns import range_bound, sphere_bound
 
 __all__ = [
     "band_bound",
@@ -11,7 +12,9 @@ __all__ = [
     "exact_detection",
     "line_bound",
     "network_detection",
+    "range_bound",
     "rss_bound",
     "snapshot_bound",
+    "sphere_bound",
     "tone_bound",
 ]

@@ -25,6 +25,7 @@ from arrivals.scenarios.simulations.moving_emitters import (
     CrossingSources,
     WalkingSources,
 )
+from arrivals.scenarios.simulations.near_field import NearField
 from arrivals.scenarios.simulations.planar_arrays import Cardioids, Circle, Grating
 from arrivals.scenarios.simulations.random_walks import RandomWalks, SwitchingWalks
 from arrivals.scenarios.simulations.rooms import TalkersInRoom
@@ -34,6 +35,7 @@ from arrivals.scenarios.simulations.sampled_source import (
     InterpolationTone,
 )
 from arrivals.scenarios.simulations.signal_strength import RSSTrial, Table1K3, Table1K7
+from arrivals.scenarios.simulations.sources_on_sphere import SourcesOnSphere
 from arrivals.scenarios.simulations.speech import SpeechField, SpeechOfOrderTwo
 from arrivals.scenarios.simulations.swellex96 import TowPastLine
 
@@ -51,6 +53,7 @@ __all__ = [
     "InterpolationTone",
     "MoreSensors",
     "MovingSource",
+    "NearField",
     "NoisySources",
     "OnePairOff",
     "PairsInTurn",
@@ -59,6 +62,7 @@ __all__ = [
     "RandomWalks",
     "SixSources",
     "SixStatic",
+    "SourcesOnSphere",
     "StaticSources",
     "SpeechField",
     "SpeechOfOrderTwo",
