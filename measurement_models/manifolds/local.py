@@ -14,6 +14,8 @@ from arrivals.measurement_models.manifolds.manifold import UNIFORM_STD_OF_CIRCLE
 from arrivals.measurement_models.manifolds.points import PAIRS, SPACING_OF_ONE, PointResponse
 from arrivals.typing import Bool, Complex, Float
 
+HALVES = np.array([0.5, 1.0, 0.5])[:, None, None]  # of the elements 11, 12, 22 in ½ Σ Sᵢⱼ
+
 
 @dataclass(frozen=True, eq=False)
 class LocalManifold(PointResponse):
@@ -31,39 +33,51 @@ class LocalManifold(PointResponse):
     """
 
     @abstractmethod
-    def expansion(self, x: Float) -> tuple[Complex, list[Complex], list[Complex]]:
-        """Return a (..., F, L, M) at points (..., p, L), the d Zᵢ, and the d(d+1)/2 Hᵢⱼ."""
+    def expansion(self, x: Float) -> tuple[Complex, Complex, Complex]:
+        """Return a (..., F, L, M) at points (..., p, L), Z (..., F, d, L, M) and H.
 
-    def slope_change(self, Z: list[Complex], S: list[Float]) -> list[Complex]:
-        """Return ½ Σ Sᵢⱼ ∂Hᵢⱼ/∂xₖ for each k: zero unless a manifold has it."""
-        return []
+        H (..., F, d(d+1)/2, L, M) has the second derivatives 11, 12, 22.
+        """
+
+    def damping_slope(self, Z: Complex, S: Float) -> Complex | float:
+        """Return ½ Σ Sᵢⱼ ∂ₖHᵢⱼ (..., F, d, L, M), S (..., 1, d(d+1)/2, L, 1): zero if left out."""
+        return 0.0
 
     def responses(self, x: Float, covariance: Float) -> Complex:
         """Return the mean responses and their derivatives: (B, F, 1+d+d(d+1)/2, L, M)."""
         a, Z, H = self.expansion(x)
-        d = len(Z)
-        S = [each[..., None, :, None] for each in np.moveaxis(covariance, -2, 0)]
-        second = [Z[i] * Z[j] + h for (i, j), h in zip(PAIRS[d], H, strict=True)]
-        # ⟨a⟩ = a exp(½ Σ Sᵢⱼ (Zᵢ Zⱼ + Hᵢⱼ)),  ∂ₖ ln ⟨a⟩ = Zₖ + Σ Sᵢⱼ Zᵢ Hⱼₖ + ½ Σ Sᵢⱼ ∂ₖHᵢⱼ
+        S, d = covariance[..., None, :, :, None], Z.shape[-3]
+        rows = np.empty((*a.shape[:-2], 1 + d + H.shape[-3], *a.shape[-2:]), dtype=np.complex128)
+        mean, second = rows[..., :1, :, :], rows[..., 1 + d :, :, :]
+        # ∂ᵢⱼ⟨a⟩ = (Zᵢ Zⱼ + Hᵢⱼ) ⟨a⟩,  ⟨a⟩ = a exp(½ Σ Sᵢⱼ (Zᵢ Zⱼ + Hᵢⱼ))
         if d == 1:
-            damping = 0.5 * S[0] * second[0]
-            first = [Z[0] + S[0] * Z[0] * H[0]]
+            np.multiply(Z, Z, out=second)
+            bent = S * Z * H
+            weight = 0.5 * S
         else:
-            damping = 0.5 * (S[0] * second[0] + S[2] * second[2]) + S[1] * second[1]
-            one, two = S[0] * Z[0] + S[1] * Z[1], S[1] * Z[0] + S[2] * Z[1]
-            first = [Z[0] + one * H[0] + two * H[1], Z[1] + one * H[1] + two * H[2]]
-        for each, change in zip(first, self.slope_change(Z, S), strict=False):
-            each += change
-        mean = a * np.exp(damping)
-        rows = np.stack([np.ones_like(mean), *first, *second], axis=-3)
-        rows *= mean[..., None, :, :]
+            np.multiply(Z[..., :1, :, :], Z, out=second[..., :2, :, :])
+            np.multiply(Z[..., 1:, :, :], Z[..., 1:, :, :], out=second[..., 2:, :, :])
+            one, two = (
+                (each * Z).sum(axis=-3, keepdims=True)
+                for each in (S[..., :2, :, :], S[..., 1:, :, :])
+            )
+            bent = one * H[..., :2, :, :] + two * H[..., 1:, :, :]
+            weight = HALVES * S
+        second += H
+        mean[..., 0, :, :] = a * np.exp((weight * second).sum(axis=-3))
+        # ∂ₖ ln ⟨a⟩ = Zₖ + Σ Sᵢⱼ Zᵢ Hⱼₖ + ½ Σ Sᵢⱼ ∂ₖHᵢⱼ
+        slopes = Z + bent
+        slopes += self.damping_slope(Z, S)
+        np.multiply(slopes, mean, out=rows[..., 1 : 1 + d, :, :])
+        second *= mean
         return rows
 
     def at(self, x: Float) -> tuple[Complex, Float]:
         """Return a(x) (F, G, M) of points (p, G), and Σₘ |a|² Re Zᵢ* Zⱼ (F, d(d+1)/2, G)."""
         a, Z, _ = self.expansion(x)
-        Z = [a * each for each in Z]
-        gram = [(Z[i].conj() * Z[j]).real.sum(axis=-1) for i, j in PAIRS[len(Z)]]
+        Z = a[..., None, :, :] * Z
+        pairs = PAIRS[Z.shape[-3]]
+        gram = [(Z[:, i].conj() * Z[:, j]).real.sum(axis=-1) for i, j in pairs]
         return a, np.stack(gram, axis=1)
 
 
@@ -103,19 +117,18 @@ class HorizontalWaves(LocalManifold):
         azimuth = x[..., 0, :] * self.unit[0]
         return np.stack([np.cos(azimuth), np.sin(azimuth), 0 * azimuth], axis=-2)
 
-    def expansion(self, x: Float) -> tuple[Complex, list[Complex], list[Complex]]:
+    def expansion(self, x: Float) -> tuple[Complex, Complex, Complex]:
         """Return the response and its derivatives along the azimuth."""
         n = self.direction(x)[..., :2, :]
-        turned = np.stack([-n[..., 1, :], n[..., 0, :]], axis=-2)
-        k = np.asarray(1j * self.wavenumber)
-        phase = k * (n.swapaxes(-1, -2) @ self.levelled.T)[..., None, :, :]
-        slope = k * (turned.swapaxes(-1, -2) @ self.levelled.T)[..., None, :, :]
-        u = self.unit[0]
-        return np.exp(phase), [np.asarray(u * slope)], [np.asarray(-u * u * phase)]
+        turned = np.stack([n, np.stack([-n[..., 1, :], n[..., 0, :]], axis=-2)], axis=-3)
+        u, paths = self.unit[0], turned.swapaxes(-1, -2) @ self.levelled.T  # (..., 2, L, M)
+        phases: Complex = np.asarray(1j * self.wavenumber[..., None] * paths[..., None, :, :, :])
+        phase, slope = phases[..., :1, :, :], phases[..., 1:, :, :]
+        return np.exp(phase[..., 0, :, :]), u * slope, -u * u * phase
 
-    def slope_change(self, Z: list[Complex], S: list[Float]) -> list[Complex]:
+    def damping_slope(self, Z: Complex, S: Float) -> Complex | float:
         """Return ½ S ∂H = -½ S unit² Z."""
-        return [-0.5 * self.unit[0] ** 2 * S[0] * Z[0]]
+        return np.asarray(-0.5 * self.unit[0] ** 2 * S * Z)
 
     def wrap(self, azimuth: Float) -> Float:
         """Return azimuths in [-π, π)."""

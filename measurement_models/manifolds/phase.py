@@ -173,9 +173,16 @@ class DirectionCosines(PhaseManifold):
         log_measure = float(np.log(np.pi / np.prod(self.unit)))
         return CandidatePoints(uv / self.scale, log_measure, np.zeros(3))
 
+    @cached_property
+    def candidate_cosines(self) -> Float:
+        """Cosines of the candidates, (3, G)."""
+        return self.plane_cosines(self.candidates().points)
+
     def distance(self, x: Float, others: Float) -> Float:
         """Return angles, rad, between (..., 2, L) and (2, G): (..., L, G)."""
-        cosine = self.plane_cosines(x).swapaxes(-1, -2) @ self.plane_cosines(others)
+        is_grid = others is self.candidates().points
+        known = self.candidate_cosines if is_grid else self.plane_cosines(others)
+        cosine = self.plane_cosines(x).swapaxes(-1, -2) @ known
         return np.asarray(np.arccos(sine_limits(cosine)))
 
     def exists(self, x: Float, covariance: Float) -> Bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -78,7 +78,7 @@ class SphericalLine(LocalManifold):
         # t = √(1 - 2puv + p²v²)
         return u, v, np.sqrt(np.maximum(1 - 2 * p * u * v + (p * v) ** 2, MIN_SQUARE))
 
-    def expansion(self, x: Float) -> tuple[Complex, list[Complex], list[Complex]]:
+    def expansion(self, x: Float) -> tuple[Complex, Complex, Complex]:
         """Return the response and its derivatives along sin β and 1/R."""
         u, v, t = self.relative_distance(x)
         p = self.positions[:, 0]
@@ -89,24 +89,22 @@ class SphericalLine(LocalManifold):
         f = (2 * p * u - p * p * v) / (1 + t)
         fu, fv = p / t, -(p * p + f * tv) / (1 + t)
         fvv = -(2 * fv * tv + f * tvv) / (1 + t)
-        # l = ln R/r
-        level = -np.log(t), -tu / t, -tv / t
-        bend = [(ti * tj / t - tij) / t for ti, tj, tij in
-                ((tu, tu, tuu), (tu, tv, tuv), (tv, tv, tvv))]  # fmt: skip
-        gain, change, second = normalized(level, bend)
-        k = 1j * self.wavenumber
-        phases = np.stack(np.broadcast_arrays(f, fu, fv, -fu * tu / t, -fu * tv / t, fvv))
+        phases = np.stack([f, fu, fv, -fu * tu / t, -fu * tv / t, fvv], axis=-3)
         phases -= phases.mean(axis=-1, keepdims=True)
-        f, fu, fv, fuu, fuv, fvv = k * phases[..., None, :, :]
+        # l = ln R/r
+        slopes = np.stack([-tu / t, -tv / t], axis=-3)
+        bends = np.stack([tu * tu - t * tuu, tu * tv - t * tuv, tv * tv - t * tvv], axis=-3)
+        bends /= (t * t)[..., None, :, :]
+        gains = np.concatenate(normalized(-np.log(t), slopes, bends), axis=-3)
+        turns = 1j * self.wavenumber[..., None] * phases[..., None, :, :, :]
+        rows: Complex = np.asarray(self.powers * (gains[..., None, :, :, :] + turns))
+        return np.exp(rows[..., 0, :, :]), rows[..., 1:3, :, :], rows[..., 3:, :, :]
+
+    @cached_property
+    def powers(self) -> Float:
+        """Units of a response and its derivatives, (6, 1, 1)."""
         one, two = self.unit
-        gain, change, second = (each[..., None, :, :] for each in (gain, change, second))
-        Z = [one * (fu + change[0]), two * (fv + change[1])]
-        H = [
-            one * one * (fuu + second[0]),
-            one * two * (fuv + second[1]),
-            two * two * (fvv + second[2]),
-        ]
-        return np.exp(gain + f), Z, H
+        return np.array([1.0, one, two, one * one, one * two, two * two])[:, None, None]
 
     def size(self, x: Float) -> Float:
         """Return the root mean square of R/r over the sensors: (L,)."""
@@ -164,41 +162,35 @@ class SphericalLine(LocalManifold):
         return range_estimate(self.direction(x)[0], self.unit[0], inverse_range, rates, covariance)
 
 
-def normalized(level: tuple[Float, Float, Float], bend: list[Float]) -> tuple[Float, Float, Float]:
+def normalized(level: Float, slopes: Float, bends: Float) -> tuple[Float, Float, Float]:
     """Return log gains, their 2 first and 3 second derivatives, for a mean square of 1.
 
     ln g = l - ½ ln mean exp(2l), over the last axis.
 
     Parameters
     ----------
-    level : tuple of ndarray, shape (..., M)
-        l and its first derivatives.
-    bend : list of ndarray, shape (..., M)
+    level : ndarray, shape (..., L, M)
+        l.
+    slopes : ndarray, shape (..., 2, L, M)
+        First derivatives of l.
+    bends : ndarray, shape (..., 3, L, M)
         Second derivatives 11, 12, 22.
 
     Returns
     -------
-    gain : ndarray, shape (..., M)
-    first : ndarray, shape (2, ..., M)
-    second : ndarray, shape (3, ..., M)
+    gain : ndarray, shape (..., 1, L, M)
+    first : ndarray, shape (..., 2, L, M)
+    second : ndarray, shape (..., 3, L, M)
     """
-    gain, one, two = level
+    gain = level[..., None, :, :]
     weight = np.exp(2 * gain)
     total = weight.sum(axis=-1, keepdims=True)
     weight /= total
-
-    def mean(values: Float) -> Float:
-        return np.asarray((weight * values).sum(axis=-1, keepdims=True))
-
-    m1, m2 = mean(one), mean(two)
-    products = (one, one, m1, m1), (one, two, m1, m2), (two, two, m2, m2)
+    first = slopes - (weight * slopes).sum(axis=-1, keepdims=True)
     # ∂∂ ½ ln Σ exp 2l = ⟨l_ij⟩ + 2 (⟨l_i l_j⟩ - ⟨l_i⟩⟨l_j⟩)
-    second = [
-        each - mean(each) - 2 * (mean(a * b) - ma * mb)
-        for each, (a, b, ma, mb) in zip(bend, products, strict=True)
-    ]
-    size = 0.5 * np.log(total / gain.shape[-1])
-    return gain - size, np.stack([one - m1, two - m2]), np.stack(second)
+    products = first[..., [0, 0, 1], :, :] * first[..., [0, 1, 1], :, :]
+    second = bends - (weight * (bends + 2 * products)).sum(axis=-1, keepdims=True)
+    return gain - 0.5 * np.log(total / gain.shape[-1]), first, second
 
 
 @lru_cache(maxsize=256)

@@ -17,6 +17,7 @@ from arrivals.measurement_models.manifolds.points import SPACING_OF_TWO, sine_li
 from arrivals.typing import Bool, Complex, Float
 
 FEWEST_CANDIDATES = 100
+IDENTITY = np.array([1.0, 0.0, 1.0])[:, None, None]  # elements 11, 12, 22
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,20 +62,20 @@ class TangentPlanes(LocalManifold):
         """Return unit vectors to points (..., 9, L): (..., 3, L)."""
         return x[..., 6:, :]
 
-    def expansion(self, x: Float) -> tuple[Complex, list[Complex], list[Complex]]:
+    def expansion(self, x: Float) -> tuple[Complex, Complex, Complex]:
         """Return the response and its derivatives along the tangents."""
         rows = x.reshape(*x.shape[:-2], 3, 3, x.shape[-1])
         paths = rows.swapaxes(-1, -2) @ self.centred.T  # (..., 3, L, M): of e₁, e₂ and n
-        one, two, n = np.moveaxis(1j * self.wavenumber * paths[..., None, :, :], -4, 0)
-        u = self.unit[0]
+        phases: Complex = np.asarray(1j * self.wavenumber[..., None] * paths[..., None, :, :, :])
+        tangents, phase = phases[..., :2, :, :], phases[..., 2:, :, :]
         # Z = jk u Eᵀp,  H = -jk u² (n·p) I
-        H = -u * u * n
-        return np.exp(n), [u * one, u * two], [H, np.zeros_like(H), H]
+        u = self.unit[0]
+        return np.exp(phase[..., 0, :, :]), u * tangents, -u * u * IDENTITY * phase
 
-    def slope_change(self, Z: list[Complex], S: list[Float]) -> list[Complex]:
+    def damping_slope(self, Z: Complex, S: Float) -> Complex | float:
         """Return ½ Σ Sᵢⱼ ∂Hᵢⱼ = -½ u² tr(S) Z."""
-        share = -0.5 * self.unit[0] ** 2 * (S[0] + S[2])
-        return [share * each for each in Z]
+        trace = S[..., :1, :, :] + S[..., 2:, :, :]
+        return np.asarray(-0.5 * self.unit[0] ** 2 * trace * Z)
 
     def move(self, x: Float, step: Float) -> Float:
         """Return the points after displacements (..., 2, L) along great circles."""
