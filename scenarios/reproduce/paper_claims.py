@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from arrivals.scenarios.reproduce import rooms
+from arrivals.scenarios.reproduce import rooms, sphere
 from arrivals.scenarios.reproduce.ar_kalman import own_claims as own_ar
 from arrivals.scenarios.reproduce.ar_kalman import paper_claims as autoregressive
 from arrivals.scenarios.reproduce.claims import Claim, Verdict
@@ -38,6 +38,7 @@ OWN: tuple[Claim, ...] = (
     *own_rss.CLAIMS,
     *any_array.CLAIMS,
     *rooms.CLAIMS,
+    *sphere.CLAIMS,
     *calibration.CLAIMS,
     *envelope_decisions.CLAIMS,
     *doppler.CLAIMS,

@@ -76,6 +76,13 @@ PAPERS = (
     ),
     Paper("any", "Any array", "no published results", "SVALSE on circles and sparse lines."),
     Paper(
+        "sphere",
+        "Azimuth and elevation",
+        "no published results",
+        "SVALSE with two unknowns a source, on arrays in a plane and in space: two sources that "
+        "cross in azimuth, one over the zenith, and one at the horizon.",
+    ),
+    Paper(
         "rooms",
         "Talkers in rooms",
         "no published results",

@@ -14,7 +14,7 @@ from arrivals.scenarios.base import Scenario, Trial
 from arrivals.scenarios.registry import register
 from arrivals.scenarios.simulations.line_arrays import complex_normal
 from arrivals.scenarios.simulations.planar_arrays import bins
-from arrivals.typing import Float
+from arrivals.typing import Complex, Float
 from arrivals.validation import count, number, one_of
 
 ArrayName = Literal["ura4", "ura8", "uca8", "uca6", "tetra4", "sph12"]
@@ -107,13 +107,21 @@ class SourcesOnSphere(Scenario):
         azimuth_deg, elevation_deg = np.where(on, both, np.nan)
         return (azimuth_deg + 180) % 360 - 180, elevation_deg
 
+    @property
+    def noise(self) -> float:
+        """Variance of the noise of one sensor."""
+        return float(N_SOURCES.get(self.array, 4) * 10 ** (-self.snr_db / 10))
+
+    def amplitudes(self, rng: np.random.Generator) -> Complex:
+        """Draw amplitudes w ~ CN(0, 1) of each bin and snapshot, the first draw of `sample`."""
+        n = N_SOURCES.get(self.array, 4)
+        return complex_normal(rng, (self.n_steps, *self.measurement.shape[:-1], n))
+
     def sample(self, rng: np.random.Generator) -> Trial:
         """Draw one trial; the motion model has 3° a step."""
         azimuth, elevation = map(np.deg2rad, self.directions_deg())
         model = self.measurement
-        # w ~ CN(0, 1) of each bin and snapshot
-        w = complex_normal(rng, (self.n_steps, *model.shape[:-1], azimuth.shape[1]))
-        noise = azimuth.shape[1] * 10 ** (-self.snr_db / 10)
-        z = model.replace(noise=noise).simulate(azimuth, w, rng, elevation)
+        w = self.amplitudes(rng)
+        z = model.replace(noise=self.noise).simulate(azimuth, w, rng, elevation)
         motion = BernoulliVonMises(sigma_doa=np.deg2rad(3.0))
         return Trial(z, azimuth, model, motion, elevation=elevation)
