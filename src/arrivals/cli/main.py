@@ -134,6 +134,10 @@ def _add_track(commands: Any) -> None:
     option("--reduce", action="store_true",
            help="replace the complex samples of a step by eight a channel, of the same "
                 "covariance")  # fmt: skip
+    option("--unknowns", choices=("sphere", "range"),
+           help="estimate azimuth and elevation, or direction and range")  # fmt: skip
+    option("--nearest", type=float, metavar="M",
+           help="distance of the nearest source, m, with --unknowns range")  # fmt: skip
     option(
         "--snr",
         type=float,

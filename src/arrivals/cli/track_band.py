@@ -19,7 +19,7 @@ def track_band(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -> N
     """Track by a tracker of single real samples, from a recording or a stream."""
     refuse(
         arguments,
-        ("frequency", "frequencies", "center", "reduce", "follow", "window"),
+        ("frequency", "frequencies", "center", "reduce", "follow", "window", "unknowns", "nearest"),
         "requires snapshots, not a tracker of real samples",
     )
     if arguments.snapshots not in (None, 1):

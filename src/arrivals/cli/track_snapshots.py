@@ -13,11 +13,12 @@ import numpy as np
 from arrivals.cli.models import n_stream_channels, printed_warnings, require_speed
 from arrivals.cli.outputs import Bar, draw, live_output, refuse, write_table
 from arrivals.cli.reading import read_recording
-from arrivals.measurement_models import SensorArray
+from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.measurements import is_missing
 from arrivals.recordings.check import warn_of_faults
 from arrivals.recordings.choice import Choice, MeanSpectrum, TrackOptions, choose
 from arrivals.recordings.choice.assembly import assembled
+from arrivals.recordings.choice.unknowns import unknowns_in_words
 from arrivals.recordings.formats.iq import complex_frames
 from arrivals.recordings.framing import frame_stream
 from arrivals.recordings.step_snapshots import reduced_snapshots, strongest_candidates
@@ -39,7 +40,7 @@ def track_snapshots(arguments: argparse.Namespace, array: SensorArray, bar: Bar)
     options = TrackOptions(
         arguments.tracker, frequencies, arguments.band, arguments.window, arguments.hop,
         arguments.snapshots, dict(arguments.set), arguments.reduce,
-        arguments.follow,
+        arguments.follow, arguments.unknowns or "azimuth", arguments.nearest,
     )  # fmt: skip
     track = _track_stream if arguments.file == "-" else _track_file
     track(arguments, array, options, bar)
@@ -61,26 +62,29 @@ def _track_file(
         steps = RecordedSteps(recording, choice)
         warn_of_faults(recording, min(choice.frequencies))
     time = steps.time if np.isfinite(steps.time).all() else None
-    announced = map(_announcement(choice, options), steps)
+    announced = map(_announcement(choice, options, measurement), steps)
     result = tracker.run(bar(announced, desc=choice.tracker, total=len(steps)))
     result = result if time is None else result.at(time)
     write_table(result, arguments.out)
     draw(arguments.plot, result, snapshots=steps, measurement=measurement, time=time)
 
 
-def _announcement(choice: Choice, options: TrackOptions) -> Callable[[Complex], Complex]:
-    """Return an identity that prints the choice, if there was one, at the first valid snapshot.
+def _announcement(
+    choice: Choice, options: TrackOptions, measurement: ArraySnapshot
+) -> Callable[[Complex], Complex]:
+    """Return an identity that prints what was chosen at the first valid snapshot.
 
     If no snapshot is valid, the error is then the only line on standard error.
     """
     complete = options.tracker and options.has_frequencies and options.snapshots
-    is_due = bool(choice.reason and not complete)
+    lines = [str(choice)] if choice.reason and not complete else []
+    lines += [unknowns_in_words(measurement)] if choice.unknowns != "azimuth" else []
 
     def announce(z: Complex) -> Complex:
-        nonlocal is_due
-        if is_due and not is_missing(z):
-            is_due = False
-            print(f"arrivals: {choice}", file=sys.stderr)
+        if lines and not is_missing(z):
+            for line in lines:
+                print(f"arrivals: {line}", file=sys.stderr)
+            lines.clear()
         return z
 
     return announce
@@ -96,13 +100,13 @@ def _track_stream(
         raise ValueError(f"--center requires complex samples: pass --dtype; got {dtype}")
     with printed_warnings():
         choice, source = _stream_choice(source, dtype, arguments.rate, array, options, n_channels)
-        _, tracker = assembled(array, choice, arguments.rate)
+        measurement, tracker = assembled(array, choice, arguments.rate)
     frequencies = followed(choice, arguments.rate, choice.window or 1)
     frames = frame_stream(
         source, n_channels, frequencies, n_snapshots=choice.n_snapshots, dtype=dtype,
         rate=arguments.rate, window=choice.window, hop=choice.hop,
     )  # fmt: skip
-    announce = _announcement(choice, options)
+    announce = _announcement(choice, options, measurement)
     steps = ((time, announce(_completed(array.select(z), choice))) for time, z in frames)
     with live_output(arguments.out) as write:
         track_live(tracker, bar(steps, desc=choice.tracker), write)

@@ -62,7 +62,7 @@ def track_sources(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -
         raise ValueError("pass --frequency, or --band, of the separated sources")
     refuse(
         arguments,
-        ("frequencies", "center", "reduce", "follow"),
+        ("frequencies", "center", "reduce", "follow", "unknowns", "nearest"),
         "requires another tracker: this one takes --frequency",
     )
     model = model_at(array, arguments, [arguments.frequency])

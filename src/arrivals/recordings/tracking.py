@@ -31,6 +31,7 @@ from arrivals.trackers import find
 from arrivals.trackers.run import Run
 from arrivals.typing import Complex
 
+TWO = ("unknowns", "nearest")  # arguments of measurement models with two unknowns a source
 BLOCK = 2**20  # samples, or complex numbers of the steps, that are processed together: 16 MB
 
 
@@ -70,8 +71,9 @@ def track(
     snapshots : int, optional
         Windows in a step.
     **more : object
-        `rate`, `variable`, `transpose`, `max_bytes` and `format` of `read`; `reduce` and `follow`
-        as in `TrackOptions`; other names are parameters of the tracker, as in `set_params`.
+        `rate`, `variable`, `transpose`, `max_bytes` and `format` of `read`; `reduce`, `follow`,
+        `unknowns` and `nearest` as in `TrackOptions`, such as `unknowns="sphere"` for azimuth and
+        elevation; other names are parameters of the tracker, as in `set_params`.
 
     Returns
     -------
@@ -96,7 +98,7 @@ def track(
     from threadpoolctl import threadpool_limits
 
     reading = {name: more.pop(name) for name in READING if name in more}
-    given = {name: more.pop(name) for name in ("reduce", "follow") if name in more}
+    given = {name: more.pop(name) for name in ("reduce", "follow", *TWO) if name in more}
     options = TrackOptions(tracker, frequencies, band, window, hop, snapshots, more, **given)
     recording = _recording(recording, array, reading)
     if band is not None and takes_samples(tracker):
@@ -126,8 +128,8 @@ def _track_band(recording: Recording, options: TrackOptions) -> Run:
     array, rate = _array_of(recording), recording.rate
     if recording.is_narrowband or rate is None or options.band is None:
         raise ValueError("a band requires real samples with a rate")
-    for name in ("window", "snapshots"):
-        if getattr(options, name) is not None:
+    for name in ("window", "snapshots", *TWO):
+        if getattr(options, name) not in (None, "azimuth"):
             raise ValueError(f"{name} must be left out for {options.tracker!r}, of real samples")
     measurement = band_samples(array, rate, options.band)
     made = make_tracker(options.tracker or "", measurement, options.settings)

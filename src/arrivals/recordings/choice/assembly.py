@@ -7,12 +7,17 @@ from collections.abc import Mapping, Sequence
 from typing import Any, get_type_hints
 
 from arrivals.measurement_models import ArraySamples, ArraySnapshot, SensorArray
-from arrivals.recordings.choice.options import Choice
+from arrivals.measurement_models.manifolds.two_unknowns import Unknowns
+from arrivals.recordings.choice.options import NARROWBAND, Choice
 from arrivals.trackers import Tracker, find
 
 
 def measurement_at(
-    array: SensorArray, frequencies: Sequence[float], n_snapshots: int = 1
+    array: SensorArray,
+    frequencies: Sequence[float],
+    n_snapshots: int = 1,
+    unknowns: Unknowns = "azimuth",
+    nearest: float | None = None,
 ) -> ArraySnapshot:
     """Return the measurement model at frequencies; a line at one frequency must be unambiguous.
 
@@ -24,6 +29,10 @@ def measurement_at(
         Hz.
     n_snapshots : int
         Snapshots in a step.
+    unknowns : {"azimuth", "sphere", "range"}
+        Unknowns of a source, as in `ArraySnapshot`.
+    nearest : float, optional
+        Distance of the nearest source, m.
 
     Returns
     -------
@@ -32,7 +41,8 @@ def measurement_at(
     Raises
     ------
     ValueError
-        If the one frequency is above the alias limit of a line.
+        If the one frequency is above the alias limit of a line, or the array cannot resolve the
+        unknowns.
 
     Examples
     --------
@@ -47,7 +57,9 @@ def measurement_at(
             f"{array.wavelength(1.0) / limit:g} Hz, at which its grid spacing is half the "
             f"wavelength; got {frequencies[0]:g} Hz. Several, frequencies (--frequencies), may"
         )
-    return ArraySnapshot(array, wavelengths, n_snapshots=n_snapshots)
+    return ArraySnapshot(
+        array, wavelengths, n_snapshots=n_snapshots, unknowns=unknowns, nearest=nearest
+    )
 
 
 def takes_samples(name: str | None) -> bool:
@@ -159,9 +171,16 @@ def assembled(
             f"the tracker {choice.tracker!r} takes real samples of a band: pass band (--band)"
         )
     n_rows = choice.n_rows(array.n_sensors)
-    measurement = measurement_at(array, choice.frequencies, n_rows)
+    two = choice.unknowns, choice.nearest
+    measurement = measurement_at(array, choice.frequencies, n_rows, *two)
     settings = dict(choice.settings)
     hop = choice.hop or choice.window
     if hop and rate and "step_duration" in inspect.signature(find(choice.tracker)).parameters:
         settings = {"step_duration": hop * choice.n_snapshots / rate} | settings
-    return measurement, make_tracker(choice.tracker, measurement, settings)
+    tracker = make_tracker(choice.tracker, measurement, settings)
+    if choice.unknowns != "azimuth" and getattr(tracker.estimate, "n_unknowns", 1) == 1:
+        raise ValueError(
+            f"the tracker {choice.tracker!r} estimates one angle a source; unknowns "
+            f"{choice.unknowns!r} (--unknowns) requires another, such as {NARROWBAND}"
+        )
+    return measurement, tracker

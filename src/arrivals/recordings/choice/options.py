@@ -6,8 +6,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from arrivals.measurement_models.manifolds.two_unknowns import Unknowns
 from arrivals.recordings.step_snapshots import reduced_number
 from arrivals.validation import count, items, positive
+
+WIDEBAND, NARROWBAND = "wideband_mixture", "svalse"
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +35,11 @@ class TrackOptions:
     follow : float, optional
         Largest shift, Hz, of tones at the given frequencies: in each step they are where the power
         of all channels is largest.
+    unknowns : {"azimuth", "sphere", "range"}
+        Unknowns of a source, as in `ArraySnapshot`: a direction in the plane of the array; azimuth
+        and elevation; direction and range.
+    nearest : float, optional
+        Distance of the nearest source, m, as in `ArraySnapshot`; only with ranges.
 
     Examples
     --------
@@ -48,6 +56,8 @@ class TrackOptions:
     settings: Mapping[str, Any] = field(default_factory=dict)
     reduce: bool = False
     follow: float | None = None
+    unknowns: Unknowns = "azimuth"
+    nearest: float | None = None
 
     def __post_init__(self) -> None:
         if self.frequencies is not None and self.band is not None:
@@ -99,6 +109,10 @@ class Choice:
         True if the snapshots of a step are replaced by eight a channel.
     follow : float, optional
         Largest shift of the frequencies, Hz, as in `TrackOptions`.
+    unknowns : {"azimuth", "sphere", "range"}
+        Unknowns of a source, as in `TrackOptions`.
+    nearest : float, optional
+        Distance of the nearest source, m.
 
     Examples
     --------
@@ -117,6 +131,8 @@ class Choice:
     settings: Mapping[str, Any] = field(default_factory=dict)
     reduce: bool = False
     follow: float | None = None
+    unknowns: Unknowns = "azimuth"
+    nearest: float | None = None
 
     def n_rows(self, n_sensors: int) -> int:
         """Return the number of snapshots that a tracker of an array gets in a step.
@@ -138,6 +154,8 @@ class Choice:
         words += [f"--{name} {value}" for name, value in framing.items() if value is not None]
         words += ["--reduce"] if self.reduce else []
         words += [f"--follow {self.follow:g}"] if self.follow is not None else []
+        words += [f"--unknowns {self.unknowns}"] if self.unknowns != "azimuth" else []
+        words += [f"--nearest {self.nearest:g}"] if self.nearest is not None else []
         words += [f"--set {name}={_text(value)}" for name, value in self.settings.items()]
         return f"{self.reason}: {' '.join(words)}"
 

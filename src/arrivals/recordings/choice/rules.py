@@ -11,14 +11,13 @@ import numpy as np
 
 from arrivals.measurement_models import SensorArray
 from arrivals.recordings.choice.limits import SPEECH_STEP_S, BandLimits, power_of_two
-from arrivals.recordings.choice.options import Choice, TrackOptions
+from arrivals.recordings.choice.options import NARROWBAND, WIDEBAND, Choice, TrackOptions
 from arrivals.recordings.choice.plausibility import implausible_size
 from arrivals.recordings.choice.spectrum import MeanSpectrum
 from arrivals.recordings.framing import frequencies_in
 from arrivals.recordings.narrowband import default_window
 from arrivals.typing import Float
 
-WIDEBAND, NARROWBAND = "wideband_mixture", "svalse"
 N_SNAPSHOTS = 4  # half-overlapping windows in a step of wideband sources below speech
 LINE_SNAPSHOTS, LINE_WINDOWS = 2, 4  # in a step of lines; their length in default windows
 NEIGHBOURS = 4  # bins of a Hann window that count as one
@@ -68,8 +67,8 @@ def choose(
     - with lines are tracked at these by `svalse`, 2 long windows a step;
     - without, by `wideband_mixture` at all bins of `BandLimits`: windows of 32 ms, every 16 ms,
       steps of 64 ms;
-    - below the frequencies of speech by `svalse` at all bins, in windows of three periods of the
-      lowest.
+    - below the frequencies of speech, and with two unknowns a source, by `svalse` at all bins, in
+      windows of three periods of the lowest, or of 32 ms.
 
     `svalse` gets settings for recorded data then: snapshots of a step and neighbouring bins are
     tempered, weak sources are left out, and deviations from plane waves count as noise.
@@ -86,6 +85,7 @@ def choose(
     """
     options = TrackOptions() if options is None else options
     choice = _choice(array, rate, spectrum, options, n_samples)
+    choice = replace(choice, unknowns=options.unknowns, nearest=options.nearest)
     limits = None
     if rate is not None and spectrum is not None and not options.has_frequencies:
         limits = BandLimits.of(array, rate)
@@ -234,6 +234,7 @@ def _of_band(limits: BandLimits, rate: float, options: TrackOptions) -> Choice:
     band = (float(f"{limits.low:.6g}"), float(f"{limits.high:.6g}"))
     frequencies = tuple(frequencies_in(band, rate, window))
     is_speech = limits.has_speech and len(frequencies) >= LEAST_BINS
+    is_speech &= options.unknowns == "azimuth"
     tracker = options.tracker or (WIDEBAND if is_speech else NARROWBAND)
     reason = f"wideband sources, {len(frequencies)} bins"
     return Choice(reason, tracker, frequencies, band, *_frames(limits, rate, options, tracker))
