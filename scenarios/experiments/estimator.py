@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator
 
+from arrivals.scenarios.metrics.distances import Distance
 from arrivals.scenarios.metrics.gospa import mean_gospa
 from arrivals.trackers import Run, Tracker
 from arrivals.typing import Float
@@ -28,7 +29,8 @@ class TrackerEstimator(BaseEstimator):  # type: ignore[misc]  # scikit-learn has
     Notes
     -----
     A sample is a sequence of measurements, (n_steps, n_sensors), its target the true directions,
-    (n_steps, n_sources), rad, NaN for inactive sources. `fit` only checks the parameters.
+    (n_steps, n_sources), rad, NaN for inactive sources; azimuths and elevations,
+    (n_steps, n_sources, 2), for a tracker of both. `fit` only checks the parameters.
 
     Examples
     --------
@@ -64,15 +66,22 @@ class TrackerEstimator(BaseEstimator):  # type: ignore[misc]  # scikit-learn has
         return self.tracker.run_batch([np.asarray(sequence) for sequence in X])
 
     def predict(self, X: Sequence[ArrayLike]) -> list[Float]:
-        """Return the estimated directions, rad, (n_steps, n_slots) for each sequence."""
-        return [run.fields["doa"] for run in self.runs(X)]
+        """Return the estimated directions, rad, (n_steps, n_slots[, 2]) for each sequence."""
+        return [_directions(run) for run in self.runs(X)]
 
     def score(self, X: Sequence[ArrayLike], y: Sequence[ArrayLike]) -> float:
         """Return minus the mean GOSPA, degrees, over steps and sequences: larger is better."""
         planar = getattr(getattr(self.tracker, "measurement", None), "array", None)
         period = 360.0 if planar is not None and planar.dim > 1 else None
-        scores = [
-            mean_gospa(np.rad2deg(truth), np.rad2deg(estimate), c=self.c_deg_, period=period).total
-            for truth, estimate in zip(y, self.predict(X), strict=True)
-        ]
+        scores = []
+        for truth, estimate in zip(y, self.predict(X), strict=True):
+            distance: Distance = "great_circle" if estimate.ndim == 3 else "euclidean"
+            degrees = np.rad2deg(truth), np.rad2deg(estimate)
+            one = mean_gospa(*degrees, c=self.c_deg_, period=period, distance=distance)
+            scores.append(one.total)
         return -float(np.mean(scores))
+
+
+def _directions(run: Run) -> Float:
+    doa = run.fields["doa"]
+    return np.stack([doa, run.elevation], axis=-1) if "elevation" in run.fields else doa

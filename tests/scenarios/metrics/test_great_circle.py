@@ -8,12 +8,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
-from two_unknowns import range_estimate, run_of, sphere_estimate
+from two_unknowns import GivenEstimates, range_estimate, run_of, sphere_estimate
 
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.measurement_models.arrays.sphere import azimuth_elevation, unit_vectors
 from arrivals.motion_models import BernoulliVonMises
 from arrivals.scenarios import Trial, gospa, mean_gospa, mean_rmse, ospa, rmse
+from arrivals.scenarios.experiments.estimator import TrackerEstimator
 from arrivals.scenarios.experiments.monte_carlo import monte_carlo
 from arrivals.scenarios.metrics import METRICS, RANGE_METRICS, label_switches, matches
 from arrivals.scenarios.metrics.distances import distances, tangent_errors
@@ -62,10 +63,12 @@ def test_metrics_on_the_horizon_are_those_of_the_circle(
     circle = gospa(truth, estimate, c=30, period=360)
     assert gospa(flat_truth, flat, c=30, **SPHERE).total == pytest.approx(circle.total, abs=1e-9)
     pairs = matches(flat_truth[None], flat[None], 30, **SPHERE)
-    expected = matches(truth[None], estimate[None], 30, 360)
-    np.testing.assert_array_equal(pairs.slot, expected.slot)
-    np.testing.assert_allclose(pairs.error[:, 1], expected.error, atol=1e-9)
+    assert np.abs(pairs.error[:, 1]).sum() == pytest.approx(circle.distance, abs=1e-9)
     np.testing.assert_allclose(pairs.error[:, 0], 0, atol=1e-9)
+    error = tangent_errors(flat_truth[:, None], flat, 360.0)[..., 1]
+    wrapped = (estimate - truth[:, None] + 180) % 360 - 180
+    np.testing.assert_allclose(np.cos(np.deg2rad(error - wrapped)), 1)  # +180 is -180
+    np.testing.assert_allclose(np.abs(error), np.abs(wrapped), atol=1e-9)
 
 
 @given(SEEDS)
@@ -208,3 +211,14 @@ def test_labels_that_change_along_a_track_on_the_sphere_are_counted() -> None:
     pairs = matches(truth, estimate, 5, **SPHERE)
     assert len(pairs.step) == 3
     assert label_switches(pairs, [[4], [4], [5]]) == 1
+
+
+def test_estimator_scores_azimuth_and_elevation_together() -> None:
+    tracker = GivenEstimates(sphere_estimate(90, 85), sphere_estimate(0, 88), kind=SphereEstimate)
+    tracker.measurement = MODEL  # type: ignore[attr-defined]
+    truth = np.deg2rad([[[0.0, 85.0]], [[0.0, 85.0]]])
+    apart = float(distances([[0, 85]], [[90, 85]], 360, "great_circle")[0, 0])
+    estimator = TrackerEstimator(tracker).fit([])
+    with pytest.raises(ValueError, match="must have the same dimension; got 1 and 2"):
+        estimator.score([[0, 1]], [truth[..., 0]])
+    assert estimator.score([[0, 1]], [truth]) == pytest.approx(-(apart + 3) / 2)
