@@ -224,7 +224,7 @@ def music_speed(n_snapshots: int = 50) -> None:
 
     def ours() -> Float:
         vectors = np.linalg.eigh(y.T @ y.conj() / n_snapshots)[1][:, ::-1]
-        return np.sort(search.directions(Subspaces(vectors[:, :2], vectors[:, 2:])))
+        return np.sort(search.directions(Subspaces(vectors[:, :2], vectors[:, 2:]))[0])
 
     def step() -> None:
         tracker.predict()

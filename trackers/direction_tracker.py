@@ -14,11 +14,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.direction_measurement import DirectionMeasurement
+from arrivals.measurement_models.manifolds.manifold import UNIFORM_STD_OF_CIRCLE
 from arrivals.measurements import rows
 from arrivals.trackers.base import Tracker
+from arrivals.trackers.direction_estimates import SphereEstimate
 from arrivals.trackers.estimates import DirectionEstimate
 from arrivals.trackers.run import Run, RunRecorder
-from arrivals.typing import Bool, Float, Int
+from arrivals.typing import Bool, Complex, Float, Int
 from arrivals.validation import positive
 
 ENDED: Any = object()  # in place of a measurement after the end of a shorter sequence
@@ -203,6 +205,44 @@ class DirectionTracker(Tracker):
         index = np.arange(len(values[:n]))
         blocks[index, :, index] = np.nan_to_num(covariance[:n], posinf=np.inf)
         self.P = blocks.reshape(n * d, n * d)
+
+    def report_directions(
+        self,
+        directions: Float,
+        covariance: Float | None = None,
+        existence: Float | None = None,
+        amplitude: Complex | None = None,
+        label: Int | None = None,
+    ) -> None:
+        """Make directions of one or two unknowns the present estimate, and set `x` and `P`.
+
+        Parameters
+        ----------
+        directions : ndarray, shape (1, n_sources) or (2, n_sources)
+            Directions, or azimuths and elevations, rad.
+        covariance : ndarray, shape (n_sources, n_unknowns, n_unknowns), optional
+            Variances, or covariances in the tangent plane as in `SphereEstimate`; NaN if None.
+        existence, amplitude, label : ndarray, shape (n_sources,), optional
+            As in `report`.
+        """
+        doa, d = directions[0], len(directions)
+        std = None
+        if covariance is not None:
+            std = np.sqrt(covariance[:, -1, -1])
+        if d > 1 and std is not None:
+            with np.errstate(divide="ignore"):
+                std = np.minimum(std / np.cos(directions[1]), UNIFORM_STD_OF_CIRCLE)
+        self.report(doa, std, existence, amplitude, label)
+        if d > 1:
+            unknown = np.full((len(doa), d, d), np.nan)
+            fields = {each: getattr(self._estimate, each) for each in DirectionEstimate.per_source}
+            self.report_estimate(
+                SphereEstimate(
+                    **fields,
+                    elevation=directions[1],
+                    covariance=unknown if covariance is None else covariance,
+                )
+            )
 
 
 class BatchDirectionTracker(DirectionTracker):

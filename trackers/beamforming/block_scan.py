@@ -10,25 +10,22 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.arrays.noise_coherence import NoiseCoherence
-from arrivals.trackers.beamforming.spectrum import mean_beam_power, scan_directions
+from arrivals.trackers.beamforming.scan_grid import ScanGrid
+from arrivals.trackers.beamforming.spectrum import mean_beam_power
 from arrivals.typing import Bool, Complex, Float
 
 TINY = np.finfo(float).tiny
 
 
 class ScanResponses(NamedTuple):
-    """Responses A, (n_nuisance, n_bins, n_sensors, n_directions), on a grid, and their ‖a‖².
+    """Responses A, (n_nuisance, n_bins, n_sensors, n_directions), on a grid, and their ‖a‖²."""
 
-    They are whitened where the noise is coherent.
-    """
-
-    doa_grid: Float
     A: Complex
     norm: Float
 
 
 def has_plain_response(model: ArraySnapshot) -> bool:
-    """Return True if the scan has one bin of isotropic sensors in white noise, no second unknown.
+    """Return True if the scan is of azimuth, with one bin of isotropic sensors in white noise.
 
     Examples
     --------
@@ -38,7 +35,8 @@ def has_plain_response(model: ArraySnapshot) -> bool:
     (True, False)
     """
     return (
-        model.n_bins == 1
+        model.unknowns == "azimuth"
+        and model.n_bins == 1
         and model.response is None
         and model.slowness is None
         and model.elevation is None
@@ -46,8 +44,25 @@ def has_plain_response(model: ArraySnapshot) -> bool:
     )
 
 
-def whitened_responses(model: ArraySnapshot, doa: Float) -> Complex:
-    """Return responses (n_nuisance, n_bins, n_sensors, n), whitened where noise is coherent.
+def plane_wave_responses(model: ArraySnapshot, directions: Float) -> Complex:
+    """Return responses (n_nuisance, n_bins, n_sensors, n) to directions (n,) or (n_unknowns, n).
+
+    Examples
+    --------
+    >>> from arrivals.measurement_models import SensorArray
+    >>> model = ArraySnapshot(SensorArray.uca(5, 0.4), [1.0, 1.2])
+    >>> plane_wave_responses(model, np.zeros(3)).shape
+    (1, 2, 5, 3)
+    """
+    doa, *others = np.atleast_2d(directions)
+    if not others:
+        return model.waves.steering(doa)
+    a = model.steering_vector(doa, *others).reshape(len(doa), model.n_bins, model.array.n_sensors)
+    return np.moveaxis(a, 0, -1)[None]
+
+
+def whitened_responses(model: ArraySnapshot, directions: Float) -> Complex:
+    """Return `plane_wave_responses`, whitened where noise is coherent.
 
     Examples
     --------
@@ -56,7 +71,7 @@ def whitened_responses(model: ArraySnapshot, doa: Float) -> Complex:
     >>> whitened_responses(model, np.zeros(3)).shape
     (1, 1, 5, 3)
     """
-    A = model.waves.steering(doa)
+    A = plane_wave_responses(model, directions)
     return A if model.coherence is None else np.asarray(model.whitening() @ A)
 
 
@@ -77,34 +92,54 @@ def whitened_covariance(model: ArraySnapshot, R: Complex) -> Complex:
 
 
 @lru_cache(maxsize=2)  # models are immutable; the responses of a grid can be large
-def scan_responses(model: ArraySnapshot, n: int) -> ScanResponses:
-    """Return the responses of a model on n scan directions, cached and read-only.
+def scan_responses(model: ArraySnapshot, grid: ScanGrid, *, whitened: bool = True) -> ScanResponses:
+    """Return the responses of a model on a grid, cached and read-only.
 
     Parameters
     ----------
     model : ArraySnapshot
         Any array, bins and second unknown.
-    n : int
-        Number of directions, as in `scan_directions`.
+    grid : ScanGrid
+        Directions.
+    whitened : bool
+        True for responses that are whitened where the noise is coherent.
 
     Returns
     -------
     ScanResponses
-        Grid, rad, responses and norms (n_nuisance, n_bins, n_directions).
+        Responses and norms (n_nuisance, n_bins, n_directions).
 
     Examples
     --------
     >>> from arrivals.measurement_models import SensorArray
-    >>> scan = scan_responses(ArraySnapshot(SensorArray.uca(5, 0.4), [1.0, 1.2]), 90)
+    >>> from arrivals.trackers.beamforming.scan_grid import scan_grid
+    >>> model = ArraySnapshot(SensorArray.uca(5, 0.4), [1.0, 1.2])
+    >>> scan = scan_responses(model, scan_grid(model, 90))
     >>> scan.A.shape, scan.norm.shape
     ((1, 2, 5, 90), (1, 2, 90))
     """
-    doa_grid = scan_directions(model.array, n)
-    A = whitened_responses(model, doa_grid)
-    scan = ScanResponses(doa_grid, A, (A.real**2 + A.imag**2).sum(axis=2))
+    A = (whitened_responses if whitened else plane_wave_responses)(model, grid.directions)
+    scan = ScanResponses(A, (A.real**2 + A.imag**2).sum(axis=2))
     for shared in scan:
         shared.setflags(write=False)
     return scan
+
+
+@lru_cache(maxsize=2)
+def scan_rows(model: ArraySnapshot, grid: ScanGrid) -> Complex:
+    """Return rows a of a model of one snapshot on a grid, (n_directions, n_sensors), cached.
+
+    Examples
+    --------
+    >>> from arrivals.measurement_models import SensorArray
+    >>> from arrivals.trackers.beamforming.scan_grid import scan_grid
+    >>> model = ArraySnapshot(SensorArray.uca(5, 0.4), 1.0)
+    >>> scan_rows(model, scan_grid(model, 90)).shape
+    (90, 5)
+    """
+    A = model.steering_vector(*grid.directions)
+    A.setflags(write=False)
+    return A
 
 
 def part_in_use(model: ArraySnapshot, sensors: Bool, bins: Bool | None) -> ArraySnapshot:
@@ -140,7 +175,7 @@ def _part(model: ArraySnapshot, sensors: bytes, bins: bytes) -> ArraySnapshot:
     )
 
 
-def root_mean_amplitudes(model: ArraySnapshot, doa: Float, Y: Complex) -> Complex:
+def root_mean_amplitudes(model: ArraySnapshot, directions: Float, Y: Complex) -> Complex:
     """Return amplitudes of plane waves: the root of the mean power over bins and snapshots.
 
     The least-squares fit of all waves to each snapshot, each wave at the slowness or elevation of
@@ -150,7 +185,7 @@ def root_mean_amplitudes(model: ArraySnapshot, doa: Float, Y: Complex) -> Comple
     ----------
     model : ArraySnapshot
         Model of the snapshots.
-    doa : ndarray, shape (n_sources,)
+    directions : ndarray, shape (n_sources,) or (n_unknowns, n_sources)
         Directions, rad.
     Y : ndarray, shape (n_bins, n_sensors, n_snapshots)
         Snapshots, NaN where a sensor is missing.
@@ -168,11 +203,11 @@ def root_mean_amplitudes(model: ArraySnapshot, doa: Float, Y: Complex) -> Comple
     >>> root_mean_amplitudes(model, np.array([0.3]), Y).real.round(6)
     array([3.])
     """
-    if len(doa) == 0:
+    if directions.size == 0:
         return np.zeros(0, dtype=np.complex128)
     valid = ~np.isnan(Y)
     y = np.where(valid, Y, 0)
-    A = model.waves.steering(doa)
+    A = plane_wave_responses(model, directions)
     A = A[0] if len(A) == 1 else strongest(A, [mean_beam_power(a[None], Y) for a in A])
     AH = np.swapaxes(A.conj(), 1, 2)
     if valid.all():  # normal equations of a bin, (n_bins, K, K)

@@ -6,15 +6,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
-from arrivals.trackers.beamforming.scan_ends import scan_is_joined
-from arrivals.trackers.beamforming.spectrum import (
-    bartlett_power,
-    find_peaks,
-    mean_beam_power,
-    refine_peaks,
-    scan_directions,
+from arrivals.trackers.beamforming.block_scan import (
+    plane_wave_responses,
+    scan_responses,
+    scan_rows,
 )
+from arrivals.trackers.beamforming.scan_ends import scan_is_joined
+from arrivals.trackers.beamforming.scan_grid import (
+    ScanGrid,
+    log_level,
+    number_of_directions,
+    scan_grid,
+)
+from arrivals.trackers.beamforming.spectrum import bartlett_power, mean_beam_power
 from arrivals.trackers.direction_tracker import DirectionTracker, warn_of_ambiguity
+from arrivals.trackers.kinds_of_estimates import kind_of_estimate
 from arrivals.trackers.registry import register
 from arrivals.typing import Bool, Complex, Float
 from arrivals.validation import count, instance, no_control, positive, time_step
@@ -67,12 +73,12 @@ class CBF(DirectionTracker):
         self,
         measurement: ArraySnapshot,
         *,
-        n_directions: int = 361,
+        n_directions: int | None = None,
         threshold_db: float = 10.0,
         max_sources: int | None = None,
     ) -> None:
         self.measurement = instance("measurement", measurement, ArraySnapshot)
-        self.n_directions = count("n_directions", n_directions, 3, 100_000)
+        self.n_directions = number_of_directions(n_directions)
         self.threshold_db = positive("threshold_db", threshold_db)
         self.max_sources = max_sources
         if max_sources is not None:
@@ -82,9 +88,23 @@ class CBF(DirectionTracker):
 
     def reset(self) -> None:
         """Return to the state after construction: no spectrum, no direction."""
-        self.doa_grid = scan_directions(self.measurement.array, self.n_directions)
-        self.power = np.full(self.n_directions, np.nan)
-        self.report([])
+        self._discard_spectrum()
+
+    def _discard_spectrum(self) -> None:
+        name = type(self).__name__
+        self.estimate_kind = kind_of_estimate(self.measurement, name, "azimuth", "sphere")
+        self.power = np.full(len(self.doa_grid), np.nan)
+        self.report_none()
+
+    @property
+    def grid(self) -> ScanGrid:
+        """Scan directions."""
+        return scan_grid(self.measurement, self.n_directions)
+
+    @property
+    def doa_grid(self) -> Float:
+        """Scan directions, on the sphere their azimuths, rad, (n_directions,)."""
+        return self.grid.doa
 
     @property
     def n_slots(self) -> int:
@@ -95,21 +115,25 @@ class CBF(DirectionTracker):
         """Discard the spectrum: steps are independent."""
         time_step(dt)
         no_control(u)
-        self.power = np.full(self.n_directions, np.nan)
-        self.report_none()
+        self._discard_spectrum()
 
     def update(self, z: ArrayLike | None) -> None:
         """Report the peaks of one measurement; missing sensors are left out."""
         z = self.measurement.snapshot(z)
         if np.isnan(z).all():
             return
-        array = self.measurement.array
-        self.doa_grid = scan_directions(array, self.n_directions)
-        self.power = self._scan(z)
-        peaks = find_peaks(self.power, circular=array.dim > 1, joined=self._has_joined_ends(z))
-        high = self.power[peaks] > self.power.max() * 10 ** (-self.threshold_db / 10)
-        doa = refine_peaks(self.doa_grid, self.power, peaks[high][: self.n_slots])
-        self.report(doa, amplitude=self._amplitude(doa, z))
+        self.add_data(z)
+        self.power = self._power_at(None, z)
+        joined = self._has_joined_ends(z)
+        directions, power = self.grid.peaks(
+            self.power, log_level, lambda each: self._power_at(each, z), self.n_slots, joined
+        )
+        highest = max(self.power.max(), power.max(initial=0.0))
+        directions = directions[:, power > highest * 10 ** (-self.threshold_db / 10)]
+        self.report_directions(directions, amplitude=self._amplitude(directions, z))
+
+    def add_data(self, z: Complex) -> None:
+        """Do nothing: steps are independent."""
 
     def scanned_sensors(self, z: Complex) -> Bool:
         """Return the sensors of the spectrum after a snapshot or several, (n_sensors,)."""
@@ -122,42 +146,51 @@ class CBF(DirectionTracker):
             array = array.without(np.flatnonzero(~sensors))
         return scan_is_joined(array, self.measurement.wavelengths)
 
-    def _scan(self, z: Complex) -> Float:
+    def _power_at(self, directions: Float | None, z: Complex) -> Float:
+        """Return the spectrum of a step at directions (n_unknowns, n); on the grid if None."""
         model = self.measurement
-        if model.is_plain:
-            return self.spectrum(model.steering_vector(self.doa_grid), z)
-        return self.block_spectrum(model.snapshots(z))
+        if not model.is_plain:
+            return self.block_spectrum(model.snapshots(z), directions)
+        is_scan = directions is None
+        A = scan_rows(model, self.grid) if is_scan else model.steering_vector(*directions)
+        return self.spectrum(A, z)
 
-    def _amplitude(self, doa: Float, z: Complex) -> Complex:
+    def _amplitude(self, directions: Float, z: Complex) -> Complex:
         """Return amplitudes, or the root of the mean power over several bins and snapshots."""
         model = self.measurement
         if model.is_plain:
-            return self.amplitudes(model.steering_vector(doa), z)
-        return self.block_amplitudes(doa, model.snapshots(z))
+            return self.amplitudes(model.steering_vector(*directions), z)
+        return self.block_amplitudes(directions, model.snapshots(z))
 
-    def block_spectrum(self, Y: Complex) -> Float:
-        """Return the mean power of several bins and snapshots over the scan.
+    def block_spectrum(self, Y: Complex, directions: Float | None = None) -> Float:
+        """Return the mean power of several bins and snapshots.
 
         Parameters
         ----------
         Y : ndarray, shape (n_bins, n_sensors, n_snapshots)
             Snapshots; NaN where a sensor has no valid data.
+        directions : ndarray, shape (n_unknowns, n), optional
+            Directions, rad; those of the scan if None.
 
         Returns
         -------
-        ndarray, shape (n_directions,)
+        ndarray, shape (n,)
             The largest over slowness or elevation.
         """
         model = self.measurement
-        Y, A = model.whitened(Y, model.waves.steering(self.doa_grid))
+        if directions is None:
+            A = scan_responses(model, self.grid, whitened=False).A
+        else:
+            A = plane_wave_responses(model, directions)
+        Y, A = model.whitened(Y, A)
         return mean_beam_power(A, Y)
 
-    def block_amplitudes(self, doa: Float, Y: Complex) -> Complex:
+    def block_amplitudes(self, directions: Float, Y: Complex) -> Complex:
         """Return the root of the mean power of plane waves over bins and snapshots.
 
         Parameters
         ----------
-        doa : ndarray, shape (n_sources,)
+        directions : ndarray, shape (n_unknowns, n_sources)
             Directions, rad.
         Y : ndarray, shape (n_bins, n_sensors, n_snapshots)
             Snapshots; NaN where a sensor has no valid data.
@@ -168,7 +201,7 @@ class CBF(DirectionTracker):
             Amplitudes, real.
         """
         model = self.measurement
-        Y, A = model.whitened(Y, model.waves.steering(doa))
+        Y, A = model.whitened(Y, plane_wave_responses(model, directions))
         valid = ~np.isnan(Y)
         n_valid, bins = valid.any(axis=1).sum(axis=1), valid.any(axis=(1, 2))
         share = valid[bins].sum(axis=2) / n_valid[bins, None]  # of the snapshots with data
@@ -177,7 +210,7 @@ class CBF(DirectionTracker):
         if model.is_single:
             return np.asarray(A[0, 0].conj().T @ np.where(valid, Y, 0)[0, :, 0] / norm[0])
         beam = np.array([mean_beam_power(a[None], Y) for a in A])
-        best = beam.argmax(axis=0), np.arange(len(doa))
+        best = beam.argmax(axis=0), np.arange(beam.shape[1])
         return np.asarray(np.sqrt(beam[best] / norm[best]) + 0j)
 
     def spectrum(self, A: Complex, z: Complex) -> Float:

@@ -142,7 +142,7 @@ class MVDR(RunningCovariance, CBF):
         *,
         loading: float = 0.01,
         forgetting: float = 0.96,
-        n_directions: int = 361,
+        n_directions: int | None = None,
         threshold_db: float = 10.0,
         max_sources: int | None = None,
     ) -> None:
@@ -165,26 +165,34 @@ class MVDR(RunningCovariance, CBF):
         super().predict(u, dt=dt)
         self.apply_forgetting(dt)
 
+    def add_data(self, z: Complex) -> None:
+        """Add the snapshots of a step to the covariance."""
+        model = self.measurement
+        self.fit_covariance(model.array.n_sensors, model.n_bins)
+        if model.is_plain:
+            self.add_snapshot(z)
+        else:
+            self.add_block(model.snapshots(z))
+
     def spectrum(self, A: Complex, z: Complex) -> Float:
-        """Add a snapshot to the covariance, and return Capon's spectrum."""
-        self.fit_covariance(len(z), 1)
-        self.add_snapshot(z)
+        """Return Capon's spectrum of the covariance."""
         sensors = self.sensors_with_data()
         A = A if sensors.all() else A[:, sensors]
         return capon_power(A, self._loaded_covariance(sensors))
 
-    def block_spectrum(self, Y: Complex) -> Float:
-        """Add the snapshots of a step, and return the mean of Capon's spectra of the bins."""
-        self.fit_covariance(Y.shape[1], len(Y))
-        self.add_block(Y)
+    def block_spectrum(self, Y: Complex, directions: Float | None = None) -> Float:
+        """Return the mean of Capon's spectra of the bins."""
         sensors, bins = used_data(self.data_weights())
         if not sensors.any():
-            return np.zeros(self.n_directions)
+            return np.zeros(len(self.doa_grid) if directions is None else directions.shape[1])
         model = part_in_use(self.measurement, sensors, bins)
-        A = scan_responses(model, self.n_directions).A
+        if directions is None:
+            A = scan_responses(model, self.grid).A
+        else:
+            A = whitened_responses(model, directions)
         return mean_capon_power(A, self._loaded_covariance(sensors, bins))
 
-    def block_amplitudes(self, doa: Float, Y: Complex) -> Complex:
+    def block_amplitudes(self, directions: Float, Y: Complex) -> Complex:
         """Return the root of the mean of |wᴴy|², w = R⁻¹a / aᴴR⁻¹a, over bins and snapshots.
 
         A slowness or elevation is that of the spectrum. Snapshots with missing sensors are left
@@ -194,11 +202,11 @@ class MVDR(RunningCovariance, CBF):
         Y = Y[:, sensors] if bins is None else Y[np.ix_(bins, sensors)]
         is_complete: Bool = np.asarray(~np.isnan(Y).any(axis=1))
         model = part_in_use(self.measurement, sensors, bins)
-        if not len(doa) or not is_complete.any():
-            return root_mean_amplitudes(model, doa, Y)
+        if not directions.size or not is_complete.any():
+            return root_mean_amplitudes(model, directions, Y)
         y = model.whitening() @ np.where(is_complete[:, None], Y, 0)
         R = self._loaded_covariance(sensors, bins)
-        solved, power = _capon_solution(whitened_responses(model, doa), R)
+        solved, power = _capon_solution(whitened_responses(model, directions), R)
         w = strongest(solved * power[:, :, None], power.mean(axis=1))
         output = np.swapaxes(w.conj(), 1, 2) @ y
         if self.measurement.is_single:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Generic, Literal, NamedTuple, Protocol, TypeAlias, TypeVar
+from typing import ClassVar, Generic, Literal, NamedTuple, Protocol, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,6 +13,8 @@ from arrivals.trackers.beamforming.block_scan import part_in_use, root_mean_ampl
 from arrivals.trackers.beamforming.covariance import used_data
 from arrivals.trackers.beamforming.source_number import number_of_sources
 from arrivals.trackers.direction_tracker import DirectionTracker, warn_of_ambiguity
+from arrivals.trackers.estimates import DirectionEstimate
+from arrivals.trackers.kinds_of_estimates import kind_of_estimate
 from arrivals.typing import Bool, Complex, Float
 from arrivals.validation import count, instance, no_control, one_of, probability, time_step
 
@@ -37,7 +39,7 @@ class DirectionFinder(Protocol):
         """Maximum number of directions."""
 
     def directions(self, subspaces: Subspaces) -> Float:
-        """Return directions, rad, at most as many as the signal subspace has dimensions."""
+        """Return directions, rad, (n,) or (n_unknowns, n); at most one a signal dimension."""
 
 
 F = TypeVar("F", bound=DirectionFinder)
@@ -104,6 +106,8 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
         Number of steps since the last snapshot with valid data.
     """
 
+    unknowns: ClassVar[tuple[str, ...]] = ("azimuth",)  # that the method can estimate
+
     def __init__(
         self,
         measurement: ArraySnapshot,
@@ -124,6 +128,7 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
             one_of("n_sources", n_sources, ("aic", "mdl"))
         elif n_sources is not None:
             self.n_sources = count("n_sources", n_sources, maximum=1000)
+        self._kind_of_estimate()
         self._check_number_of_sources()
         warn_of_ambiguity(measurement)
         self.reset()
@@ -142,8 +147,12 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
         """Return to the state after construction: no snapshot, no direction."""
         self.total_weight, self.total_squared_weight, self.n_snapshots = 0.0, 0.0, 0
         self.n_missing = 0
+        self.estimate_kind = self._kind_of_estimate()
         self.report_none()
         self.last_report = self.estimate
+
+    def _kind_of_estimate(self) -> type[DirectionEstimate]:
+        return kind_of_estimate(self.measurement, type(self).__name__, *self.unknowns)
 
     @property
     def n_slots(self) -> int:
@@ -161,6 +170,7 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
         self.total_weight = factor * self.total_weight
         self.total_squared_weight = factor**2 * self.total_squared_weight
         self.n_missing = self.n_missing + 1
+        self.estimate_kind = self._kind_of_estimate()
         self.report_none()
 
     def update(self, z: ArrayLike | None) -> None:
@@ -177,13 +187,13 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
         self.n_snapshots = self.n_snapshots + n_new
         follows_gap, self.n_missing = self.n_missing > 1, 0
         if is_due:
-            doa = self._directions()
-            self.report(doa, amplitude=self._amplitudes(doa, z))
+            directions = self._directions()
+            self.report_directions(directions, amplitude=self._amplitudes(directions, z))
             self.last_report = self.estimate
         elif follows_gap:
             self.last_report = self.estimate  # none
         else:
-            self.report(self.last_report.doa, amplitude=self.last_report.amplitude)
+            self.report_estimate(self.last_report)
 
     def _count(self, valid: Bool) -> int:
         """Return the number of snapshots of a step with data in some bin."""
@@ -191,12 +201,12 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
         has_data = valid.reshape(model.n_bins, model.n_snapshots, -1).any(axis=(0, 2))
         return int(has_data.sum())
 
-    def _amplitudes(self, doa: Float, z: Complex) -> Complex:
+    def _amplitudes(self, directions: Float, z: Complex) -> Complex:
         """Return amplitudes, or the root of the mean power over several bins and snapshots."""
         model = self.measurement
         if model.is_single:
-            return least_squares_amplitudes(model.steering_vector(doa), z)
-        return root_mean_amplitudes(model, doa, model.snapshots(z))
+            return least_squares_amplitudes(model.steering_vector(*directions), z)
+        return root_mean_amplitudes(model, directions, model.snapshots(z))
 
     @abstractmethod
     def update_subspace(self, z: Complex) -> None:
@@ -237,8 +247,8 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
         valid_sensors, bins = used_data(weights)
         if bins is not None and not bins.any():
             return None
-        model = part_in_use(self.measurement, valid_sensors, bins)
         try:
+            model = part_in_use(self.measurement, valid_sensors, bins)
             finder = self.direction_finder(self.subarray_model(model))
         except ValueError:  # too few sensors are left for the method
             return None
@@ -253,12 +263,13 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
         return (finder, Subspaces(vectors[..., :K], vectors[..., K:])) if K > 0 else None
 
     def _directions(self) -> Float:
-        """Return the directions, rad, in rising order."""
+        """Return the directions, rad, (n_unknowns, n), in rising order of the first unknown."""
         current = self.current_subspaces()
         if current is None:
-            return np.zeros(0)
+            return np.zeros((self.estimate_kind.n_unknowns, 0))
         finder, subspaces = current
-        return np.sort(finder.directions(subspaces))
+        directions = np.atleast_2d(finder.directions(subspaces))
+        return np.asarray(directions[:, np.argsort(directions[0], kind="stable")])
 
     def _number_of_sources(self, eigenvalues: Float, share: float) -> int:
         """Return the number of sources, given or estimated, from a share of complete data."""

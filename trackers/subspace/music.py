@@ -9,19 +9,24 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.arrays.sensor_array import SensorArray
-from arrivals.trackers.beamforming.block_scan import has_plain_response, scan_responses
-from arrivals.trackers.beamforming.scan_ends import scan_is_joined
-from arrivals.trackers.beamforming.spectrum import (
-    find_peaks,
-    parabolic_peak,
-    scan_directions,
-    scan_steering_matrix,
+from arrivals.trackers.beamforming.block_scan import (
+    has_plain_response,
+    scan_responses,
+    whitened_responses,
 )
+from arrivals.trackers.beamforming.scan_ends import scan_is_joined
+from arrivals.trackers.beamforming.scan_grid import (
+    AngleGrid,
+    ScanGrid,
+    inverse_level,
+    number_of_directions,
+    scan_grid,
+)
+from arrivals.trackers.beamforming.spectrum import scan_steering_matrix
 from arrivals.trackers.registry import register
 from arrivals.trackers.subspace.base import NumberOfSources, Subspaces
 from arrivals.trackers.subspace.covariance import CovarianceSubspace
 from arrivals.typing import Complex, Float
-from arrivals.validation import count
 
 MAX_SPECTRUM = 1e10  # without noise the spectrum is infinite at the sources
 TINY = np.finfo(float).tiny
@@ -105,18 +110,11 @@ class SpectrumSearch:
         return doa_grid, n / np.maximum(null, n / MAX_SPECTRUM)
 
     def directions(self, subspaces: Subspaces) -> Float:
-        """Return the highest peaks, rad, each refined by a parabola through the null spectrum."""
+        """Return the highest peaks, rad, (1, n), by parabolas through the null spectrum."""
         doa_grid, power = self.spectrum(subspaces)
-        joined = scan_is_joined(self.array, (self.wavelength,))
-        return highest_peaks(doa_grid, power, subspaces, self.array.dim > 1, joined)
-
-
-def highest_peaks(
-    doa_grid: Float, power: Float, subspaces: Subspaces, circular: bool, joined: bool
-) -> Float:
-    """Return as many directions, rad, of the highest peaks as there are sources."""
-    peaks = find_peaks(power, circular=circular, joined=joined)
-    return parabolic_peak(doa_grid, -1 / power, peaks[: subspaces.signal.shape[-1]])
+        joined, n = scan_is_joined(self.array, (self.wavelength,)), subspaces.signal.shape[-1]
+        grid = AngleGrid(doa_grid[None], self.array.dim > 1)
+        return grid.peaks(power, inverse_level, np.ones_like, n, joined)[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +126,7 @@ class NormalizedSearch:
     """
 
     model: ArraySnapshot
-    n_directions: int
+    grid: ScanGrid
 
     @property
     def max_sources(self) -> int:
@@ -136,32 +134,51 @@ class NormalizedSearch:
         return self.model.array.n_sensors - 1
 
     def spectrum(self, subspaces: Subspaces) -> tuple[Float, Float]:
-        """Return scan directions and the mean spectrum there."""
-        doa_grid, A, norm = scan_responses(self.model, self.n_directions)
+        """Return scan directions, of the sphere the azimuths, and the mean spectrum there."""
+        power = self._bin_powers(*scan_responses(self.model, self.grid), subspaces)
+        return self.grid.doa, _mean(power, _highest(power))
+
+    def directions(self, subspaces: Subspaces) -> Float:
+        """Return the highest peaks, rad, (n_unknowns, n), refined as those of `SpectrumSearch`."""
+        power = self._bin_powers(*scan_responses(self.model, self.grid), subspaces)
+        highest, model = _highest(power), self.model
+
+        def power_at(directions: Float) -> Float:
+            A = whitened_responses(model, directions)
+            norm = (A.real**2 + A.imag**2).sum(axis=2)
+            return _mean(self._bin_powers(A, norm, subspaces), highest)
+
+        joined, n = scan_is_joined(model.array, model.wavelengths), subspaces.signal.shape[-1]
+        return self.grid.peaks(_mean(power, highest), inverse_level, power_at, n, joined)[0]
+
+    def _bin_powers(self, A: Complex, norm: Float, subspaces: Subspaces) -> Float:
+        """Return the spectra of the bins, (n_nuisance, n_bins, n)."""
         rows = np.swapaxes(A, 2, 3)  # (n_nuisance, n_bins, n_directions, n_sensors)
         n, K = subspaces.signal.shape[-2:]
         if n < 2 * K:
             null = projected_power(rows, subspaces.noise)
         else:
             null = norm - projected_power(rows, subspaces.signal)
-        power = norm / np.maximum(null, np.maximum(norm / MAX_SPECTRUM, TINY))
-        if power.shape[1] > 1:
-            power = power / np.maximum(power.max(axis=(0, 2), keepdims=True), TINY)
-        return doa_grid, np.maximum(power.mean(axis=1).max(axis=0), TINY)
-
-    def directions(self, subspaces: Subspaces) -> Float:
-        """Return the highest peaks, rad, refined as those of `SpectrumSearch`."""
-        doa_grid, power = self.spectrum(subspaces)
-        array = self.model.array
-        joined = scan_is_joined(array, self.model.wavelengths)
-        return highest_peaks(doa_grid, power, subspaces, array.dim > 1, joined)
+        return np.asarray(norm / np.maximum(null, np.maximum(norm / MAX_SPECTRUM, TINY)))
 
 
-def spectrum_search(model: ArraySnapshot, n_directions: int) -> SpectrumSearch | NormalizedSearch:
-    """Return the peak search for the bins, elements and second unknown of a model."""
+def _highest(power: Float) -> Float:
+    """Return the maximum of each bin (n_bins, 1); 1 for a single one."""
+    if power.shape[1] == 1:
+        return np.ones((1, 1))
+    return np.maximum(power.max(axis=(0, 2))[:, None], TINY)
+
+
+def _mean(power: Float, highest: Float) -> Float:
+    """Return the mean over the bins, the largest over a second unknown, (n,)."""
+    return np.maximum((power / highest).mean(axis=1).max(axis=0), TINY)
+
+
+def spectrum_search(model: ArraySnapshot, grid: ScanGrid) -> SpectrumSearch | NormalizedSearch:
+    """Return the peak search on a grid for the bins, elements and unknowns of a model."""
     if has_plain_response(model):
-        return SpectrumSearch(model.array, model.wavelengths[0], n_directions)
-    return NormalizedSearch(model, n_directions)
+        return SpectrumSearch(model.array, model.wavelengths[0], len(grid.doa))
+    return NormalizedSearch(model, grid)
 
 
 @register("music")
@@ -229,6 +246,8 @@ class MUSIC(CovarianceSubspace[SpectrumSearch | NormalizedSearch]):
     array([-2. ,  0.5])
     """
 
+    unknowns = ("azimuth", "sphere")
+
     def __init__(
         self,
         measurement: ArraySnapshot,
@@ -239,9 +258,9 @@ class MUSIC(CovarianceSubspace[SpectrumSearch | NormalizedSearch]):
         smoothing: int | None = None,
         backward: bool = False,
         interval: int = 1,
-        n_directions: int = 361,
+        n_directions: int | None = None,
     ) -> None:
-        self.n_directions = count("n_directions", n_directions, 3, 100_000)
+        self.n_directions = number_of_directions(n_directions)
         super().__init__(
             measurement,
             n_sources,
@@ -254,18 +273,23 @@ class MUSIC(CovarianceSubspace[SpectrumSearch | NormalizedSearch]):
 
     def direction_finder(self, model: ArraySnapshot) -> SpectrumSearch | NormalizedSearch:
         """Return the peak search on the scan grid."""
-        return spectrum_search(model, self.n_directions)
+        return spectrum_search(model, self.grid)
+
+    @property
+    def grid(self) -> ScanGrid:
+        """Scan directions."""
+        return scan_grid(self.measurement, self.n_directions)
 
     @property
     def doa_grid(self) -> Float:
-        """Scan directions, rad, (n_directions,)."""
-        return scan_directions(self.measurement.array, self.n_directions)
+        """Scan directions, on the sphere their azimuths, rad, (n_directions,)."""
+        return self.grid.doa
 
     @property
     def power(self) -> Float:
         """Present spectrum, (n_directions,); NaN while there is no source."""
         current = self.current_subspaces()
         if current is None:
-            return np.full(self.n_directions, np.nan)
+            return np.full(len(self.doa_grid), np.nan)
         finder, subspaces = current
         return finder.spectrum(subspaces)[1]

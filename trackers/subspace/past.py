@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.trackers.beamforming.covariance import used_data
+from arrivals.trackers.beamforming.scan_grid import scan_grid
 from arrivals.trackers.registry import register
 from arrivals.trackers.subspace.base import DirectionFinder, NumberOfSources, SubspaceTracker
 from arrivals.trackers.subspace.bin_values import column, is_zero, larger, power_of, where_bins
@@ -295,5 +296,5 @@ class PAST(SubspaceTracker[DirectionFinder]):
                 "noise_coherence must be 'white' for past; got coherent noise: music whitens it"
             )
         if self.method == "music":
-            return spectrum_search(model, self.n_directions)
+            return spectrum_search(model, scan_grid(self.measurement, self.n_directions))
         return polynomial_rooting(model) if self.method == "root_music" else shift_invariance(model)
