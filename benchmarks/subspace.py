@@ -25,7 +25,7 @@ from arrivals.trackers import MUSIC, PAST
 from arrivals.trackers.subspace.base import Subspaces
 from arrivals.trackers.subspace.esprit import esprit_angles
 from arrivals.trackers.subspace.line_bins import uniform_line
-from arrivals.trackers.subspace.music import SpectrumSearch
+from arrivals.trackers.subspace.music_spectrum import SpectrumSearch
 from arrivals.trackers.subspace.past_steps import past_step
 from arrivals.trackers.subspace.root_music import root_music_angles
 from arrivals.typing import Complex, Float

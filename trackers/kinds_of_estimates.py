@@ -41,7 +41,5 @@ def kind_of_estimate(
     wanted = getattr(measurement, "unknowns", "azimuth")
     if wanted not in unknowns:
         able = " or ".join(map(repr, unknowns))
-        raise ValueError(
-            f"measurement must have unknowns {able} for {tracker}; got unknowns={wanted!r}"
-        )
+        raise ValueError(f"{tracker} requires unknowns={able}; got {wanted!r}")
     return KINDS[wanted]

@@ -142,6 +142,25 @@ def scan_rows(model: ArraySnapshot, grid: ScanGrid) -> Complex:
     return A
 
 
+def can_scan(model: ArraySnapshot, sensors: Bool) -> bool:
+    """Return False if some sensors, (n_sensors,), are too few for azimuth and elevation.
+
+    Examples
+    --------
+    >>> from arrivals.measurement_models import SensorArray
+    >>> model = ArraySnapshot(SensorArray.uca(5, 0.4), 1.0, unknowns="sphere")
+    >>> can_scan(model, np.arange(5) > 1), can_scan(model, np.arange(5) > 2)
+    (True, False)
+    """
+    if model.unknowns == "azimuth":
+        return True
+    try:
+        part_in_use(model, sensors, None)
+    except ValueError:
+        return False
+    return True
+
+
 def part_in_use(model: ArraySnapshot, sensors: Bool, bins: Bool | None) -> ArraySnapshot:
     """Return the model of some sensors, (n_sensors,), and of some bins, (n_bins,); all if None.
 

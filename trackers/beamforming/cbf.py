@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.trackers.beamforming.block_scan import (
+    can_scan,
     plane_wave_responses,
     scan_responses,
     scan_rows,
@@ -33,10 +34,12 @@ class CBF(DirectionTracker):
     Parameters
     ----------
     measurement : ArraySnapshot
-        Any array; of its noise, only the coherence is used. With several bins or snapshots per
-        step the powers are averaged, each direction at the slowness or elevation of largest power.
-    n_directions : int
-        Scan directions: over ±90° for a line (361: every half degree), else over the circle.
+        Any array, of one angle or of azimuth and elevation; of its noise, only the coherence is
+        used. With several bins or snapshots per step the powers are averaged, each direction at the
+        slowness or elevation of largest power.
+    n_directions : int, optional
+        Scan directions: over ±90° for a line, over the circle, or on the sphere. If None, 361,
+        every half degree of a line; on the sphere one in 2 by 2 degrees: 10313, on a half 5157.
     threshold_db : float
         Peaks more than this below the highest are not reported, dB.
     max_sources : int, optional
@@ -44,8 +47,11 @@ class CBF(DirectionTracker):
 
     Attributes
     ----------
+    grid : ScanGrid
+        Scan directions.
     doa_grid, power : ndarray, shape (n_directions,)
-        Scan directions, rad, and the beam power of the last step; NaN before the first.
+        Scan directions, on the sphere their azimuths, rad, and the beam power of the last step; NaN
+        before the first.
 
     Notes
     -----
@@ -53,7 +59,8 @@ class CBF(DirectionTracker):
     noise alone leaves equal in all directions; ã = L a, z̃ = L z.
 
     Each step is processed on its own: labels are -1, `std` and `existence` NaN. A peak is refined
-    by a parabola through three points of the spectrum in dB.
+    by a parabola through three points of the spectrum in dB; on the sphere by the highest of finer
+    and finer stencils about it, to less than 0.2 degrees.
 
     References
     ----------
@@ -123,6 +130,8 @@ class CBF(DirectionTracker):
         if np.isnan(z).all():
             return
         self.add_data(z)
+        if not can_scan(self.measurement, self.scanned_sensors(z)):
+            return
         self.power = self._power_at(None, z)
         joined = self._has_joined_ends(z)
         directions, power = self.grid.peaks(

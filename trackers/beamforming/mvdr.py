@@ -92,15 +92,17 @@ class MVDR(RunningCovariance, CBF):
     Parameters
     ----------
     measurement : ArraySnapshot
-        Any array; of its noise, only the coherence is used. With several bins the spectrum is the
-        mean of theirs, each direction at the slowness or elevation of the largest mean.
+        Any array, of one angle or of azimuth and elevation; of its noise, only the coherence is
+        used. With several bins the spectrum is the mean of theirs, each direction at the slowness
+        or elevation of the largest mean.
     loading : float
         Added to the diagonal of the covariance, relative to the mean power of a sensor.
     forgetting : float
         Weight of the past after one unit of time; the covariance averages about
         1 / (1 - forgetting) snapshots.
-    n_directions : int
-        Scan directions: over ±90° for a line (361: every half degree), else over the circle.
+    n_directions : int, optional
+        Scan directions: over ±90° for a line, over the circle, or on the sphere. If None, 361,
+        every half degree of a line; on the sphere one in 2 by 2 degrees: 10313, on a half 5157.
     threshold_db : float
         Peaks more than this below the highest are not reported, dB.
     max_sources : int, optional
@@ -110,9 +112,11 @@ class MVDR(RunningCovariance, CBF):
     ----------
     covariance : ndarray, shape ([n_bins,] n_sensors, n_sensors)
         Weighted sum of the snapshots' outer products, of each bin if there are several.
+    grid : ScanGrid
+        Scan directions.
     doa_grid, power : ndarray, shape (n_directions,)
-        Scan directions, rad, and Capon's spectrum of the last step, NaN before the first; a wave
-        of amplitude w has nearly |w|².
+        Scan directions, on the sphere their azimuths, rad, and Capon's spectrum of the last step,
+        NaN before the first; a wave of amplitude w has nearly |w|².
 
     Notes
     -----

@@ -11,6 +11,7 @@ import numpy as np
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.arrays.sphere import azimuth_elevation, fibonacci_sphere
+from arrivals.measurement_models.manifolds.phase import plane_axes
 from arrivals.trackers.beamforming.spectrum import find_peaks, parabolic_peak, scan_directions
 from arrivals.typing import Float, Int
 from arrivals.validation import count
@@ -289,7 +290,10 @@ def scan_grid(model: ArraySnapshot, n: int | None = None) -> ScanGrid:
         area = 2 * np.pi if model.half_space else 4 * np.pi
         n = round(area / DEFAULT_STEP**2) if n is None else n
         n = count("n_directions", n, MIN_SPHERE_DIRECTIONS, MAX_DIRECTIONS)
-        normal = np.array([0.0, 0.0, 1.0]) if model.half_space else None
-        grid = SphereGrid(fibonacci_sphere(n, upper=model.half_space), normal)
+        points, normal = fibonacci_sphere(n, upper=model.half_space), None
+        if model.half_space:
+            frame = plane_axes(model.array.positions - model.waves.centre)
+            points, normal = points @ frame, frame[2]
+        grid = SphereGrid(points, normal)
     grid.directions.setflags(write=False)
     return grid

@@ -18,7 +18,7 @@ from arrivals.trackers.registry import register
 from arrivals.trackers.subspace.base import DirectionFinder, NumberOfSources, SubspaceTracker
 from arrivals.trackers.subspace.bin_values import column, is_zero, larger, power_of, where_bins
 from arrivals.trackers.subspace.esprit import shift_invariance
-from arrivals.trackers.subspace.music import spectrum_search
+from arrivals.trackers.subspace.music_spectrum import spectrum_search
 from arrivals.trackers.subspace.past_steps import (
     SensorInverses,
     incomplete_step,

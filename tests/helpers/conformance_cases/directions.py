@@ -3,6 +3,7 @@
 import numpy as np
 
 from arrivals.measurement_models import ArraySnapshot, ElementResponse, SensorArray
+from arrivals.measurement_models.arrays.sphere import fibonacci_sphere
 from arrivals.motion_models import BernoulliVonMises
 from arrivals.trackers import (
     CBF,
@@ -28,6 +29,10 @@ MANY_BINS = CIRCLE.replace(wavelength=list(np.linspace(1.0, 3.0, 24)), n_snapsho
 MANY_BINS_OF_A_LINE = LINE.replace(wavelength=list(np.linspace(1.0, 2.0, 16)), n_snapshots=4)
 DIFFUSE = WIDEBAND.replace(noise_coherence="diffuse")
 LINE_DIFFUSE = LINE.replace(noise_coherence="diffuse", white=0.3)
+SPHERE = CIRCLE.replace(unknowns="sphere")
+SPACE = ArraySnapshot(
+    SensorArray(0.4 * fibonacci_sphere(8)), [1.0, 1.3], 1e-3, n_snapshots=2, unknowns="sphere"
+)
 GAPS = ArraySnapshot(SensorArray.ula(10, 0.4, missing=[2]), wavelength=1.0, noise=1e-3)
 
 
@@ -35,7 +40,8 @@ def two_sources(model: ArraySnapshot, n_steps: int = 4) -> Measurements:
     """Return snapshots of two sources: the second starts late, a sensor fails, the end is zero."""
     on = np.arange(n_steps) > 0
     doa = np.stack([0.5 + 0.02 * np.arange(n_steps), np.where(on, -0.4, np.nan)], axis=-1)
-    z = model.simulate(doa, [1.0, 0.8j], np.random.default_rng(5))
+    elevation = np.array([0.3, 0.9]) + 0 * doa if model.unknowns == "sphere" else None
+    z = model.simulate(doa, [1.0, 0.8j], np.random.default_rng(5), elevation)
     z[1, ..., 3] = np.nan
     z[-1] = 0.0
     return z
@@ -100,4 +106,6 @@ TRACKERS: list[tuple[str, MakeTracker, Measurements]] = [
     ("cbf", lambda: CBF(LINE_DIFFUSE, n_directions=91), two_sources(LINE_DIFFUSE)),
     ("svalse", lambda: SVALSE(DIFFUSE, BernoulliVonMises(kappa=50.0)), two_sources(DIFFUSE)),
     ("valse", lambda: VALSE(LINE_DIFFUSE), two_sources(LINE_DIFFUSE)),
+    ("cbf", lambda: CBF(SPHERE, n_directions=500, max_sources=3), two_sources(SPHERE)),
+    ("cbf", lambda: CBF(SPACE, n_directions=500, max_sources=3), two_sources(SPACE)),
 ]

@@ -10,7 +10,7 @@ from arrivals.trackers import MUSIC, PAST, RootMUSIC, create
 from arrivals.trackers.beamforming import spatial_smoothing
 from arrivals.trackers.subspace.base import Subspaces, least_squares_amplitudes
 from arrivals.trackers.subspace.esprit import esprit_angles, shifted_pairs
-from arrivals.trackers.subspace.music import SpectrumSearch, music_spectrum
+from arrivals.trackers.subspace.music_spectrum import SpectrumSearch, music_spectrum
 from arrivals.trackers.subspace.past_steps import past_step
 from arrivals.trackers.subspace.root_music import null_polynomial, root_music_angles
 from arrivals.typing import Complex
