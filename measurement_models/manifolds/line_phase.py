@@ -14,7 +14,6 @@ from arrivals.measurement_models.manifolds.manifold import CandidatePoints
 from arrivals.measurement_models.manifolds.phase import PhaseManifold
 from arrivals.measurement_models.manifolds.points import (
     SPACING_OF_ONE,
-    WALK_SHARE,
     cell_centres,
     cosine_squared,
     line_direction,
@@ -22,6 +21,8 @@ from arrivals.measurement_models.manifolds.points import (
     sine_limits,
 )
 from arrivals.typing import Bool, Float
+
+CURVATURE_WALK_SHARE = 0.2  # of the slab's standard deviation: the default step of the curvature
 
 SPIKE_STD = 0.05  # of the curvature of a plane wave, rad rms of the phases over the array
 
@@ -167,7 +168,7 @@ class FresnelLine(SineLine):
     def walk(self, x: Float, variance: float, curvature_variance: float | None = None) -> Float:
         """Return the covariance of a step of some variance, rad², and of one of c: (..., 3, L)."""
         if curvature_variance is None:
-            curvature_variance = (WALK_SHARE * self.curvature_std) ** 2
+            curvature_variance = (CURVATURE_WALK_SHARE * self.curvature_std) ** 2
         along = super().walk(x, variance)
         return np.concatenate(
             [along, 0 * along, 0 * along + curvature_variance / self.unit[1] ** 2], axis=-2

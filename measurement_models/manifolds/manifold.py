@@ -158,6 +158,13 @@ class PointManifold(Manifold, Protocol):
     def slab_precision(self) -> float | None:
         """Prior precision of the second unknown of a curved wave, where it may be plane."""
 
+    @property
+    def merge_correlation(self) -> float | None:
+        """Correlation of two responses above which their sources count as one.
+
+        None where a distance in direction decides: a direction has one source.
+        """
+
     def responses(self, x: Float, covariance: Float) -> Complex:
         """Return ⟨a⟩, ∂ᵢ⟨a⟩ and ∂ᵢⱼ⟨a⟩, i ≤ j, at points (B, p, L): (B, F, 1+d+d(d+1)/2, L, M)."""
 

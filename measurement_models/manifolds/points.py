@@ -18,7 +18,7 @@ from arrivals.typing import Bool, Complex, Float, Int
 PAIRS = {1: ((0, 0),), 2: ((0, 0), (0, 1), (1, 1))}  # of upper triangles, by number of unknowns
 SPACING_OF_ONE = 0.45  # of candidates, rad rms of the phases over the array
 SPACING_OF_TWO = 0.5
-WALK_SHARE = 0.1  # of the largest 1/R: its default step
+WALK_SHARE = 0.1  # of the largest 1/R of spherical waves: its default step
 MIN_COSINE = 0.1  # of the angle between a wave and broadside, where its inverse is taken
 
 
@@ -46,6 +46,7 @@ class PointResponse(ABC):
     centre: tuple[float, ...]
 
     is_linear: ClassVar[bool] = False
+    merge_correlation: ClassVar[float | None] = None
 
     @property
     def spike_precision(self) -> float | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -57,6 +58,8 @@ class SphericalLine(LocalManifold):
     """
 
     max_inverse: float
+
+    merge_correlation: ClassVar[float | None] = 0.95
 
     def from_doa(self, doa: ArrayLike, distance: ArrayLike = np.inf) -> Float:
         """Return the points (2, n) of directions and distances (n,), rad and m."""

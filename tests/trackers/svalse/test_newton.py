@@ -13,7 +13,7 @@ from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.measurement_models.manifolds.uniform_line import UniformLineManifold
 from arrivals.trackers.svalse.components import MERGE_DISTANCE, ComponentPrior
 from arrivals.trackers.svalse.newton.batch import Components
-from arrivals.trackers.svalse.newton.candidate_grid import AngleGrid
+from arrivals.trackers.svalse.newton.candidate_grid import AngleCandidates
 from arrivals.trackers.svalse.newton.candidates import (
     RemovedComponents,
     add_candidates,
@@ -171,7 +171,7 @@ def test_removal_changes_the_criterion_by_its_gain(seed: int, kl_weight: float) 
 
 def test_addition_changes_the_evidence_by_its_gain() -> None:
     state, response = scene(0), ExpectedResponse(MODEL.angle_manifold())
-    grid = AngleGrid(response, 8, merge=0.0)
+    grid = AngleCandidates(response, 8, merge=0.0)
     gain = grid_evidence(grid, state)[0][0]
     for g in (3, 40, 77):
         new = Components.zeros(1, 1)
@@ -187,7 +187,7 @@ def test_candidates_keep_the_merge_distance_and_removed_components_return() -> N
         state = newton_step(response, state, NONE)
     components = state.components.without(np.array([3])).first(4)
     rest = evaluation_of(response, state.Y, components, state.nu[0, 0])
-    grid = AngleGrid(response, 8, merge=np.deg2rad(1.5))
+    grid = AngleCandidates(response, 8, merge=np.deg2rad(1.5))
     excluded, room = np.zeros((1, len(grid.theta)), dtype=np.bool_), np.ones(1, dtype=np.int64)
     memory = state.components.with_slots(np.arange(5))
     gone = np.array([[False, False, False, True, False]])
@@ -254,7 +254,7 @@ def test_response_with_coefficients_has_equal_steps() -> None:
     for _ in range(4):
         state, state2 = newton_step(one, state, NONE), newton_step(other, state2, NONE)
         np.testing.assert_allclose(state2.components.packed, state.components.packed, atol=1e-10)
-    gram, expected = np.broadcast_arrays(AngleGrid(other).gram, AngleGrid(one).gram)
+    gram, expected = np.broadcast_arrays(AngleCandidates(other).gram, AngleCandidates(one).gram)
     np.testing.assert_allclose(gram, expected)
 
 

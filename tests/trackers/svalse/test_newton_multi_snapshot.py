@@ -17,7 +17,7 @@ from arrivals.trackers import SVALSE
 from arrivals.trackers.svalse.components import ComponentPosterior, ComponentPrior
 from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver
 from arrivals.trackers.svalse.newton.batch import Components
-from arrivals.trackers.svalse.newton.candidate_grid import AngleGrid
+from arrivals.trackers.svalse.newton.candidate_grid import AngleCandidates
 from arrivals.trackers.svalse.newton.candidates import (
     grid_evidence,
     reestimation_gains,
@@ -146,7 +146,7 @@ def test_removal_changes_the_criterion_by_its_gain(model: ArraySnapshot) -> None
 @every_model
 def test_addition_changes_the_evidence_by_its_gain(model: ArraySnapshot) -> None:
     response, state = scene(model)
-    grid = AngleGrid(response, 4, merge=0.0)
+    grid = AngleCandidates(response, 4, merge=0.0)
     gain = grid_evidence(grid, state)[0][0]
     for g in (2, len(grid.theta) // 2 + 1):
         new = Components.zeros(1, 1)
@@ -179,7 +179,7 @@ def test_first_duplicate_across_pi_and_of_ambiguous_angles(
     components = state.components.copy()
     components.mu[0] = doa
     state = again(response, state, components)
-    grid = AngleGrid(response, 4, merge=np.deg2rad(1.5))
+    grid = AngleCandidates(response, 4, merge=np.deg2rad(1.5))
     assert grid.first_duplicate(state).tolist() == [nearest]
 
 

@@ -120,7 +120,7 @@ class CandidateGrid(ABC):
         """Return KL costs, (B, n, G), and precisions (B, q, n, G) of components that return."""
 
 
-class AngleGrid(CandidateGrid):
+class AngleCandidates(CandidateGrid):
     """Equally spaced angles.
 
     Parameters
@@ -193,7 +193,7 @@ class AngleGrid(CandidateGrid):
         return kl, (1 / variance[:, None] + kappa[:, :, None])[:, None]
 
 
-class PointGrid(CandidateGrid):
+class PointCandidates(CandidateGrid):
     """The candidates of a manifold of points.
 
     Parameters
@@ -259,5 +259,5 @@ def candidate_grid(
 ) -> CandidateGrid:
     """Return the grid of a manifold."""
     if isinstance(response.chart, PointChart):
-        return PointGrid(response, merge, merge_correlation)
-    return AngleGrid(response, GRID_POINTS_PER_SENSOR, merge, merge_correlation)
+        return PointCandidates(response, merge, merge_correlation)
+    return AngleCandidates(response, GRID_POINTS_PER_SENSOR, merge, merge_correlation)

@@ -13,7 +13,11 @@ from functools import lru_cache
 
 import numpy as np
 
-from arrivals.measurement_models.manifolds.manifold import Manifold, is_angle_manifold
+from arrivals.measurement_models.manifolds.manifold import (
+    Manifold,
+    is_angle_manifold,
+    is_point_manifold,
+)
 from arrivals.trackers.svalse.components import (
     ComponentPosterior,
     ComponentPrior,
@@ -77,7 +81,8 @@ class NewtonSolver(SolverSettings):
         support. 1 is the exact bound; less finds weaker sources, and more false ones below 10 dB.
     merge_correlation : float, optional
         Instead of a distance: correlation of the responses, in all bins, above which the later of
-        two active components is removed; in (0, 1]. It needs no scale.
+        two active components is removed; in (0, 1]. It needs no scale, and is the default, 0.95,
+        of spherical waves, where two sources may have one direction.
     curved_probability : float
         Prior probability that a wave is curved, where sources have a range.
     limits : IterationLimits
@@ -108,6 +113,13 @@ class NewtonSolver(SolverSettings):
         ):
             raise ValueError(f"merge_correlation must lie in (0, 1]; got {self.merge_correlation}")
         instance("limits", self.limits, IterationLimits)
+
+    def merging(self, manifold: Manifold, with_prior: bool) -> tuple[float, float | None]:
+        """Return the distance, rad, and the correlation by which components are merged."""
+        correlation = self.merge_correlation
+        if correlation is None and self.merge is None and is_point_manifold(manifold):
+            correlation = manifold.merge_correlation
+        return self.merge_distance(with_prior), correlation
 
     def solve(
         self, snapshots: Complex, manifold: Manifold, prior: ComponentPrior | None
@@ -262,7 +274,7 @@ def support_search(
     )
     return SupportSearch(
         response,
-        candidate_grid(response, solver.merge_distance(with_prior), solver.merge_correlation),
+        candidate_grid(response, *solver.merging(manifold, with_prior)),
         limits=solver.limits,
         tolerance=solver.tolerance,
         max_iterations=solver.max_iterations,
