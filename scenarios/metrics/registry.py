@@ -202,27 +202,36 @@ def _converged(trial: Trial, run: Run) -> float:
     return float(np.mean(run.converged))
 
 
-def _ranges(trial: Trial, run: Run) -> tuple[Float, Float]:
-    """Return true and estimated ranges, m, of the detected sources that have a finite one."""
+def _near_pairs(trial: Trial, run: Run) -> tuple[Matches, Float, Float]:
+    """Return the pairs whose source has a finite range, with true and estimated ranges, m."""
     if trial.range is None or "range" not in run.fields:
         missing = "the trial's truth" if trial.range is None else f"a run of {run.kind.__name__}s"
         raise ValueError(f"errors in range require ranges of truth and run; {missing} has none")
     pairs = pairs_of(trial, run)
+    near = np.isfinite(trial.range[pairs.step, pairs.source])
+    step, source, slot, error = pairs
+    pairs = Matches(step[near], source[near], slot[near], error[near])
     truth, estimate = trial.range[pairs.step, pairs.source], run.range[pairs.step, pairs.slot]
-    near = np.isfinite(truth)
-    return truth[near], np.asarray(estimate[near])
+    return pairs, truth, np.asarray(estimate)
 
 
 def _range_error(trial: Trial, run: Run) -> float:
-    truth, estimate = _ranges(trial, run)
+    _, truth, estimate = _near_pairs(trial, run)
     found = np.isfinite(estimate)
     error = np.abs(estimate[found] / truth[found] - 1)
     return float(np.median(error)) if found.any() else np.nan
 
 
 def _range_found(trial: Trial, run: Run) -> float:
-    estimate = _ranges(trial, run)[1]
+    estimate = _near_pairs(trial, run)[2]
     return float(np.isfinite(estimate).mean()) if estimate.size else np.nan
+
+
+def _range_nees(trial: Trial, run: Run) -> float:
+    pairs, truth, estimate = _near_pairs(trial, run)
+    found = np.isfinite(estimate)
+    error = np.stack([pairs.error, 1 / estimate - 1 / truth], axis=-1)[found]
+    return position_nees(error, run.covariance[pairs.step, pairs.slot][found])
 
 
 METRICS: dict[str, Metric] = {
@@ -245,5 +254,9 @@ METRICS: dict[str, Metric] = {
     "track_length": _track_length,
     "converged": _converged,
 }
-RANGE_METRICS: dict[str, Metric] = {"range_error": _range_error, "range_found": _range_found}
+RANGE_METRICS: dict[str, Metric] = {
+    "range_error": _range_error,
+    "range_found": _range_found,
+    "range_nees": _range_nees,
+}
 CPU = "cpu_ms"  # processor time of a step, measured by the runner: not reproducible by the seed

@@ -21,6 +21,7 @@ METRIC_LABELS = {  # {} is the unit of errors
     "converged": "share of converged steps",
     "range_error": "median relative error in range",
     "range_found": "share of sources with a range",
+    "range_nees": "NEES of direction and 1/range a degree of freedom",
     "cpu_ms": "processor time of a step, ms",
 }
 UNITS = {

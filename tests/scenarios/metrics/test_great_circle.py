@@ -189,6 +189,8 @@ def test_range_metrics_are_those_of_detected_sources_at_finite_ranges() -> None:
     run = run_of([range_estimate([1, 41, 70], [12, np.inf, 30])], RangeEstimate)
     assert RANGE_METRICS["range_error"](one, run) == pytest.approx(0.2)
     assert RANGE_METRICS["range_found"](one, run) == pytest.approx(1 / 2)
+    curvature = (1 / 12 - 1 / 10) / (0.1 / 12)  # errors over their deviations
+    assert RANGE_METRICS["range_nees"](one, run) == pytest.approx((1 + curvature**2) / 2)
     assert METRICS["distance"](one, run) == pytest.approx(2)
     assert METRICS["missed"](one, run) == 5
     none = run_of([range_estimate([], [])], RangeEstimate)
