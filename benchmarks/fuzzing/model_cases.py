@@ -196,6 +196,7 @@ CLASSES: dict[str, tuple[Any, list[Arguments]]] = {
 }  # fmt: skip
 
 ANGLES = np.array([0.1, -2.0])
+SKY = np.array([[0.1, 1.2], [-2.0, 0.3]])  # azimuths and elevations
 X4 = np.array([1.0, 0.1, 2.0, 0.2])
 FUNCTIONS: dict[str, tuple[Callable[..., Any], Arguments]] = {
     "ula": (mm.SensorArray.ula, {"n_sensors": 4, "spacing": 0.5}),
@@ -247,6 +248,15 @@ FUNCTIONS: dict[str, tuple[Callable[..., Any], Arguments]] = {
     "gospa": (
         gospa,
         {"truth": ANGLES, "estimate": ANGLES + 1, "c": 10.0, "p": 1.0, "alpha": 2.0, "period": 6.3},
+    ),
+    "gospa_on_sphere": (
+        gospa,
+        {"truth": SKY, "estimate": SKY, "c": 0.3, "period": 6.3, "distance": "great_circle"},
+    ),
+    "matches_on_sphere": (
+        matches,
+        {"truth": SKY[None], "estimate": SKY[None], "c": 0.3, "period": 6.3,
+         "distance": "great_circle"},
     ),
     "ospa": (ospa, {"truth": ANGLES, "estimate": ANGLES, "c": 10.0, "p": 2.0, "period": 6.3}),
     "rmse": (rmse, {"truth": ANGLES, "estimate": ANGLES, "c": 10.0, "period": 6.3}),
