@@ -201,14 +201,14 @@ class SupportSearch:
         if not any_set(rows):
             return rows
         part = state.select(rows)
-        evaluation, changed = switch_waves(
+        evaluation, tried, changed = switch_waves(
             self.response, part.evaluation, part.estimate_nu, self.limits.inner,
             self.curved_probability, self.kl_weight,
         )  # fmt: skip
         state.evaluation = state.evaluation.replace_rows(rows, evaluation)
-        state.iterations = state.iterations + self.limits.inner * rows
-        switched = rows.copy()
-        switched[rows] = changed
+        switched, steps = rows.copy(), np.zeros(len(rows), dtype=np.int64)
+        switched[rows], steps[rows] = changed, self.limits.inner * tried
+        state.iterations = state.iterations + steps
         state.may_switch = state.may_switch & ~(rows & ~switched)
         count_change(state, switched)
         self.set_steps(state, switched, self.limits.removal)

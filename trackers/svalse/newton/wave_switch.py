@@ -95,7 +95,7 @@ def switch_waves(
     n_steps: int,
     curved_probability: float,
     kl_weight: float,
-) -> tuple[Evaluation, Bool]:
+) -> tuple[Evaluation, Bool, Bool]:
     """Try to change one component of each problem from plane to curved, or back.
 
     All trials are problems of one batch.
@@ -117,17 +117,17 @@ def switch_waves(
     -------
     evaluation : Evaluation
         With the first change of each problem that raises the criterion.
-    changed : ndarray of bool, shape (B,)
-        Problems with such a change.
+    tried, changed : ndarray of bool, shape (B,)
+        Problems with a trial, and those with such a change.
     """
     assert isinstance(response.chart, PointChart)
     spike, slab = response.chart.wave_precisions
     log_odds = float(np.log(curved_probability) - np.log1p(-curved_probability))
     evidence = curvature_evidence(response, evaluation, slab, log_odds, kl_weight)
     order, there = trial_order(evidence, evaluation.components.point[:, 1])
-    changed = np.zeros(len(evaluation), dtype=np.bool_)
-    if not there.any():
-        return evaluation, changed
+    tried, changed = there.any(axis=1), np.zeros(len(evaluation), dtype=np.bool_)
+    if not any_set(tried):
+        return evaluation, tried, changed
     row, place = np.nonzero(there)
     k = order[row, place]
     freed = ~evidence.is_curved[row, k]
@@ -155,6 +155,6 @@ def switch_waves(
     good = np.flatnonzero(better)
     rows, first = np.unique(row[good], return_index=True)  # the first of each problem
     changed[rows] = True
-    if not any_set(changed):
-        return evaluation, changed
-    return evaluation.replace_rows(changed, trial.take(good[first])), changed
+    if any_set(changed):
+        evaluation = evaluation.replace_rows(changed, trial.take(good[first]))
+    return evaluation, tried, changed
