@@ -15,6 +15,7 @@ from arrivals.measurement_models.manifolds.phase import PhaseManifold
 from arrivals.measurement_models.manifolds.points import (
     SPACING_OF_ONE,
     cell_centres,
+    cell_count,
     cosine_squared,
     line_direction,
     sine_exists,
@@ -83,7 +84,8 @@ class SineLine(PhaseManifold):
 
     def sine_grid(self) -> Float:
         """Return the first coordinates of candidates: (n,)."""
-        return cell_centres(self.unit[0], 1.0, SPACING_OF_ONE) / self.unit[0]
+        (n,) = cell_count(2 / (SPACING_OF_ONE * self.unit[0]))
+        return cell_centres(n) / self.unit[0]
 
     def new_candidates(self) -> CandidatePoints:
         """Return an even grid of sines, of uniform density."""
@@ -144,8 +146,8 @@ class FresnelLine(SineLine):
 
     @property
     def slab_precision(self) -> float:
-        """Prior precision of c of a curved wave."""
-        return (self.unit[1] / self.curvature_std) ** 2
+        """Prior precision of c of a curved wave, at most that of a plane one."""
+        return min(self.unit[1] / self.curvature_std, 1 / SPIKE_STD) ** 2
 
     @property
     def path(self) -> Float:

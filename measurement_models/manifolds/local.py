@@ -11,7 +11,12 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.arrays.plane_waves import PlaneWaves
 from arrivals.measurement_models.manifolds.manifold import UNIFORM_STD_OF_CIRCLE, CandidatePoints
-from arrivals.measurement_models.manifolds.points import PAIRS, SPACING_OF_ONE, PointResponse
+from arrivals.measurement_models.manifolds.points import (
+    PAIRS,
+    SPACING_OF_ONE,
+    PointResponse,
+    cell_count,
+)
 from arrivals.typing import Bool, Complex, Float
 
 HALVES = np.array([0.5, 1.0, 0.5])[:, None, None]  # of the elements 11, 12, 22 in ½ Σ Sᵢⱼ
@@ -144,7 +149,7 @@ class HorizontalWaves(LocalManifold):
 
     def new_candidates(self) -> CandidatePoints:
         """Return an even grid of the circle."""
-        n = int(np.ceil(2 * np.pi / self.unit[0] / SPACING_OF_ONE))
+        (n,) = cell_count(2 * np.pi / self.unit[0] / SPACING_OF_ONE)
         grid = (-np.pi + 2 * np.pi * np.arange(n) / n) / self.unit[0]
         log_measure = float(np.log(2 * np.pi / self.unit[0]))
         return CandidatePoints(grid[None], log_measure, np.zeros(1))

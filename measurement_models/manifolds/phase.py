@@ -20,6 +20,7 @@ from arrivals.measurement_models.manifolds.points import (
     SPACING_OF_TWO,
     PointResponse,
     cell_centres,
+    cell_count,
     sine_limits,
 )
 from arrivals.typing import Bool, Complex, Float
@@ -167,7 +168,8 @@ class DirectionCosines(PhaseManifold):
 
     def new_candidates(self) -> CandidatePoints:
         """Return a square grid on the disc of directions, of a uniform density in (u, v)."""
-        grids = [cell_centres(unit, 1.0, SPACING_OF_TWO) for unit in self.unit]
+        counts = cell_count(*(2 / (SPACING_OF_TWO * unit) for unit in self.unit))
+        grids = map(cell_centres, counts)
         uv = np.stack([each.ravel() for each in np.meshgrid(*grids, indexing="ij")])
         uv = uv[:, (uv**2).sum(axis=0) <= 1.0]
         log_measure = float(np.log(np.pi / np.prod(self.unit)))

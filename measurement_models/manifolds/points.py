@@ -19,6 +19,7 @@ PAIRS = {1: ((0, 0),), 2: ((0, 0), (0, 1), (1, 1))}  # of upper triangles, by nu
 SPACING_OF_ONE = 0.45  # of candidates, rad rms of the phases over the array
 SPACING_OF_TWO = 0.5
 WALK_SHARE = 0.1  # of the largest 1/R of spherical waves: its default step
+MOST_CANDIDATES = 1 << 16
 MIN_COSINE = 0.1  # of the angle between a wave and broadside, where its inverse is taken
 
 
@@ -168,10 +169,30 @@ def matrices(triangles: Float) -> Float:
     return np.moveaxis(triangles[np.array([[0, 1], [1, 2]])], 2, 0)
 
 
-def cell_centres(unit: float, half_width: float, spacing: float) -> Float:
-    """Return an even grid of an unknown from -half_width to half_width, in its own scale."""
-    n = int(np.ceil(2 * half_width / (unit * spacing)))
-    return half_width * (-1 + 2 * (np.arange(n) + 0.5) / n)
+def cell_count(*cells: float) -> list[int]:
+    """Return numbers of cells of a grid, one an unknown, rounded up.
+
+    Raises
+    ------
+    ValueError
+        If the grid has too many points.
+
+    Examples
+    --------
+    >>> cell_count(3.2, 5.0)
+    [4, 5]
+    """
+    n_points = float(np.prod(np.ceil(cells)))
+    if not n_points <= MOST_CANDIDATES:
+        cure = "leave sensors out, or use longer wavelengths"
+        wanted = f"resolve at most {MOST_CANDIDATES} directions or ranges"
+        raise ValueError(f"array must {wanted}; got about {n_points:.2g}: {cure}")
+    return [int(np.ceil(each)) for each in cells]
+
+
+def cell_centres(n: int) -> Float:
+    """Return the centres of n equal cells from -1 to 1."""
+    return -1 + 2 * (np.arange(n) + 0.5) / n
 
 
 def sine_limits(sine: Float) -> Float:

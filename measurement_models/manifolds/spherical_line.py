@@ -18,6 +18,7 @@ from arrivals.measurement_models.manifolds.points import (
     SPACING_OF_ONE,
     WALK_SHARE,
     cell_centres,
+    cell_count,
     cosine_squared,
     sine_exists,
     sine_limits,
@@ -141,9 +142,10 @@ class SphericalLine(LocalManifold):
 
     def new_candidates(self) -> CandidatePoints:
         """Return a grid of sin β and 1/R, about one unit apart in 1/R."""
-        u = cell_centres(self.unit[0], 1.0, SPACING_OF_ONE)
-        v = np.linspace(0, self.max_inverse, 1 + int(np.ceil(self.max_inverse / self.unit[1])))
-        points = np.stack([each.ravel() for each in np.meshgrid(u, v, indexing="ij")]) / self.scale
+        reach = self.max_inverse / self.unit[1]
+        n, n_ranges = cell_count(2 / (SPACING_OF_ONE * self.unit[0]), 1 + reach)
+        grids = np.meshgrid(cell_centres(n), np.linspace(0, self.max_inverse, n_ranges))
+        points = np.stack([each.T.ravel() for each in grids]) / self.scale
         precision = (2 * self.unit[1] / self.max_inverse) ** 2
         log_measure = np.log(2 / self.unit[0]) + 0.5 * np.log(2 * np.pi / precision)
         prior = np.array([0.0, 0.0, precision])

@@ -13,7 +13,7 @@ from arrivals.measurement_models.arrays.sphere import fibonacci_sphere, unit_vec
 from arrivals.measurement_models.manifolds.local import LocalManifold
 from arrivals.measurement_models.manifolds.located import tangent_estimate
 from arrivals.measurement_models.manifolds.manifold import CandidatePoints
-from arrivals.measurement_models.manifolds.points import SPACING_OF_TWO, sine_limits
+from arrivals.measurement_models.manifolds.points import SPACING_OF_TWO, cell_count, sine_limits
 from arrivals.typing import Bool, Complex, Float
 
 FEWEST_CANDIDATES = 100
@@ -107,7 +107,7 @@ class TangentPlanes(LocalManifold):
 
     def new_candidates(self) -> CandidatePoints:
         """Return a Fibonacci grid, of uniform density."""
-        n = int(np.ceil(4 * np.pi / (SPACING_OF_TWO * self.unit[0]) ** 2))
+        (n,) = cell_count(4 * np.pi / (SPACING_OF_TWO * self.unit[0]) ** 2)
         points = with_tangents(fibonacci_sphere(max(n, FEWEST_CANDIDATES)).T)
         log_measure = float(np.log(4 * np.pi) - 2 * np.log(self.unit[0]))
         return CandidatePoints(points, log_measure, np.zeros(3))

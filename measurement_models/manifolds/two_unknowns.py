@@ -136,15 +136,24 @@ def two_unknowns_manifold(
         Distance of the nearest source, m; a quarter of the Fraunhofer distance if None. From there
         on, wavefronts are parabolic; below, spherical.
 
+    Raises
+    ------
+    ValueError
+        If the array resolves too many points for a grid.
+
     Examples
     --------
     >>> waves = PlaneWaves(SensorArray.ula(16, 0.08), (0.1715,))
     >>> [type(two_unknowns_manifold(waves, "range", each)).__name__ for each in (None, 0.5)]
     ['FresnelLine', 'SphericalLine']
     """
-    if unknowns == "sphere":
-        return direction_cosines(waves) if is_planar(waves.array) else tangent_planes(waves)
+    manifold: PointManifold
     limit = fraunhofer_distance(waves) / 4
-    if nearest is not None and nearest < limit:
-        return spherical_line(waves, 1 / nearest)
-    return fresnel_line(waves, 1 / (nearest or limit))
+    if unknowns == "sphere":
+        manifold = direction_cosines(waves) if is_planar(waves.array) else tangent_planes(waves)
+    elif nearest is not None and nearest < limit:
+        manifold = spherical_line(waves, 1 / nearest)
+    else:
+        manifold = fresnel_line(waves, 1 / (nearest or limit))
+    manifold.candidates()  # refuses too many
+    return manifold

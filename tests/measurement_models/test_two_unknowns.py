@@ -251,6 +251,19 @@ def test_unknowns_that_an_array_cannot_give_are_refused_in_one_line(
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize("unknowns", ["sphere", "range"])
+def test_array_that_resolves_too_many_points_is_refused_in_one_line(unknowns: Any) -> None:
+    array = SPACE if unknowns == "sphere" else LINE
+    with pytest.raises(ValueError, match="array must resolve at most 65536") as error:
+        ArraySnapshot(array, 1e-9, unknowns=unknowns).manifold()
+    assert "\n" not in str(error.value)
+
+
+def test_slab_is_never_narrower_than_the_spike() -> None:
+    manifold: Any = ArraySnapshot(LINE, 1.0, unknowns="range", nearest=1e100).manifold()
+    assert manifold.slab_precision == manifold.spike_precision
+
+
 def test_nearest_of_a_quarter_of_the_extent_is_accepted() -> None:
     """16 microphones 8 cm apart: 1.2 m, in floating point a little more."""
     model = ArraySnapshot(SensorArray.ula(16, 0.08), 0.17, unknowns="range", nearest=0.3)
