@@ -14,7 +14,7 @@ from arrivals.measurement_models.arrays.sphere import unit_vectors
 from arrivals.messages import shown
 from arrivals.parameters import FrozenModel
 from arrivals.typing import Complex, Float, Int
-from arrivals.validation import positive, real
+from arrivals.validation import SMALLEST, positive, real
 
 
 @dataclass(frozen=True)
@@ -160,7 +160,7 @@ def source_paths(
         n = unit_vectors(doa, elevation)[..., : array.dim]
     if distance is None:
         return n @ array.positions.T, np.ones(1)
-    if not (distance > 0).all():
+    if not (distance > SMALLEST).all():
         raise ValueError(f"distance must be positive; got {shown(distance)}")
     centre = array.positions.mean(axis=0)
     p = array.positions - centre

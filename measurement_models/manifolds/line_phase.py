@@ -142,7 +142,7 @@ class FresnelLine(SineLine):
     @property
     def spike_precision(self) -> float:
         """Prior precision of c of a plane wave."""
-        return SPIKE_STD**-2
+        return (1 / SPIKE_STD) ** 2
 
     @property
     def slab_precision(self) -> float:

@@ -8,8 +8,11 @@ from numpy.typing import ArrayLike
 from arrivals.measurement_models import ArraySnapshot
 from arrivals.measurement_models.arrays.sphere import unit_vectors
 from arrivals.measurements import numbers
+from arrivals.messages import shown
 from arrivals.typing import Complex, Float
-from arrivals.validation import instance, positive, real
+from arrivals.validation import LARGEST, instance, positive, real
+
+NO_INFORMATION = 1e-9  # of the largest root of a diagonal element of the Fisher matrix
 
 
 def sphere_bound(
@@ -41,7 +44,7 @@ def sphere_bound(
     ndarray, shape (n_sources, 2, 2)
         Covariances in the tangent plane, rad²: elevation, and azimuth times cos(elevation). The
         standard deviation along the great circle is the root of the trace. Of an array in a plane,
-        a source in the plane has no bound on its elevation: NaN.
+        the elevation of a source in the plane has an infinite variance, and covariances of 0.
 
     References
     ----------
@@ -57,7 +60,7 @@ def sphere_bound(
     array([0.99, 0.5 ])
     """
     model = instance("measurement", measurement, ArraySnapshot)
-    azimuth, height = real("doa", doa), real("elevation", elevation)
+    azimuth, height = _finite("doa", doa), _finite("elevation", elevation)
     a = _responses(model, model.steering_vector(azimuth, height))
     up = unit_vectors(azimuth, height + np.pi / 2)  # ∂n/∂ε
     across = unit_vectors(azimuth + np.pi / 2, 0 * azimuth)  # ∂n/(cos ε ∂φ)
@@ -108,7 +111,7 @@ def range_bound(
     model = instance("measurement", measurement, ArraySnapshot)
     if model.array.dim != 1:
         raise ValueError(f"array must be a line for a range; got {model.array.dim} dimensions")
-    beta, R = real("doa", doa), real("distance", distance)
+    beta, R = _finite("doa", doa), real("distance", distance)
     a = _responses(model, model.steering_vector(beta, distance=R))
     p = model.array.positions - model.array.positions.mean()  # (M, 1)
     u, v = np.sin(beta), 1 / R
@@ -121,6 +124,13 @@ def range_bound(
     slopes = 1j * k * np.stack([fu, fv]) - np.stack([tu, tv]) / t
     slopes[:, 0] *= np.cos(beta)
     return _bound(model, a, slopes * a[:, None], amplitude, noise)
+
+
+def _finite(name: str, value: ArrayLike) -> Float:
+    values = real(name, value)
+    if not (np.abs(values) < LARGEST).all():
+        raise ValueError(f"{name} must be finite; got {shown(value)}")
+    return values
 
 
 def _responses(model: ArraySnapshot, a: Complex) -> Complex:
@@ -142,6 +152,8 @@ def _bound(
     W = numbers("amplitude", amplitude)
     if W.shape != (*model.shape[:-1], K):
         raise ValueError(f"amplitude must have shape {(*model.shape[:-1], K)}; got {W.shape}")
+    if not (np.abs(W) < LARGEST).all():
+        raise ValueError(f"amplitude must be finite; got {shown(amplitude)}")
     W = np.swapaxes(W.reshape(F, -1, K), 1, 2)  # (F, K, N)
     D = np.moveaxis(D, 1, 2).reshape(F, M, 2 * K)
     # P⊥D = D - A A⁺ D
@@ -150,12 +162,12 @@ def _bound(
     outer = np.tile(np.swapaxes(W @ W.conj().swapaxes(1, 2), 1, 2), (2, 2))
     J = (D.conj().swapaxes(1, 2) @ residual * outer).real.sum(axis=0)
     J *= 2 / positive("noise", noise)
-    scale = np.sqrt(np.diagonal(J))
-    scale = np.where(scale > 1e-9 * scale.max(), scale, np.nan)  # NaN: no bound
-    known = np.flatnonzero(~np.isnan(scale))
-    C = np.full(J.shape, np.nan)
-    inside = np.ix_(known, known)
-    C[inside] = np.linalg.inv((J / np.outer(scale, scale))[inside]) / np.outer(scale, scale)[inside]
+    scale = np.sqrt(np.maximum(np.diagonal(J), 0.0))
+    known = np.flatnonzero(scale > NO_INFORMATION * scale.max(initial=0.0))
+    C = np.zeros(J.shape)
+    np.fill_diagonal(C, np.inf)
+    inside, units = np.ix_(known, known), np.outer(scale, scale)
+    C[inside] = np.linalg.pinv((J / np.where(units > 0, units, 1))[inside]) / units[inside]
     C = C.reshape(2, K, 2, K)
     index = np.arange(K)
     return np.asarray(np.moveaxis(C, (1, 3), (0, 1))[index, index])

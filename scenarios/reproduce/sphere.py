@@ -190,16 +190,16 @@ def _draw(seed: int) -> Figure:
 
     from arrivals.plots.sky import plot_sky
 
-    figure = Figure(figsize=(12.0, 5.0), layout="constrained")
-    panels = figure.subplots(1, 2, width_ratios=(1, 2))
+    figure = Figure(figsize=(10.0, 5.2), layout="constrained")
+    panels = figure.subplots(1, 2)
     arrays: tuple[ArrayName, ...] = ("ura4", "sph12")
     for ax, array in zip(panels, arrays, strict=True):
         trial = SourcesOnSphere(array).sample(np.random.default_rng(seed))
         run = trial.tracker("svalse").run(trial.measurements)
         plot_sky(run, ax=ax)
         if trial.elevation is not None:
-            radius = 90 - np.rad2deg(trial.elevation)
-            x, y = radius * np.cos(trial.truth), radius * np.sin(trial.truth)
+            azimuth, radius = trial.truth[::5], 90 - np.rad2deg(trial.elevation[::5])
+            x, y = radius * np.cos(azimuth), radius * np.sin(azimuth)
             ax.plot(x, y, linestyle="none", marker="+", markersize=4, color="black", zorder=5)
         ax.set_title(f"{array}, 10 snapshots, 20 dB; crosses: truth", loc="left", fontsize=11)
     return figure

@@ -131,7 +131,8 @@ def test_bound_of_the_near_field_is_that_of_the_specification(
 def test_source_in_the_plane_of_the_sensors_has_no_bound_on_its_elevation() -> None:
     model = ArraySnapshot(SensorArray.uca(7, 0.7), 1.0, unknowns="sphere")
     C = sphere_bound(model, FIRST, [0.0, 0.5], [1.0, 1.0], 0.1)
-    assert np.isnan(C[0, 0, 0])
+    assert np.isinf(C[0, 0, 0])
+    assert C[0, 0, 1] == 0
     assert C[0, 1, 1] > 0
     assert np.isfinite(C[1]).all()
 
@@ -142,6 +143,9 @@ def test_source_in_the_plane_of_the_sensors_has_no_bound_on_its_elevation() -> N
         (lambda m: sphere_bound(m, [0.1], [0.2], [1.0, 2.0], 0.1), "amplitude must have shape"),
         (lambda m: sphere_bound(m, [0.1], [0.2], [1.0], 0.0), "noise must be"),
         (lambda m: sphere_bound(m, 0.1, 0.2, 1.0, 0.1), "doa must have shape"),
+        (lambda m: sphere_bound(m, [np.nan], [0.2], [1.0], 0.1), "doa must be finite"),
+        (lambda m: sphere_bound(m, [0.1], [np.inf], [1.0], 0.1), "elevation must be finite"),
+        (lambda m: sphere_bound(m, [0.1], [0.2], [np.inf], 0.1), "amplitude must be finite"),
         (lambda m: range_bound(m, [0.1], [2.0], [1.0], 0.1), "array must be a line"),
         (
             lambda m: sphere_bound(
