@@ -16,7 +16,6 @@ from arrivals.scenarios.bounds.delay import tone_bound
 from arrivals.scenarios.bounds.detection import exact_detection, network_detection
 from arrivals.scenarios.bounds.signal_strength import rss_bound
 from arrivals.scenarios.bounds.snapshot import snapshot_bound
-from arrivals.scenarios.bounds.two_unknowns import range_bound, sphere_bound
 from arrivals.scenarios.experiments.statistics import bootstrap_interval
 from arrivals.scenarios.metrics.assignment import matches
 from arrivals.scenarios.metrics.consistency import (
@@ -43,10 +42,10 @@ from arrivals.trackers import (
     refine_peaks,
 )
 from arrivals.typing import Float
+from fuzzing.two_unknown_cases import TWO_UNKNOWNS
 
 Arguments = dict[str, Any]
 LINE = mm.SensorArray.ula(4, spacing=0.5)
-SPHERE = mm.ArraySnapshot(mm.SensorArray.uca(4, 0.3), wavelength=1.0, unknowns="sphere")
 SNAPSHOT = mm.ArraySnapshot(LINE, wavelength=1.0, noise=0.1)
 PLACES = [[0.0, 0.0], [10.0, 0.0], [4.0, 9.0]]
 RSS = mm.LogNormalRSS(PLACES, sigma=0.3, log_noise=0.0)
@@ -54,16 +53,6 @@ TONE = mm.Tones(0.1)
 SAMPLES = mm.ArraySamples(mm.SensorArray.ula(4, 0.5, speed=1.0), 4.0, TONE)
 SIGNAL = np.sin(np.arange(20.0) ** 1.5)
 CONTROL = np.array([[0.0], [1.0]])
-
-
-def spherical_wave(array: Any, wavelength: Any, nearest: Any, **source: Any) -> Any:
-    model = mm.ArraySnapshot(array, wavelength, unknowns="range", nearest=nearest)
-    return model.wave(**source), model.manifold().n_unknowns
-
-
-def elevated_wave(array: Any, wavelength: Any, **source: Any) -> Any:
-    model = mm.ArraySnapshot(array, wavelength, unknowns="sphere")
-    return model.wave(**source), model.manifold().n_unknowns
 
 
 def swing(x: Any, dt: float) -> list[Any]:
@@ -210,7 +199,7 @@ CLASSES: dict[str, tuple[Any, list[Arguments]]] = {
 ANGLES = np.array([0.1, -2.0])
 SKY = np.array([[0.1, 1.2], [-2.0, 0.3]])  # azimuths and elevations
 X4 = np.array([1.0, 0.1, 2.0, 0.2])
-FUNCTIONS: dict[str, tuple[Callable[..., Any], Arguments]] = {
+FUNCTIONS: dict[str, tuple[Callable[..., Any], Arguments]] = TWO_UNKNOWNS | {
     "ula": (mm.SensorArray.ula, {"n_sensors": 4, "spacing": 0.5}),
     "uca": (mm.SensorArray.uca, {"n_sensors": 4, "radius": 0.5}),
     "symmetric": (mm.SensorArray.symmetric, {"distances": [0.25, 0.5]}),
@@ -319,26 +308,6 @@ FUNCTIONS: dict[str, tuple[Callable[..., Any], Arguments]] = {
     "snapshot_bound": (
         snapshot_bound,
         {"measurement": SNAPSHOT, "doa": ANGLES[:1], "amplitude": np.ones(1), "noise": 0.1},
-    ),
-    "sphere_bound": (
-        sphere_bound,
-        {"measurement": SPHERE, "doa": ANGLES[:1], "elevation": ANGLES[1:2],
-         "amplitude": np.ones(1), "noise": 0.1},
-    ),
-    "range_bound": (
-        range_bound,
-        {"measurement": SNAPSHOT, "doa": ANGLES[:1], "distance": np.array([2.0]),
-         "amplitude": np.ones(1), "noise": 0.1},
-    ),
-    "spherical_wave": (
-        spherical_wave,
-        {"array": LINE, "wavelength": 1.0, "nearest": 0.7, "doa": ANGLES[:1],
-         "amplitude": np.ones(1), "distance": np.array([2.0])},
-    ),
-    "elevated_wave": (
-        elevated_wave,
-        {"array": SPHERE.array, "wavelength": 1.0, "doa": ANGLES[:1], "amplitude": np.ones(1),
-         "elevation": ANGLES[1:2]},
     ),
     "rss_bound": (
         rss_bound,
