@@ -23,11 +23,14 @@ TRACK = ["track", "tow.wav", "--array", "array.toml", "--frequency", "1000", "--
 CHOSEN = ["track", "tow.wav", "--array", "array.toml", "--quiet"]
 SOUND = ["track", "tow.wav", "--array", "array.toml", "--tracker", "interpolation_ekf",
          "--band", "100", "900", "--set", "doa=0.1", "--quiet"]  # fmt: skip
+RANGE = ["track", "tow.wav", "--array", "array.toml", "--frequency", "1000", "--window", "64",
+         "--unknowns", "range", "--nearest", "2", "--quiet"]  # fmt: skip
 LOCATE = ["locate", "levels.csv", "--sensors", "places.csv", "--quiet"]
 COMMANDS: dict[str, list[str]] = {
     "track": TRACK,
     "track chosen": CHOSEN,
     "track samples": SOUND,
+    "track range": RANGE,
     "locate": LOCATE,
     "list": ["list"],
     "demo": ["demo", "nothing", "--quiet"],
@@ -37,7 +40,7 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "track": ("--frequency", "--frequencies", "--band", "--snapshots", "--snr",
               "--tracker", "--set", "--out", "--signals", "--rate", "--window", "--hop",
               "--variable", "--transpose", "--dtype", "--channels", "--quiet", "--array",
-              "--nothing"),
+              "--nothing", "--unknowns", "--nearest"),
     "locate": ("--sensors", "--alpha", "--sigma-db", "--floor-db", "--power-db", "--sources",
                "--tracker", "--out", "--speed", "--q", "--power-std-db", "--r-min", "--nothing"),
 }  # fmt: skip
@@ -46,7 +49,8 @@ VALUES = (
     "1e400", "10000000000", "9" * 5000, "text", "a\nb", "\x00", "é", "\udcff", "1,5", "0x10", "1j",
     "None", "True", "[]", "()", "{}", "tow.wav", "array.toml", "levels.csv", "places.csv",
     "nothing.wav", "nothing/there.csv", "out.csv", "out.wav", "out.npy", "out.txt", "folder", ".",
-    "cbf", "svalse", "kalman", "music", "rss_ml", "interpolation_ekf", "peaks_gnn", "int32", "self",
+    "sphere", "range", "cbf", "svalse", "kalman", "music", "rss_ml", "interpolation_ekf",
+    "peaks_gnn", "int32", "self",
     "n_directions=1e9", "n_directions=0", "n_directions=10**9", "max_sources=None", "=", "a=b",
     "threshold_db=nan", "threshold_db=[1,2]", "motion__kappa=-1", "n_directions=" + "9" * 400,
     "doa=nan", "std=inf", "solver__tolerance='a'", "measurement=None", "n_directions=" + "[" * 300,
