@@ -112,7 +112,7 @@ def scan_responses(model: ArraySnapshot, grid: ScanGrid, *, whitened: bool = Tru
     Examples
     --------
     >>> from arrivals.measurement_models import SensorArray
-    >>> from arrivals.trackers.beamforming.scan_grid import scan_grid
+    >>> from arrivals.trackers.beamforming.model_grid import scan_grid
     >>> model = ArraySnapshot(SensorArray.uca(5, 0.4), [1.0, 1.2])
     >>> scan = scan_responses(model, scan_grid(model, 90))
     >>> scan.A.shape, scan.norm.shape
@@ -132,7 +132,7 @@ def scan_rows(model: ArraySnapshot, grid: ScanGrid) -> Complex:
     Examples
     --------
     >>> from arrivals.measurement_models import SensorArray
-    >>> from arrivals.trackers.beamforming.scan_grid import scan_grid
+    >>> from arrivals.trackers.beamforming.model_grid import scan_grid
     >>> model = ArraySnapshot(SensorArray.uca(5, 0.4), 1.0)
     >>> scan_rows(model, scan_grid(model, 90)).shape
     (90, 5)

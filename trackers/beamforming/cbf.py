@@ -12,13 +12,9 @@ from arrivals.trackers.beamforming.block_scan import (
     scan_responses,
     scan_rows,
 )
+from arrivals.trackers.beamforming.model_grid import number_of_directions, scan_grid
 from arrivals.trackers.beamforming.scan_ends import scan_is_joined
-from arrivals.trackers.beamforming.scan_grid import (
-    ScanGrid,
-    log_level,
-    number_of_directions,
-    scan_grid,
-)
+from arrivals.trackers.beamforming.scan_grid import ScanGrid, log_level
 from arrivals.trackers.beamforming.spectrum import bartlett_power, mean_beam_power
 from arrivals.trackers.direction_tracker import DirectionTracker, warn_of_ambiguity
 from arrivals.trackers.kinds_of_estimates import kind_of_estimate
@@ -160,9 +156,9 @@ class CBF(DirectionTracker):
         model = self.measurement
         if not model.is_plain:
             return self.block_spectrum(model.snapshots(z), directions)
-        is_scan = directions is None
-        A = scan_rows(model, self.grid) if is_scan else model.steering_vector(*directions)
-        return self.spectrum(A, z)
+        if directions is None:
+            return self.spectrum(scan_rows(model, self.grid), z)
+        return self.spectrum(model.steering_vector(*directions), z)
 
     def _amplitude(self, directions: Float, z: Complex) -> Complex:
         """Return amplitudes, or the root of the mean power over several bins and snapshots."""

@@ -5,12 +5,14 @@ from __future__ import annotations
 import copy
 import inspect
 import warnings
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
+from arrivals.measurement_models.arrays.sphere import azimuth_elevation, unit_vectors
 from arrivals.measurement_models.manifolds.manifold import (
     UNIFORM_STD_OF_CIRCLE,
     UNIFORM_STD_OF_LINE,
@@ -20,12 +22,18 @@ from arrivals.motion_models.base import MotionModel
 from arrivals.motion_models.linear import ConstantVelocity
 from arrivals.motion_models.von_mises import wrap
 from arrivals.trackers.base import Tracker
+from arrivals.trackers.beamforming.sphere_grid import half_space_normal
+from arrivals.trackers.direction_estimates import SphereEstimate
 from arrivals.trackers.direction_tracker import DirectionTracker, warn_of_ambiguity
 from arrivals.trackers.estimates import DirectionEstimate
+from arrivals.trackers.kinds_of_estimates import kind_of_estimate
+from arrivals.trackers.multi_target.sphere_bank import SphereBank, offsets
 from arrivals.trackers.multi_target.track_bank import TrackBank, nearest
 from arrivals.trackers.registry import find, register
 from arrivals.typing import Bool, Complex, Float
 from arrivals.validation import count, instance, no_control, positive, time_step
+
+UNIFORM_VARIANCE_OF_SPHERE = (np.pi**2 - 4) / 4  # rad², along each axis
 
 
 @register("peaks_gnn")
@@ -35,18 +43,20 @@ class PeaksGNN(DirectionTracker):
     Parameters
     ----------
     measurement : ArraySnapshot
-        Any array.
+        Any array, of one angle or of azimuth and elevation.
     detector : str or Tracker
         Method that detects directions in a snapshot: a registered tracker whose only required
         argument is a measurement ("cbf", "mvdr", "music", "sbl"), or an instance with settings.
     motion : MotionModel
-        Linear motion of a direction; entry 0 of its state is the direction, rad.
+        Linear motion of a direction; entry 0 of its state is the direction, rad. On the sphere,
+        of each of two axes of the tangent plane.
     std : float
         Standard deviation of a detected direction, rad.
     speed_std : float
         Standard deviation of the other entries of a new track, rad per unit of time.
     gate : float
-        Maximum distance of a detection from its track, in standard deviations.
+        Maximum distance of a detection from its track, on the sphere along a great circle, in
+        standard deviations.
     confirm_steps : int
         Consecutive detections after which a new track is reported.
     patience : int
@@ -61,7 +71,8 @@ class PeaksGNN(DirectionTracker):
     active_detector : Tracker
         The detector and its state.
     x, P : ndarray, shapes (n_slots,), (n_slots, n_slots)
-        Reported directions, rad, NaN in unused slots, and their variances on a diagonal.
+        Reported directions, rad, NaN in unused slots, and their variances on a diagonal; on the
+        sphere two entries a slot, azimuth and elevation.
 
     Notes
     -----
@@ -70,7 +81,8 @@ class PeaksGNN(DirectionTracker):
     source (`walk`), 68 and 94 % for six (Fig. 6 of SVALSE's paper): most of the error is then
     interference, which the curvature of a peak does not show. A track of a line that leaves ±90°
     ends, as does one after `patience` steps without a detection, those without data included, and
-    one whose standard deviation exceeds that of a uniform direction.
+    one whose standard deviation exceeds that of a uniform direction. One that would pass below the
+    plane of the sensors is mirrored.
 
     References
     ----------
@@ -117,7 +129,7 @@ class PeaksGNN(DirectionTracker):
     def reset(self) -> None:
         """Return to the state after construction: no track, the detector as it was given."""
         self.active_detector = self._new_detector()
-        self.bank = TrackBank.empty(self.n_slots, self.motion.dim_x)
+        self.bank = self._empty_bank()
         self._report_confirmed(self._no_amplitude())
 
     @property
@@ -133,7 +145,7 @@ class PeaksGNN(DirectionTracker):
         self.active_detector.predict(dt=dt)
         bank = self.bank.predict(self.motion, dt)
         unknown = bank.covariance[:, 0, 0] > self._max_variance
-        has_ended = self._is_outside(bank.mean[:, 0]) | unknown | (bank.misses > self.patience + 1)
+        has_ended = self._is_outside(bank) | unknown | (bank.misses > self.patience + 1)
         self.bank = bank.remove(bank.used & has_ended)
         self._report_confirmed(self._no_amplitude())
 
@@ -144,9 +156,12 @@ class PeaksGNN(DirectionTracker):
             return
         self._apply_changed_parameters()
         self.active_detector.update(z)
-        detected = instance("detector's estimate", self.active_detector.estimate, DirectionEstimate)
+        detected = instance(
+            "detector's estimate", self.active_detector.estimate, self.estimate_kind
+        )
         bank, tracks = self.bank, np.flatnonzero(self.bank.used)
-        residual = self._difference(detected.doa, bank.mean[tracks, :1])
+        directions = self._directions(detected)
+        residual = self._difference(directions, bank.mean[tracks, :1])
         S = bank.covariance[tracks, 0, 0] + self.std**2  # S = H P H' + R
         pair, detection = nearest(residual, S, self.gate)
         bank = bank.update(tracks[pair], residual[pair, detection], self.std**2)
@@ -155,7 +170,7 @@ class PeaksGNN(DirectionTracker):
         amplitude = self._no_amplitude()
         amplitude[tracks[pair]] = detected.amplitude[detection]
         unassigned = np.delete(np.arange(detected.n_found), detection)
-        self.bank = bank.add(detected.doa[unassigned], self._initial_covariance())
+        self.bank = bank.add(directions[unassigned], self._initial_covariance())
         is_new = self.bank.used & ~bank.used
         amplitude[is_new] = detected.amplitude[unassigned][: is_new.sum()]
         self._report_confirmed(amplitude)
@@ -164,8 +179,9 @@ class PeaksGNN(DirectionTracker):
         """Reset the parts that depend on parameters that `set_params` changed."""
         if self._detector_parameters != (self.detector, self.measurement):
             self.active_detector = self._new_detector()
-        if self.bank.mean.shape != (self.n_slots, self.motion.dim_x):
-            self.bank = TrackBank.empty(self.n_slots, self.motion.dim_x)
+        empty = self._empty_bank()
+        if self.bank.mean.shape != empty.mean.shape:
+            self.bank = empty
 
     def _new_detector(self) -> Tracker:
         self._detector_parameters = (self.detector, self.measurement)
@@ -186,16 +202,38 @@ class PeaksGNN(DirectionTracker):
     def _no_amplitude(self) -> Complex:
         return np.full(self.n_slots, complex(np.nan, np.nan))
 
-    def _difference(self, doa: Float, mean: Float) -> Float:
-        return wrap(doa - mean) if self.measurement.array.dim > 1 else doa - mean
+    def _empty_bank(self) -> TrackBank:
+        """Return a bank without tracks, and set the class of the estimates."""
+        model = self.measurement
+        self.estimate_kind = kind_of_estimate(model, type(self).__name__, "azimuth", "sphere")
+        if model.unknowns == "azimuth":
+            return TrackBank.empty(self.n_slots, self.motion.dim_x)
+        bank = SphereBank.empty(self.n_slots, self.motion.dim_x)
+        return replace(bank, normal=half_space_normal(model))
 
-    def _is_outside(self, doa: Float) -> Bool:
-        line = self.measurement.array.dim == 1
-        return np.asarray(line & (np.abs(doa) > np.pi / 2))
+    def _directions(self, detected: DirectionEstimate) -> Float:
+        """Return directions as entries of the bank, (n,) or (n, 3)."""
+        if isinstance(detected, SphereEstimate):
+            return unit_vectors(detected.doa, detected.elevation)
+        return detected.doa
+
+    def _difference(self, directions: Float, mean: Float) -> Float:
+        """Return residuals (n_tracks, n) or (n_tracks, n, 3)."""
+        if directions.ndim > 1:
+            return offsets(mean, directions)
+        is_circle = self.measurement.array.dim > 1
+        return wrap(directions - mean) if is_circle else directions - mean
+
+    def _is_outside(self, bank: TrackBank) -> Bool:
+        if self.measurement.array.dim > 1:
+            return np.zeros(len(bank.mean), dtype=np.bool_)
+        return np.asarray(np.abs(bank.mean[:, 0]) > np.pi / 2)
 
     @property
     def _max_variance(self) -> float:
-        """Variance of a uniform direction, rad²."""
+        """Variance of a uniform direction along each axis, rad²."""
+        if self.measurement.unknowns == "sphere":
+            return UNIFORM_VARIANCE_OF_SPHERE
         is_line = self.measurement.array.dim == 1
         return (UNIFORM_STD_OF_LINE if is_line else UNIFORM_STD_OF_CIRCLE) ** 2
 
@@ -208,10 +246,15 @@ class PeaksGNN(DirectionTracker):
         """Report the confirmed tracks with a detection not too long ago."""
         bank = self.bank
         confirmed = bank.used & (bank.hits >= self.confirm_steps) & (bank.misses <= self.patience)
-        doa = bank.mean[confirmed, 0]
-        self.report(
-            wrap(doa) if self.measurement.array.dim > 1 else doa,
-            np.sqrt(bank.covariance[confirmed, 0, 0]),
+        mean, variance = bank.mean[confirmed, 0], bank.covariance[confirmed, 0, 0]
+        if isinstance(bank, SphereBank):
+            directions, axes = np.stack(azimuth_elevation(mean)), np.eye(2)
+        else:
+            directions = (wrap(mean) if self.measurement.array.dim > 1 else mean)[None]
+            axes = np.eye(1)
+        self.report_directions(
+            directions,
+            variance[:, None, None] * axes,
             amplitude=amplitude[confirmed],
             label=bank.label[confirmed],
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -40,7 +40,7 @@ class TrackBank:
     n_labels: int = 0
 
     @classmethod
-    def empty(cls, n_slots: int, n: int) -> TrackBank:
+    def empty(cls, n_slots: int, n: int) -> Self:
         """Return a bank without tracks."""
         none, zero = np.full(n_slots, -1), np.zeros(n_slots, dtype=np.int64)
         return cls(np.full((n_slots, n), np.nan), np.zeros((n_slots, n, n)), none, zero, zero)
@@ -50,14 +50,14 @@ class TrackBank:
         """Mask of the slots that hold a track."""
         return np.asarray(self.label >= 0)
 
-    def predict(self, motion: MotionModel, dt: float) -> TrackBank:
+    def predict(self, motion: MotionModel, dt: float) -> Self:
         """Return the bank after a step of a linear motion, so far without a measurement."""
         F, used = motion.F(np.zeros(motion.dim_x), dt), self.used
         P = predict_gaussian(self.covariance[used], F, motion.Q(dt))
         moved = self._replace_slots(used, mean=self.mean[used] @ F.T, covariance=P)
         return replace(moved, misses=self.misses + used)
 
-    def update(self, slots: Int, residual: Float, variance: float) -> TrackBank:
+    def update(self, slots: Int, residual: Float, variance: float) -> Self:
         """Return the bank after a measurement of some tracks."""
         H, R = np.eye(1, self.mean.shape[1]), np.full((1, 1), variance)
         updated = update_gaussian(self.mean[slots], self.covariance[slots], residual[:, None], H, R)
@@ -65,10 +65,13 @@ class TrackBank:
             slots, mean=updated.x, covariance=updated.P, hits=self.hits[slots] + 1, misses=0
         )
 
-    def add(self, z: Float, covariance: Float) -> TrackBank:
-        """Return the bank with a new track for each measurement, while slots are free."""
+    def add(self, z: Float, covariance: Float) -> Self:
+        """Return the bank with a new track for each measurement, while slots are free.
+
+        Measurements have the shape of entry 0 of the state.
+        """
         free_slots = np.flatnonzero(~self.used)[: len(z)]
-        mean = np.zeros((len(free_slots), self.mean.shape[1]))
+        mean = np.zeros((len(free_slots), *self.mean.shape[1:]))
         mean[:, 0] = z[: len(free_slots)]
         label = self.n_labels + np.arange(len(free_slots))
         bank = self._replace_slots(
@@ -76,11 +79,11 @@ class TrackBank:
         )
         return replace(bank, n_labels=self.n_labels + len(free_slots))
 
-    def remove(self, slots: Bool) -> TrackBank:
+    def remove(self, slots: Bool) -> Self:
         """Return the bank without some tracks."""
         return self._replace_slots(slots, mean=np.nan, covariance=0.0, label=-1, hits=0, misses=0)
 
-    def _replace_slots(self, slots: Int | Bool, **changes: Any) -> TrackBank:
+    def _replace_slots(self, slots: Int | Bool, **changes: Any) -> Self:
         arrays = {name: getattr(self, name).copy() for name in changes}
         for name, values in changes.items():
             arrays[name][slots] = values
@@ -92,10 +95,10 @@ def nearest(residual: Float, variance: Float, gate: float) -> tuple[Int, Int]:
 
     Parameters
     ----------
-    residual : ndarray, shape (n_tracks, n_measurements)
-        Measurements minus predictions.
+    residual : ndarray, shape (n_tracks, n_measurements) or (n_tracks, n_measurements, n)
+        Measurements minus predictions, numbers or vectors.
     variance : ndarray, shape (n_tracks,)
-        Variance of the residuals.
+        Variance of the residuals along each axis.
     gate : float
         Maximum distance of a pair, in standard deviations.
 
@@ -115,7 +118,8 @@ def nearest(residual: Float, variance: Float, gate: float) -> tuple[Int, Int]:
     """
     from scipy.optimize import linear_sum_assignment
 
-    distance = residual**2 / variance[:, None]
+    square = residual**2 if residual.ndim == 2 else (residual**2).sum(axis=-1)
+    distance = square / variance[:, None]
     is_within = distance <= gate**2
     outside = gate**2 * (1 + min(distance.shape))  # above the cost of all pairs within the gate
     track, measurement = linear_sum_assignment(np.where(is_within, distance, outside))

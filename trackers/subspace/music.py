@@ -7,7 +7,8 @@ from typing import ClassVar
 import numpy as np
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
-from arrivals.trackers.beamforming.scan_grid import ScanGrid, number_of_directions, scan_grid
+from arrivals.trackers.beamforming.model_grid import number_of_directions, scan_grid
+from arrivals.trackers.beamforming.scan_grid import ScanGrid
 from arrivals.trackers.registry import register
 from arrivals.trackers.subspace.base import NumberOfSources
 from arrivals.trackers.subspace.covariance import CovarianceSubspace
@@ -81,6 +82,7 @@ class MUSIC(CovarianceSubspace[SpectrumSearch | NormalizedSearch]):
 
     Examples
     --------
+    >>> from arrivals.measurement_models import SensorArray
     >>> model = ArraySnapshot(SensorArray.uca(8, radius=0.6), wavelength=1.0, noise=0.1)
     >>> phases = np.exp(2j * np.pi * np.random.default_rng(0).random((50, 2)))
     >>> z = model.simulate(np.full((50, 2), [-2.0, 0.5]), phases, np.random.default_rng(1))

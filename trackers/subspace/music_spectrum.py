@@ -158,12 +158,12 @@ def _highest(power: Float) -> Float:
     """Return the maximum of each bin (n_bins, 1); 1 for a single one."""
     if power.shape[1] == 1:
         return np.ones((1, 1))
-    return np.maximum(power.max(axis=(0, 2))[:, None], TINY)
+    return np.asarray(np.maximum(power.max(axis=(0, 2))[:, None], TINY))
 
 
 def _mean(power: Float, highest: Float) -> Float:
     """Return the mean over the bins, the largest over a second unknown, (n,)."""
-    return np.maximum((power / highest).mean(axis=1).max(axis=0), TINY)
+    return np.asarray(np.maximum((power / highest).mean(axis=1).max(axis=0), TINY))
 
 
 def spectrum_search(model: ArraySnapshot, grid: ScanGrid) -> SpectrumSearch | NormalizedSearch:

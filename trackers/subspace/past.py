@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.trackers.beamforming.covariance import used_data
-from arrivals.trackers.beamforming.scan_grid import scan_grid
+from arrivals.trackers.beamforming.model_grid import scan_grid
 from arrivals.trackers.registry import register
 from arrivals.trackers.subspace.base import DirectionFinder, NumberOfSources, SubspaceTracker
 from arrivals.trackers.subspace.bin_values import column, is_zero, larger, power_of, where_bins

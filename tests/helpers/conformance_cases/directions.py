@@ -7,6 +7,7 @@ from arrivals.measurement_models.arrays.sphere import fibonacci_sphere
 from arrivals.motion_models import BernoulliVonMises
 from arrivals.trackers import (
     CBF,
+    MVDR,
     SBL,
     SSBL,
     SVALSE,
@@ -107,5 +108,15 @@ TRACKERS: list[tuple[str, MakeTracker, Measurements]] = [
     ("svalse", lambda: SVALSE(DIFFUSE, BernoulliVonMises(kappa=50.0)), two_sources(DIFFUSE)),
     ("valse", lambda: VALSE(LINE_DIFFUSE), two_sources(LINE_DIFFUSE)),
     ("cbf", lambda: CBF(SPHERE, n_directions=500, max_sources=3), two_sources(SPHERE)),
+    (
+        "peaks_gnn",
+        lambda: PeaksGNN(SPHERE, detector=CBF(SPHERE, n_directions=500, max_sources=3)),
+        two_sources(SPHERE),
+    ),
+    (
+        "peaks_gnn",
+        lambda: PeaksGNN(SPACE, detector=MVDR(SPACE, n_directions=500), confirm_steps=1),
+        two_sources(SPACE),
+    ),
     ("cbf", lambda: CBF(SPACE, n_directions=500, max_sources=3), two_sources(SPACE)),
 ]

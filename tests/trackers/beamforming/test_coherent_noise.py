@@ -52,7 +52,7 @@ def test_spectrum_of_the_noise_is_flat_and_its_variance(model: ArraySnapshot) ->
     model = model.replace(noise=0.3)
     rng, tracker = np.random.default_rng(0), CBF(model.replace(elevation=None), n_directions=37)
     z = model.simulate(np.full((600, 1), np.nan), 0.0, rng)
-    power = np.empty((len(z), tracker.n_directions))
+    power = np.empty((len(z), len(tracker.doa_grid)))
     for step in range(len(z)):
         tracker.update(with_gaps(model, z[step], "sensor"))
         power[step] = tracker.power
