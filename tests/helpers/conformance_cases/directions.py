@@ -7,7 +7,6 @@ from arrivals.measurement_models.arrays.sphere import fibonacci_sphere
 from arrivals.motion_models import BernoulliVonMises
 from arrivals.trackers import (
     CBF,
-    MVDR,
     SBL,
     SSBL,
     SVALSE,
@@ -32,7 +31,7 @@ DIFFUSE = WIDEBAND.replace(noise_coherence="diffuse")
 LINE_DIFFUSE = LINE.replace(noise_coherence="diffuse", white=0.3)
 SPHERE = CIRCLE.replace(unknowns="sphere")
 SPACE = ArraySnapshot(
-    SensorArray(0.4 * fibonacci_sphere(8)), [1.0, 1.3], 1e-3, n_snapshots=2, unknowns="sphere"
+    SensorArray(0.7 * fibonacci_sphere(12)), [1.0, 1.3], 1e-3, n_snapshots=2, unknowns="sphere"
 )
 GAPS = ArraySnapshot(SensorArray.ula(10, 0.4, missing=[2]), wavelength=1.0, noise=1e-3)
 
@@ -41,7 +40,7 @@ def two_sources(model: ArraySnapshot, n_steps: int = 4) -> Measurements:
     """Return snapshots of two sources: the second starts late, a sensor fails, the end is zero."""
     on = np.arange(n_steps) > 0
     doa = np.stack([0.5 + 0.02 * np.arange(n_steps), np.where(on, -0.4, np.nan)], axis=-1)
-    elevation = np.array([0.3, 0.9]) + 0 * doa if model.unknowns == "sphere" else None
+    elevation = np.array([0.1, 1.0]) + 0 * doa if model.unknowns == "sphere" else None
     z = model.simulate(doa, [1.0, 0.8j], np.random.default_rng(5), elevation)
     z[1, ..., 3] = np.nan
     z[-1] = 0.0
@@ -110,12 +109,14 @@ TRACKERS: list[tuple[str, MakeTracker, Measurements]] = [
     ("cbf", lambda: CBF(SPHERE, n_directions=500, max_sources=3), two_sources(SPHERE)),
     (
         "peaks_gnn",
-        lambda: PeaksGNN(SPHERE, detector=CBF(SPHERE, n_directions=500, max_sources=3)),
+        lambda: PeaksGNN(
+            SPHERE, detector=CBF(SPHERE, n_directions=500, max_sources=3), confirm_steps=1
+        ),
         two_sources(SPHERE),
     ),
     (
         "peaks_gnn",
-        lambda: PeaksGNN(SPACE, detector=MVDR(SPACE, n_directions=500), confirm_steps=1),
+        lambda: PeaksGNN(SPACE, detector=CBF(SPACE, n_directions=500, threshold_db=6.0)),
         two_sources(SPACE),
     ),
     ("cbf", lambda: CBF(SPACE, n_directions=500, max_sources=3), two_sources(SPACE)),
