@@ -95,7 +95,7 @@ class SineLine(PhaseManifold):
     def distance(self, x: Float, others: Float) -> Float:
         """Return differences of direction, rad, of (..., d, L) and (d, G): (..., L, G)."""
         doa, other = (np.arcsin(self.direction(each)[..., 0, :]) for each in (x, others))
-        return np.asarray(np.abs(doa[..., None] - other))
+        return np.asarray(np.abs(doa[..., None] - other[..., None, :]))
 
     def exists(self, x: Float, covariance: Float) -> Bool:
         """Return which points (d, L) are within three standard deviations of a direction."""

@@ -156,7 +156,7 @@ class HorizontalWaves(LocalManifold):
 
     def distance(self, x: Float, others: Float) -> Float:
         """Return angles, rad, between (..., 1, L) and (1, G): (..., L, G)."""
-        apart = (x[..., 0, :, None] - others[0]) * self.unit[0]
+        apart = (x[..., 0, :, None] - others[..., 0, None, :]) * self.unit[0]
         return np.abs(self.wrap(apart))
 
     def exists(self, x: Float, covariance: Float) -> Bool:

@@ -187,7 +187,7 @@ class PointManifold(Manifold, Protocol):
         """Return the points at which sources may appear."""
 
     def distance(self, x: Float, others: Float) -> Float:
-        """Return distances in direction, rad, of (..., p, L) and (p, G): (..., L, G)."""
+        """Return distances in direction, rad, of (..., p, L) and ([...,] p, G): (..., L, G)."""
 
     def exists(self, x: Float, covariance: Float) -> Bool:
         """Return which points (p, L) lie within three standard deviations of a direction."""

@@ -154,7 +154,7 @@ class SphericalLine(LocalManifold):
     def distance(self, x: Float, others: Float) -> Float:
         """Return differences of direction, rad, of (..., 2, L) and (2, G): (..., L, G)."""
         doa, other = (np.arcsin(self.direction(each)[..., 0, :]) for each in (x, others))
-        return np.asarray(np.abs(doa[..., None] - other))
+        return np.asarray(np.abs(doa[..., None] - other[..., None, :]))
 
     def exists(self, x: Float, covariance: Float) -> Bool:
         """Return which points (2, L) are within three standard deviations of a direction."""

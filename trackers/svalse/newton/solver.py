@@ -112,6 +112,9 @@ class NewtonSolver(SolverSettings):
             and not probability("merge_correlation", self.merge_correlation) > 0
         ):
             raise ValueError(f"merge_correlation must lie in (0, 1]; got {self.merge_correlation}")
+        if not 0 < probability("curved_probability", self.curved_probability) < 1:
+            got = self.curved_probability
+            raise ValueError(f"curved_probability must lie between 0 and 1; got {got}")
         instance("limits", self.limits, IterationLimits)
 
     def merging(self, manifold: Manifold, with_prior: bool) -> tuple[float, float | None]:

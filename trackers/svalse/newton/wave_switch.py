@@ -125,7 +125,7 @@ def switch_waves(
     log_odds = float(np.log(curved_probability) - np.log1p(-curved_probability))
     evidence = curvature_evidence(response, evaluation, slab, log_odds, kl_weight)
     order, there = trial_order(evidence, evaluation.components.point[:, 1])
-    tried, changed = there.any(axis=1), np.zeros(len(evaluation), dtype=np.bool_)
+    tried, changed = np.asarray(there.any(axis=1)), np.zeros(len(evaluation), dtype=np.bool_)
     if not any_set(tried):
         return evaluation, tried, changed
     row, place = np.nonzero(there)
