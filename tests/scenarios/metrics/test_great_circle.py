@@ -13,7 +13,7 @@ from two_unknowns import GivenEstimates, range_estimate, run_of, sphere_estimate
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.measurement_models.arrays.sphere import azimuth_elevation, unit_vectors
 from arrivals.motion_models import BernoulliVonMises
-from arrivals.scenarios import Trial, gospa, mean_gospa, mean_rmse, ospa, rmse
+from arrivals.scenarios import Trial, create, gospa, mean_gospa, mean_rmse, ospa, rmse
 from arrivals.scenarios.experiments.estimator import TrackerEstimator
 from arrivals.scenarios.experiments.monte_carlo import monte_carlo
 from arrivals.scenarios.metrics import METRICS, RANGE_METRICS, label_switches, matches
@@ -205,6 +205,18 @@ def test_study_takes_range_metrics_by_name_and_reports_why_there_is_none() -> No
     study = monte_carlo("svalse_fig6", ["cbf"], runs=1, metrics=["gospa", "range_error"])
     with pytest.raises(ValueError, match="truth has none"):
         study.mean("range_error", "cbf")
+
+
+def test_studies_of_scenes_with_two_unknowns_have_all_metrics() -> None:
+    names = ["gospa", "nees", "label_switches", *RANGE_METRICS]
+    near = monte_carlo([create("near_field", n_steps=4)], ["svalse"], runs=1, metrics=names)
+    assert near.mean("gospa", "svalse") < 1
+    assert near.mean("range_error", "svalse") < 0.05
+    assert near.mean("range_found", "svalse") == 1
+    assert 0 < near.mean("range_nees", "svalse") < 5
+    sky = monte_carlo([create("sphere", n_steps=4)], ["svalse"], runs=1, metrics=names[:3])
+    assert sky.mean("gospa", "svalse") < 6
+    assert sky.mean("nees", "svalse") < 5
 
 
 def test_labels_that_change_along_a_track_on_the_sphere_are_counted() -> None:
