@@ -85,6 +85,12 @@ def test_directions_without_label_have_no_end() -> None:
     assert (len(alone.get_offsets()), len(last.get_offsets())) == (2, 0)
 
 
+def test_ends_of_many_tracks_are_not_marked() -> None:
+    many = [float(k) for k in range(31)]
+    assert len(dots(plot_sky(sky((many, many))))[1].get_offsets()) == 0
+    assert len(dots(plot_sky(sky((many[:30], many[:30]))))[1].get_offsets()) == 30
+
+
 def test_ranges_have_bands_of_one_deviation() -> None:
     ax = plot_range(ranges([50.0], [40.0]), time=[1.0, 1.5])
     np.testing.assert_allclose(segments(ax)[0], np.array([[1, 50], [1.5, 40]]))

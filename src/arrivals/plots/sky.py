@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 RIM = 90.0  # degrees from the middle of a disc to its horizon
 APART = 250.0  # between the middles of two discs
 RINGS = (30, 60)  # elevations that are marked
+MAX_ENDS = 30  # tracks whose ends are marked, if there are no more
 
 
 def plot_sky(run: Run, *, clockwise: bool = False, ax: Axes | None = None) -> Axes:
@@ -29,7 +30,7 @@ def plot_sky(run: Run, *, clockwise: bool = False, ax: Axes | None = None) -> Ax
 
     The distance from the middle is 90 degrees minus the elevation. Directions below the horizon
     are on a second disc, with the nadir in the middle, as seen from above, too. Colours and opacity
-    are those of `plot_bearing_time`; a ring is the last direction of a track.
+    are those of `plot_bearing_time`; a ring is the last direction of a track, of at most 30.
 
     Parameters
     ----------
@@ -76,6 +77,7 @@ def plot_sky(run: Run, *, clockwise: bool = False, ax: Axes | None = None) -> Ax
     colour, label = track_colours(run, step, slot), run.label[step, slot]
     draw_tracks(ax, point, colour, joined & (lower[1:] == lower[:-1]))
     last = np.append(np.diff(label) != 0, True)[: len(label)] & (label >= 0)
+    last &= last.sum() <= MAX_ENDS
     x, y = point[last].T
     ax.scatter(x, y, s=42, facecolors="none", edgecolors=list(colour[last]), linewidths=1.4,
                zorder=4)  # fmt: skip
