@@ -9,6 +9,7 @@ import numpy as np
 from arrivals.typing import Float, Int
 
 PLACES = {1: np.array([[0]]), 2: np.array([[0, 1], [1, 2]])}  # of the entries ij, by d
+MIN_INDEPENDENCE = 1e-14  # one minus the square of a correlation
 SIZES = {1: 1, 3: 2}  # rows of a matrix, by the length of its triangle
 
 
@@ -51,8 +52,13 @@ def log_det(C: Float) -> Float:
 
 
 def determinant(C: Float) -> Float:
-    """Return the determinants of matrices of two rows, (..., L)."""
-    return np.asarray(C[..., 0, :] * C[..., 2, :] - C[..., 1, :] ** 2)
+    """Return the determinants of positive definite matrices of two rows, (..., L).
+
+    The square of a correlation counts as at most 1 - 1e-14: beyond it rounding decides.
+    """
+    product = C[..., 0, :] * C[..., 2, :]
+    square = C[..., 1, :] ** 2 / np.where(product > 0, product, 1.0)
+    return np.asarray(product * np.maximum(1 - square, MIN_INDEPENDENCE))
 
 
 def inverse(C: Float) -> Float:

@@ -69,7 +69,9 @@ class LocalManifold(PointResponse):
             bent = one * H[..., :2, :, :] + two * H[..., 1:, :, :]
             weight = HALVES * S
         second += H
-        mean[..., 0, :, :] = a * np.exp((weight * second).sum(axis=-3))
+        exponent = (weight * second).sum(axis=-3)
+        np.minimum(exponent.real, 0.0, out=exponent.real)  # of a wide S the expansion is not valid
+        mean[..., 0, :, :] = a * np.exp(exponent)
         # ∂ₖ ln ⟨a⟩ = Zₖ + Σ Sᵢⱼ Zᵢ Hⱼₖ + ½ Σ Sᵢⱼ ∂ₖHᵢⱼ
         slopes = Z + bent
         slopes += self.damping_slope(Z, S)

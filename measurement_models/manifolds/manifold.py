@@ -162,7 +162,7 @@ class PointManifold(Manifold, Protocol):
     def merge_correlation(self) -> float | None:
         """Correlation of two responses above which their sources count as one.
 
-        None where a distance in direction decides: a direction has one source.
+        None where a distance in direction decides.
         """
 
     def responses(self, x: Float, covariance: Float) -> Complex:

@@ -17,6 +17,7 @@ from arrivals.measurement_models.manifolds.manifold import CandidatePoints
 from arrivals.measurement_models.manifolds.points import (
     MIN_COSINE,
     PAIRS,
+    SAME_SOURCE,
     SPACING_OF_TWO,
     PointResponse,
     cell_centres,
@@ -115,6 +116,8 @@ class DirectionCosines(PhaseManifold):
     """
 
     axes: tuple[tuple[float, ...], ...]
+
+    merge_correlation: ClassVar[float | None] = SAME_SOURCE
 
     @cached_property
     def frame(self) -> Float:

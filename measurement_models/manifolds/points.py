@@ -18,6 +18,7 @@ from arrivals.typing import Bool, Complex, Float, Int
 PAIRS = {1: ((0, 0),), 2: ((0, 0), (0, 1), (1, 1))}  # of upper triangles, by number of unknowns
 SPACING_OF_ONE = 0.45  # of candidates, rad rms of the phases over the array
 SPACING_OF_TWO = 0.5
+SAME_SOURCE = 0.99  # correlation of the responses of two directions that count as one source
 WALK_SHARE = 0.1  # of the largest 1/R of spherical waves: its default step
 MOST_CANDIDATES = 1 << 16
 MIN_COSINE = 0.1  # of the angle between a wave and broadside, where its inverse is taken

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,7 +14,12 @@ from arrivals.measurement_models.arrays.sphere import fibonacci_sphere, unit_vec
 from arrivals.measurement_models.manifolds.local import LocalManifold
 from arrivals.measurement_models.manifolds.located import tangent_estimate
 from arrivals.measurement_models.manifolds.manifold import CandidatePoints
-from arrivals.measurement_models.manifolds.points import SPACING_OF_TWO, cell_count, sine_limits
+from arrivals.measurement_models.manifolds.points import (
+    SAME_SOURCE,
+    SPACING_OF_TWO,
+    cell_count,
+    sine_limits,
+)
 from arrivals.typing import Bool, Complex, Float
 
 FEWEST_CANDIDATES = 100
@@ -43,6 +49,8 @@ class TangentPlanes(LocalManifold):
     >>> fields["doa"].round(6), fields["elevation"].round(6)
     (array([0.5]), array([0.2]))
     """
+
+    merge_correlation: ClassVar[float | None] = SAME_SOURCE
 
     @property
     def point_size(self) -> int:

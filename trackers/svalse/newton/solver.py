@@ -81,8 +81,9 @@ class NewtonSolver(SolverSettings):
         support. 1 is the exact bound; less finds weaker sources, and more false ones below 10 dB.
     merge_correlation : float, optional
         Instead of a distance: correlation of the responses, in all bins, above which the later of
-        two active components is removed; in (0, 1]. It needs no scale, and is the default, 0.95,
-        of spherical waves, where two sources may have one direction.
+        two active components is removed; in (0, 1]. It needs no scale, and is the default with
+        azimuth and elevation, 0.99, and of spherical waves, 0.95, of which several may have one
+        direction.
     curved_probability : float
         Prior probability that a wave is curved, where sources have a range.
     limits : IterationLimits
