@@ -8,7 +8,6 @@ import numpy as np
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.arrays.sphere import fibonacci_sphere
-from arrivals.measurement_models.manifolds.phase import plane_axes
 from arrivals.trackers.beamforming.scan_grid import AngleGrid, ScanGrid
 from arrivals.trackers.beamforming.spectrum import scan_directions
 from arrivals.trackers.beamforming.sphere_grid import SphereGrid, half_space_normal
@@ -29,6 +28,36 @@ def number_of_directions(n: int | None) -> int | None:
     (None, 90)
     """
     return None if n is None else count("n_directions", n, 3, MAX_DIRECTIONS)
+
+
+def n_sphere_directions(step: float, half: bool) -> int:
+    """Return how many directions cover the sphere, or a half, at a mean distance, rad.
+
+    Examples
+    --------
+    >>> n_sphere_directions(np.deg2rad(2.0), half=True)
+    5157
+    """
+    return round((2 if half else 4) * np.pi / step**2)
+
+
+@lru_cache(maxsize=8)
+def sphere_grid(n: int, normal: tuple[float, ...] | None) -> SphereGrid:
+    """Return n even directions on the sphere, or on the half above a plane, cached.
+
+    Examples
+    --------
+    >>> sphere_grid(100, (0.0, 1.0, 0.0)).points.min(axis=0).round(1) + 0
+    array([-1.,  0., -1.])
+    """
+    if normal is None:
+        return SphereGrid(fibonacci_sphere(n), None)
+    up = np.array(normal)
+    first = np.eye(3)[int(np.abs(up).argmin())]
+    first = first - (first @ up) * up
+    first /= np.linalg.norm(first)
+    frame = np.stack([first, np.cross(up, first), up])
+    return SphereGrid(fibonacci_sphere(n, upper=True) @ frame, up)
 
 
 @lru_cache(maxsize=16)  # models are immutable
@@ -62,12 +91,10 @@ def scan_grid(model: ArraySnapshot, n: int | None = None) -> ScanGrid:
         doa = scan_directions(model.array, n or DEFAULT_DIRECTIONS)
         grid: ScanGrid = AngleGrid(doa[None], model.array.dim > 1)
     else:
-        area = 2 * np.pi if model.half_space else 4 * np.pi
-        n = round(area / DEFAULT_STEP**2) if n is None else n
+        normal = half_space_normal(model)
+        if n is None:
+            n = n_sphere_directions(DEFAULT_STEP, normal is not None)
         n = count("n_directions", n, MIN_SPHERE_DIRECTIONS, MAX_DIRECTIONS)
-        points, normal = fibonacci_sphere(n, upper=model.half_space), half_space_normal(model)
-        if normal is not None:
-            points = points @ plane_axes(model.array.positions - model.waves.centre)
-        grid = SphereGrid(points, normal)
+        grid = sphere_grid(n, None if normal is None else tuple(normal.tolist()))
     grid.directions.setflags(write=False)
     return grid

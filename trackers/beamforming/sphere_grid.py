@@ -77,6 +77,15 @@ class SphereGrid(ScanGrid):
     @cached_property
     def neighbours(self) -> Int:
         """Indices of the nearest directions, (8, n_directions)."""
+        return np.ascontiguousarray(self._nearest[0].T)
+
+    @property
+    def ring(self) -> Float:
+        """Unit vectors to the nearest directions or their mirror images, (n_directions, 8, 3)."""
+        return self._nearest[1]
+
+    @cached_property
+    def _nearest(self) -> tuple[Int, Float]:
         from scipy.spatial import cKDTree
 
         points, index = self.points, np.arange(len(self.points))
@@ -85,8 +94,8 @@ class SphereGrid(ScanGrid):
             index = np.concatenate([index, edge])
             mirrored = points[edge] - 2 * (points[edge] @ self.normal)[:, None] * self.normal
             points = np.concatenate([points, mirrored])
-        nearest = cKDTree(points).query(self.points, N_NEIGHBOURS + 1)[1]
-        return np.ascontiguousarray(index[nearest[:, 1:]].T)
+        nearest = cKDTree(points).query(self.points, N_NEIGHBOURS + 1)[1][:, 1:]
+        return index[nearest], points[nearest]
 
     def peaks(
         self,

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from arrivals.measurement_models.manifolds.manifold import AngleManifold
-from arrivals.trackers.wideband.direction_grid import DirectionGrid
+from arrivals.trackers.wideband.density_grid import DensityGrid
+from arrivals.trackers.wideband.sphere_waves import SphereWaves
 from arrivals.typing import Bool, Complex, Float, Int
 
 Single: TypeAlias = NDArray[np.float32]  # evidence of many bins: memory limits the speed
@@ -34,6 +35,7 @@ class ScanResponse:
     Examples
     --------
     >>> from arrivals.measurement_models import ArraySnapshot, SensorArray
+    >>> from arrivals.trackers.wideband.direction_grid import DirectionGrid
     >>> manifold = ArraySnapshot(SensorArray.uca(5, 0.4), [1.0, 1.2]).manifold()
     >>> scan_response(manifold, DirectionGrid(False, np.pi / 4), 3.0).beam.shape
     (2, 5, 8)
@@ -113,14 +115,16 @@ def unit_snapshots(snapshots: Complex, bins: Bool) -> tuple[SingleComplex, Float
 
 
 @lru_cache(maxsize=16)  # one for each set of sensors with valid data
-def scan_response(manifold: AngleManifold, grid: DirectionGrid, ratio: float) -> ScanResponse:
+def scan_response(
+    manifold: AngleManifold | SphereWaves, grid: DensityGrid, ratio: float
+) -> ScanResponse:
     """Return the responses of a manifold on a grid, cached.
 
     Parameters
     ----------
-    manifold : AngleManifold
+    manifold : AngleManifold or SphereWaves
         Whitened response of the array.
-    grid : DirectionGrid
+    grid : DensityGrid
         Directions.
     ratio : float
         Power of a source over that of the diffuse sound.
@@ -129,7 +133,7 @@ def scan_response(manifold: AngleManifold, grid: DirectionGrid, ratio: float) ->
     -------
     ScanResponse
     """
-    a = manifold.steering(manifold.from_doa(grid.doa))  # (n_nuisance, F, M, G)
+    a = grid.responses(manifold)  # (n_nuisance, F, M, G)
     a = np.concatenate(list(a), axis=-1)
     norm = (a.real**2 + a.imag**2).sum(axis=1)
     beam = a.conj() / np.sqrt(np.maximum(norm, 1e-30))[:, None]

@@ -7,9 +7,10 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
+from arrivals.measurement_models.manifolds.manifold import AngleManifold
 from arrivals.motion_models.von_mises import wrap
 from arrivals.parameters import FrozenModel
-from arrivals.typing import Float
+from arrivals.typing import Complex, Float
 
 SMALLEST = np.finfo(float).tiny
 UNIFORM_VARIANCE = (6 * np.pi) ** 2  # rad², after which every direction is as likely
@@ -58,6 +59,19 @@ class DirectionGrid(FrozenModel):
     def difference(self, one: Float, other: Float) -> Float:
         """Return differences of directions, rad."""
         return np.asarray(one - other if self.is_line else wrap(one - other))
+
+    def responses(self, manifold: AngleManifold) -> Complex:
+        """Return the responses of an array, (n_nuisance, n_bins, n_sensors, n_directions)."""
+        return manifold.steering(manifold.from_doa(self.doa))
+
+    def moved(self, density: Float, variance: float) -> Float:
+        """Return densities (..., n_directions) after a random walk of a variance, rad²."""
+        return np.asarray(density @ self.walk(variance))
+
+    def located(self, density: Float, half_width: float) -> tuple[Float, Float]:
+        """Return directions (1, n), rad, and variances (n, 1, 1), as `moments` does."""
+        doa, variance = self.moments(density, half_width)
+        return doa[None], variance[:, None, None]
 
     def walk(self, variance: float) -> Float:
         """Return the transition matrix of a random walk, cached: rows are densities to move.

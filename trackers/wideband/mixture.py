@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from arrivals.trackers.wideband.bin_evidence import Single
-from arrivals.trackers.wideband.direction_grid import DirectionGrid
+from arrivals.trackers.wideband.density_grid import DensityGrid
 from arrivals.trackers.wideband.settings import MixtureSettings
 from arrivals.trackers.wideband.tracked_sources import TrackedSources
 from arrivals.typing import Float
@@ -86,7 +86,7 @@ def fit(evidence: Single, prior: Float, start: Float, settings: MixtureSettings)
 
 
 def fit_with_births(
-    evidence: Single, sources: TrackedSources, grid: DirectionGrid, settings: MixtureSettings
+    evidence: Single, sources: TrackedSources, grid: DensityGrid, settings: MixtureSettings
 ) -> tuple[TrackedSources, Mixture]:
     """Fit the mixture, and add new sources while one explains the bins much better.
 
@@ -96,7 +96,7 @@ def fit_with_births(
         ℓ of the counted bins.
     sources : TrackedSources
         Predicted sources.
-    grid : DirectionGrid
+    grid : DensityGrid
         Directions of the points.
     settings : MixtureSettings
         Settings.
@@ -125,7 +125,7 @@ def fit_with_births(
 
 
 def _birth_density(
-    evidence: Single, mixture: Mixture, grid: DirectionGrid, settings: MixtureSettings
+    evidence: Single, mixture: Mixture, grid: DensityGrid, settings: MixtureSettings
 ) -> Float | None:
     """Return the density at which a new source starts; None if it explains too little."""
     # B(θ) = Σ_i ln(1 - c + c exp(ℓ_i(θ) - m_i)) / T

@@ -26,7 +26,10 @@ class MixtureSettings(FrozenModel):
     Parameters
     ----------
     grid_step : float
-        Distance of the scan directions, rad.
+        Distance of the scan directions of one angle, rad.
+    sphere_step : float
+        Mean distance of the scan directions on the sphere, rad. At 4 degrees they are 2578, on the
+        half of an array in a plane 1289, and a step takes 8 and 4 times as long as one of azimuth.
     diffuse : bool
         True to replace white noise of the measurement model by diffuse noise; other noise of the
         model is kept.
@@ -89,6 +92,7 @@ class MixtureSettings(FrozenModel):
     """
 
     grid_step: float = float(np.deg2rad(3.0))
+    sphere_step: float = float(np.deg2rad(4.0))
     diffuse: bool = True
     source_ratio: float = 3.0
     tempering: float = 25.0

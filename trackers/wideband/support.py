@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from arrivals.trackers.wideband.direction_grid import SMALLEST, DirectionGrid
+from arrivals.trackers.wideband.density_grid import DensityGrid
+from arrivals.trackers.wideband.direction_grid import SMALLEST
 from arrivals.trackers.wideband.mixture import Mixture, log_odds_gain
 from arrivals.trackers.wideband.settings import MixtureSettings
 from arrivals.trackers.wideband.tracked_sources import TrackedSources
@@ -18,7 +19,7 @@ CERTAIN = 1e-4  # least distance of an updated existence from 0 and 1
 def updated(
     sources: TrackedSources,
     mixture: Mixture,
-    grid: DirectionGrid,
+    grid: DensityGrid,
     settings: MixtureSettings,
     seconds: float,
 ) -> tuple[TrackedSources, Int]:

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from arrivals.measurement_models.direction_measurement import DirectionMeasurement
 from arrivals.motion_models.bernoulli_von_mises import BernoulliVonMises
 from arrivals.trackers.direction_tracker import DirectionTracker, warn_of_ambiguity
+from arrivals.trackers.kinds_of_estimates import kind_of_estimate
 from arrivals.trackers.registry import register
 from arrivals.trackers.wideband.bin_evidence import (
     bin_evidence,
@@ -18,7 +19,7 @@ from arrivals.trackers.wideband.bin_evidence import (
     unit_snapshots,
 )
 from arrivals.trackers.wideband.bin_selection import BinLevels
-from arrivals.trackers.wideband.direction_grid import DirectionGrid
+from arrivals.trackers.wideband.density_grid import DensityGrid
 from arrivals.trackers.wideband.mixture import fit_with_births
 from arrivals.trackers.wideband.scan import Scan
 from arrivals.trackers.wideband.settings import MixtureSettings
@@ -46,7 +47,8 @@ class WidebandMixture(DirectionTracker):
     Parameters
     ----------
     measurement : DirectionMeasurement
-        An `ArraySnapshot`, or a model with its methods: any array, several frequency bins, tens of
+        An `ArraySnapshot`, or a model with its methods: any array, of one angle or (`ArraySnapshot`
+        alone) of azimuth and elevation, several frequency bins, tens of
         them as a rule, and several snapshots a step. Its noise is not used; white noise of an
         `ArraySnapshot` is replaced by diffuse noise where `settings.diffuse` is set.
     motion : BernoulliVonMises, optional
@@ -64,7 +66,7 @@ class WidebandMixture(DirectionTracker):
         Densities on the grid, existence, labels and ages of the tracked sources.
     levels : BinLevels
         Noise floor and recent peak of every frequency bin.
-    grid : DirectionGrid
+    grid : DensityGrid
         Scan directions of the densities.
 
     Raises
@@ -118,6 +120,8 @@ class WidebandMixture(DirectionTracker):
 
     def reset(self) -> None:
         """Return to the state after construction: no source, no noise floor."""
+        name = type(self).__name__
+        self.estimate_kind = kind_of_estimate(self.measurement, name, "azimuth", "sphere")
         self.scan = Scan.of(self.measurement, self.settings)
         self.scanned = self.measurement, self.settings
         self.sources = TrackedSources.none(self.scan.n_points)
@@ -126,7 +130,7 @@ class WidebandMixture(DirectionTracker):
         self.report_none()
 
     @property
-    def grid(self) -> DirectionGrid:
+    def grid(self) -> DensityGrid:
         """Scan directions of the densities."""
         return self.scan.grid
 
@@ -155,7 +159,7 @@ class WidebandMixture(DirectionTracker):
     def update(self, z: ArrayLike | None) -> None:
         """Fit the mixture to the bins of one measurement that count."""
         self._apply_changed_parameters()
-        observed, settings = self.scan.model.observe(z), self.settings
+        observed, settings = self.scan.observe(z), self.settings
         if observed is None:
             return
         manifold = self.scan.manifold
@@ -195,9 +199,12 @@ class WidebandMixture(DirectionTracker):
         """Report the sources that exist, with the powers of this step."""
         sources, settings = self.sources, self.settings
         active = np.flatnonzero(sources.active(settings) & (sources.label >= 0))
-        doa, variance = self.scan.moments(sources.density[active], settings.peak_half_width)
+        half_width = settings.peak_half_width
+        directions, covariance = self.scan.located(sources.density[active], half_width)
         # bins are T times fewer than they seem; the direction is T_std times as uncertain
         sharpening = settings.deviation_tempering / settings.tempering
-        std = np.sqrt(sharpening * variance + settings.model_deviation**2)
+        covariance = sharpening * covariance
+        covariance = covariance + settings.model_deviation**2 * np.eye(len(directions))
         amplitude = None if power is None else np.sqrt(power[active])
-        self.report(doa, std, sources.existence[active], amplitude, sources.label[active])
+        existence, label = sources.existence[active], sources.label[active]
+        self.report_directions(directions, covariance, existence, amplitude, label)

@@ -7,6 +7,7 @@ from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.motion_models import BernoulliVonMises
 from arrivals.trackers import MixtureSettings, Run, WidebandMixture
 from arrivals.trackers.wideband.bin_evidence import scan_response
+from arrivals.trackers.wideband.direction_grid import DirectionGrid
 from arrivals.typing import Complex, Float
 
 ARRAY = SensorArray.uca(6, radius=0.046, speed=343.0)
@@ -231,6 +232,7 @@ def test_motion_is_per_unit_of_time_and_the_default_per_second() -> None:
         tracker.predict()
     np.testing.assert_allclose(one.x, other.x, atol=0.02)
     grid = one.grid
+    assert isinstance(grid, DirectionGrid)
     spread = np.eye(len(grid.doa))[10] @ grid.walk(float(per_step.Q(1.0)[0, 0]))
     assert spread @ grid.offset[10] ** 2 == pytest.approx(0.05**2, rel=0.02)
     trial_like = WidebandMixture(CIRCLE, BernoulliVonMises(sigma_doa=np.deg2rad(3.0),
