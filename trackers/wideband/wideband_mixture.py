@@ -47,10 +47,10 @@ class WidebandMixture(DirectionTracker):
     Parameters
     ----------
     measurement : DirectionMeasurement
-        An `ArraySnapshot`, or a model with its methods: any array, of one angle or (`ArraySnapshot`
-        alone) of azimuth and elevation, several frequency bins, tens of
-        them as a rule, and several snapshots a step. Its noise is not used; white noise of an
-        `ArraySnapshot` is replaced by diffuse noise where `settings.diffuse` is set.
+        An `ArraySnapshot`, or a model with its methods: any array, several frequency bins, tens of
+        them as a rule, and several snapshots a step; an `ArraySnapshot` also of azimuth and
+        elevation. Its noise is not used; white noise of an `ArraySnapshot` is replaced by diffuse
+        noise where `settings.diffuse` is set.
     motion : BernoulliVonMises, optional
         Steps, births and deaths per unit of time; `still` must be 0. By default 3 degrees, 0.05
         and 0.02 in 128 ms, whatever the unit.

@@ -52,7 +52,8 @@ def talkers(model: ArraySnapshot, n_steps: int = 5) -> Measurements:
     rng = np.random.default_rng(5)
     doa = np.stack([np.full(n_steps, 0.5), np.where(np.arange(n_steps) > 0, -0.4, np.nan)], axis=-1)
     level = rng.exponential(size=(n_steps, *model.shape[:-1], 2)) ** 4
-    z = model.simulate(doa, level, rng)
+    elevation = np.array([0.1, 1.0]) + 0 * doa if model.unknowns == "sphere" else None
+    z = model.simulate(doa, level, rng, elevation)
     z[1, ..., 3] = np.nan
     z[-1] = 0.0
     return z
@@ -118,6 +119,14 @@ TRACKERS: list[tuple[str, MakeTracker, Measurements]] = [
         "peaks_gnn",
         lambda: PeaksGNN(SPACE, detector=CBF(SPACE, n_directions=500, threshold_db=6.0)),
         two_sources(SPACE),
+    ),
+    (
+        "wideband_mixture",
+        lambda: WidebandMixture(
+            MANY_BINS.replace(unknowns="sphere"),
+            settings=MixtureSettings(sphere_step=np.deg2rad(8.0)),
+        ),
+        talkers(MANY_BINS.replace(unknowns="sphere")),
     ),
     ("cbf", lambda: CBF(SPACE, n_directions=500, max_sources=3), two_sources(SPACE)),
 ]
