@@ -17,12 +17,14 @@ from arrivals.measurement_models import (
     Tones,
     db_to_neper,
 )
+from arrivals.measurement_models.arrays.sphere import fibonacci_sphere
 from arrivals.motion_models import (
     AutoregressiveSources,
     ConstantVelocity,
     CoordinatedTurn,
     LinearMotion,
     RandomWalk,
+    VonMisesFisherWalk,
     VonMisesWalk,
 )
 from arrivals.trackers import (
@@ -31,6 +33,7 @@ from arrivals.trackers import (
     UKF,
     GridSearch,
     Kalman,
+    MixtureSettings,
     Particle,
     Tracker,
     VariationalSolver,
@@ -46,12 +49,17 @@ POINT = LinearMeasurement(np.eye(2), 0.01 * np.eye(2))
 STATIONS = [[0.0, 0.0], [10.0, 0.0], [3.0, 9.0]]
 BEARING = Bearing(STATIONS, noise=1e-3)
 BEARING_XY = Bearing(STATIONS, noise=1e-3, position=(0, 1))
+SOUNDING = Bearing([[0.0, 0.0, 0.0], [9.0, 1.0, 2.0]], noise=1e-3)
+NORMAL = LinearMeasurement(np.eye(3), 1e-3 * np.eye(3))
 ANGLE = LinearMeasurement([[1.0]], [[0.01]])
 STEERED = LinearMotion(0.9 * np.eye(2), 0.1 * np.eye(2), control=[[0.0], [1.0]], names=["x", "y"])
 LINE = ArraySnapshot(SensorArray.ula(6, spacing=0.5), wavelength=1.0, noise=0.01)
 CIRCLE = ArraySnapshot(
     SensorArray.uca(5, radius=0.5), wavelength=[1.0, 1.3], noise=0.01, n_snapshots=2
 )
+SPHERE = CIRCLE.replace(wavelength=1.0, n_snapshots=1, unknowns="sphere")
+SPACE = CIRCLE.replace(array=SensorArray(0.4 * fibonacci_sphere(6)), unknowns="sphere")
+ON_SPHERE = ("cbf", "mvdr", "music", "peaks_gnn")
 BANDS = CIRCLE.replace(wavelength=list(np.linspace(1.0, 3.0, 12)), n_snapshots=4)
 BLOCK = LINE.replace(wavelength=[1.0, 1.3], n_snapshots=2)
 PAIRS = ArraySnapshot(SensorArray.symmetric([0.25, 0.5]), wavelength=1.0, noise=0.1)
@@ -69,8 +77,14 @@ def bearings() -> list[Any]:
     return [BEARING_XY.sample([5.0, 4.0], RNG) for _ in range(4)]
 
 
+def soundings() -> list[Any]:
+    return [SOUNDING.sample([5.0, 4.0, 7.0], RNG) for _ in range(4)]
+
+
 def snapshots(model: ArraySnapshot, n_steps: int = 6) -> list[Any]:
-    return list(model.simulate(np.full((n_steps, 2), [0.5, -0.4]), [1.0, 0.7j], RNG))
+    elevation = np.full((n_steps, 2), [0.3, 1.0]) if model.unknowns == "sphere" else None
+    doa = np.full((n_steps, 2), [0.5, -0.4])
+    return list(model.simulate(doa, [1.0, 0.7j], RNG, elevation))
 
 
 def samples() -> list[Any]:
@@ -91,8 +105,13 @@ def imm() -> IMM:
 
 
 def direction(name: str, **params: Any) -> list[Case]:
-    """Return a tracker of directions on a line, and on bins of a circle where it works there."""
-    models = (LINE, BLOCK if name in ("root_music", "esprit", "ssbl") else CIRCLE)
+    """Return a tracker of directions on a line, on bins of a circle, and on the sphere.
+
+    The latter two where it works there.
+    """
+    models = [LINE, BLOCK if name in ("root_music", "esprit", "ssbl") else CIRCLE]
+    if name in ON_SPHERE:
+        models += [SPHERE, SPACE]
     return [
         (lambda model=model: create(name, measurement=model, **params), snapshots(model))  # type: ignore[misc]
         for model in models
@@ -109,10 +128,15 @@ CASES: dict[str, list[Case]] = {
         (lambda: Kalman(STEERED, POINT, X[::2, None], np.eye(2)), positions()),
     ],
     "ekf": [
+        (lambda: EKF(RandomWalk(0.1, 3), SOUNDING, [5.0, 4.0, 6.0], np.eye(3)), soundings()),
         (lambda: EKF(CoordinatedTurn(0.01, 0.01), BEARING, [*X, 0.1], np.eye(5)), bearings()),
         (lambda: EKF(VonMisesWalk(50.0), ANGLE, [3.1], [[0.1]]), [np.array([3.1])] * 4),
     ],
-    "ukf": [(lambda: UKF(RandomWalk(0.01), BEARING_XY, X[::2], np.eye(2)), bearings())],
+    "ukf": [
+        (lambda: UKF(VonMisesFisherWalk(50.0), NORMAL, [0.0, 0.6, 0.8], 0.1 * np.eye(3)),
+         [np.array([0.0, 0.6, 0.8])] * 4),
+        (lambda: UKF(RandomWalk(0.01), BEARING_XY, X[::2], np.eye(2)), bearings()),
+    ],
     "imm": [(imm, positions())],
     "particle": [
         (
@@ -132,6 +156,14 @@ CASES: dict[str, list[Case]] = {
     **{name: direction(name) for name in ("root_music", "esprit", "peaks_gnn", "valse", "svalse")},
     "wideband_mixture": [
         (lambda: create("wideband_mixture", measurement=BANDS), snapshots(BANDS)),
+        (
+            lambda: create(
+                "wideband_mixture",
+                measurement=BANDS.replace(unknowns="sphere"),
+                settings=MixtureSettings(sphere_step=0.2),
+            ),
+            snapshots(BANDS.replace(unknowns="sphere")),
+        ),
     ],
     "ar_kalman_qrd_rls": [
         (

@@ -90,10 +90,10 @@ class SphereGrid(ScanGrid):
 
         points, index = self.points, np.arange(len(self.points))
         if self.normal is not None:
-            edge = np.flatnonzero(points @ self.normal < 3 * self.step)
+            height = points @ self.normal
+            edge = np.flatnonzero((height > self.step / 4) & (height < 3 * self.step))
             index = np.concatenate([index, edge])
-            mirrored = points[edge] - 2 * (points[edge] @ self.normal)[:, None] * self.normal
-            points = np.concatenate([points, mirrored])
+            points = np.concatenate([points, points[edge] - 2 * height[edge, None] * self.normal])
         nearest = cKDTree(points).query(self.points, N_NEIGHBOURS + 1)[1][:, 1:]
         return index[nearest], points[nearest]
 
