@@ -22,6 +22,7 @@ from arrivals.scenarios.reproduce.svalse import own_claims as own_svalse
 from arrivals.scenarios.reproduce.svalse import paper_claims as svalse
 from arrivals.scenarios.reproduce.swellex96 import decisions as own_sea
 from arrivals.scenarios.reproduce.swellex96 import paper_claims as sea
+from arrivals.scenarios.reproduce.swellex96 import ranges as sea_ranges
 
 PAPERS: tuple[Claim, ...] = (
     *svalse.CLAIMS,
@@ -33,6 +34,7 @@ PAPERS: tuple[Claim, ...] = (
 OWN: tuple[Claim, ...] = (
     *own_svalse.CLAIMS,
     *own_sea.CLAIMS,
+    *sea_ranges.CLAIMS,
     *own_ar.CLAIMS,
     *own_interpolation.CLAIMS,
     *own_rss.CLAIMS,

@@ -46,6 +46,7 @@ STUDIES: dict[str, str] = {
     "svalse-fig9": f"{PACKAGE}.svalse.figures_8_to_10:fig9",
     "svalse-fig10": f"{PACKAGE}.svalse.figures_8_to_10:fig10",
     "swellex96": f"{PACKAGE}.swellex96.figures_11_12:swellex96",
+    "swellex96-range": f"{PACKAGE}.swellex96.ranges:ranges",
 }
 # Runs of studies with numbers other than 100, and QUICK in a quick study
 RUNS: dict[str, tuple[int, int]] = {
@@ -67,6 +68,7 @@ RUNS: dict[str, tuple[int, int]] = {
     "svalse-fig9": (20, 2),
     "svalse-fig10": (20, 2),
     "swellex96": (4, 1),
+    "swellex96-range": (4, 1),
 }
 
 

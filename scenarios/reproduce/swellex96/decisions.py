@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
+from types import MappingProxyType
 from typing import NamedTuple
 
+from arrivals.scenarios.experiments.statistics import standard_error
 from arrivals.scenarios.reproduce.claims import Claim
-from arrivals.scenarios.reproduce.decisions import Both, Decision
-from arrivals.scenarios.reproduce.svalse.decisions import by_both, compared
+from arrivals.scenarios.reproduce.decisions import Both, Decision, difference
+from arrivals.scenarios.reproduce.svalse.decisions import by_both, compared, title
 from arrivals.scenarios.reproduce.swellex96.field import FieldFacts
+from arrivals.scenarios.reproduce.swellex96.strays import StrayFacts
 from arrivals.typing import Float
 
 SCORES = ("gospa", "distance", "missed", "false", "rmse", "found", "paths", "near")
+WITH_RANGE = "svalse with range"  # label of SVALSE with a curvature for each path
 MANY = 0.8  # share of steps that counts as "dominates"
 
 
@@ -23,10 +28,16 @@ class SeaResults(NamedTuple):
     scores : mapping of str to ndarray, shape (n_draws, 8)
         `SCORES` of each method in steps 1 to 100, which have many close paths; 63 elements.
     field : FieldFacts
+    blocks : mapping of str to ndarray, shape (n_draws, 4)
+        GOSPA of each method in steps 1-100, 101-200, 201-250 and 251-350; 63 elements.
+    strays : StrayFacts, optional
+        Directions far from every path in steps 251 to 350.
     """
 
     scores: Mapping[str, Float]
     field: FieldFacts
+    blocks: Mapping[str, Float] = MappingProxyType({})
+    strays: StrayFacts | None = None
 
 
 def lower(metric: str, first: str, second: str) -> Both:
@@ -117,6 +128,45 @@ def peaks_are_paths(results: SeaResults) -> Decision:
     return Decision(max(above, low) < 1, f"{numbers}from below; 90 % within {most:.1f}°")
 
 
+def never_above(first: str, second: str, results: SeaResults) -> Decision | None:
+    """Decide that the GOSPA of one method is not above that of another in any block."""
+    if not {first, second} <= set(results.blocks):
+        return None
+    d = results.blocks[first] - results.blocks[second]
+    blocks = [difference(column).removeprefix("paired difference ") for column in d.T]
+    above = any(column.mean() > 2 * standard_error(column) for column in d.T)
+    holds = None if len(d) < 2 else not above
+    return Decision(holds, f"paired differences {', '.join(blocks)} degrees")
+
+
+def late_below(first: str, second: str, results: SeaResults) -> Decision | None:
+    """Decide that the GOSPA of one method is below that of another in steps 251 to 350."""
+    if not {first, second} <= set(results.blocks):
+        return None
+    low, high = (results.blocks[name][:, -1] for name in (first, second))
+    return compared((first, second), low, high, "degrees")
+
+
+def mudstone_reflects(results: SeaResults) -> Decision | None:
+    """Decide that a third of the beam peaks far from every path are due to the mudstone."""
+    if results.strays is None:
+        return None
+    peaks, without, _ = results.strays
+    numbers = f"{peaks:.2f} peaks a step, {without:.2f} over a sea floor of sediment alone"
+    return Decision(without < 2 / 3 * peaks, numbers)
+
+
+def strays_are_peaks(method: str, results: SeaResults) -> Decision | None:
+    """Decide that most directions of a method far from every path are at beam peaks."""
+    if results.strays is None:
+        return None
+    numbers = ", ".join(
+        f"{title(name)}: {share:.0%} of {n:.2f} directions a step"
+        for name, (n, share) in results.strays.estimates.items()
+    )
+    return Decision(results.strays.estimates[method][1] > 0.5, numbers)
+
+
 def of_field(decide: Callable[[SeaResults], Decision], results: SeaResults) -> Decision:
     """Decide by the simulated field, and say so: no form of a method takes part."""
     decision = decide(results)
@@ -137,12 +187,29 @@ FIELD: tuple[tuple[str, Callable[[SeaResults], Decision]], ...] = (
     ("paths of four bounces and more, as BSBSR and BSBSBR, dominate in turn: steps 1 to 200",
      many_bounces_dominate),
 )  # fmt: skip
-CLAIMS = tuple(
-    Claim("swellex96", "", text, by_ours=lower("gospa", first, second)[1], source="ours")
-    for first, second, text in (
-        ("svalse", "cbf", "SVALSE has a lower GOSPA than the beamformer, steps 1 to 100"),
-        ("svalse", "peaks_gnn", "SVALSE has a lower GOSPA than tracked peaks of the beamformer"),
-        ("svalse", "ssbl", "SVALSE has a lower GOSPA than SSBL"),
-        ("valse", "cbf", "VALSE has a lower GOSPA than the beamformer"),
-    )
-)
+CLAIMS: tuple[Claim, ...] = (
+    *(
+        Claim("swellex96", "", text, by_ours=lower("gospa", first, second)[1], source="ours")
+        for first, second, text in (
+            ("svalse", "cbf", "SVALSE has a lower GOSPA than the beamformer, steps 1 to 100"),
+            ("svalse", "peaks_gnn",
+             "SVALSE has a lower GOSPA than tracked peaks of the beamformer"),
+            ("svalse", "ssbl", "SVALSE has a lower GOSPA than SSBL"),
+            ("valse", "cbf", "VALSE has a lower GOSPA than the beamformer"),
+        )
+    ),
+    *(
+        Claim("swellex96", "", text, by_ours=decide, source="ours")
+        for text, decide in (
+            ("SVALSE with range has a lower GOSPA than SVALSE near the closest approach: steps 251 "
+             "to 350", partial(late_below, WITH_RANGE, "svalse")),
+            ("SVALSE with range has no higher GOSPA than SVALSE in steps 1-100, 101-200, 201-250 "
+             "and 251-350", partial(never_above, WITH_RANGE, "svalse")),
+            ("most directions of SVALSE with range that are farther than 3 degrees from every "
+             "path are within 1.5 degrees of a beam peak without noise: steps 251 to 350",
+             partial(strays_are_peaks, WITH_RANGE)),
+            ("the mudstone below the sediment, which the paths leave out, causes a third or more "
+             "of these beam peaks", mudstone_reflects),
+        )
+    ),
+)  # fmt: skip

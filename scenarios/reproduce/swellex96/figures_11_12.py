@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,16 +13,19 @@ from arrivals.scenarios.experiments.workers import parallel_map
 from arrivals.scenarios.metrics.gospa import mean_gospa, mean_rmse
 from arrivals.scenarios.reproduce.report import Report
 from arrivals.scenarios.reproduce.svalse.forms import FORMS_SEEN, PAPER_FORM, quadrature
-from arrivals.scenarios.reproduce.swellex96.decisions import SeaResults
+from arrivals.scenarios.reproduce.swellex96.decisions import WITH_RANGE, SeaResults
 from arrivals.scenarios.reproduce.swellex96.field import field_facts
 from arrivals.scenarios.reproduce.swellex96.plots import environment_figure, field_figure
+from arrivals.scenarios.reproduce.swellex96.strays import StrayFacts, stray_facts
 from arrivals.scenarios.simulations.swellex96 import WITHIN_DB, TowPastLine, track
+from arrivals.trackers import NewtonSolver
 from arrivals.typing import Float, Int
 
 if TYPE_CHECKING:
     from arrivals.scenarios.base import Trial
     from arrivals.trackers import Run, Tracker
 
+RANGE_SNR_DB = 15.0  # the water is not homogeneous: waves deviate from curved ones
 METHODS: dict[str, dict[str, Any]] = {
     "cbf": {},
     "peaks_gnn": {},
@@ -30,6 +33,7 @@ METHODS: dict[str, dict[str, Any]] = {
     "ssbl": {"n_directions": 181},
     "valse": {},
     "svalse": {},
+    WITH_RANGE: {},
 }
 CLOSE = (1, 100)  # steps with many close paths
 BLOCKS = ((1, 350), (1, 100), (101, 200), (201, 250), (251, 350))  # steps, from 1
@@ -37,7 +41,7 @@ NEAR, AUDIBLE_DB = 1.5, 30.0  # distance from a path, degrees, and range of its 
 
 
 def swellex96(runs: int, seed: int, quick: bool = False) -> Report:
-    """Track the tow by six methods, with and without element 43; `runs` draws of the noise.
+    """Track the tow by seven methods, with and without element 43; `runs` draws of the noise.
 
     A single run uses every second step only, as a quick check. The paper's form of VALSE and
     SVALSE tracks steps 1 to 100 by 63 elements, and is left out of a quick study.
@@ -68,7 +72,10 @@ def swellex96(runs: int, seed: int, quick: bool = False) -> Report:
     draws = f"{runs} draws of the noise" if runs > 1 else "one draw of the noise"
     title = f"Figs 11 and 12: the SWellEx-96 tow, simulated, 10 dB, {draws}{decimation}"
     scores = {name: _scores(scenario, doa[n, name], step, CLOSE) for n, name in pairs if n == 63}
-    results = SeaResults(scores, field_facts(scenario, step))
+    blocks = {name: np.stack([_scores(scenario, doa[63, name], step, block)[:, 0]
+                              for block in BLOCKS[1:]], axis=1) for name in METHODS}  # fmt: skip
+    results = SeaResults(scores, field_facts(scenario, step), blocks,
+                         _strays(step, doa))  # fmt: skip
     return Report(title, columns, rows, (*REMARKS, CURVED, FORMS_SEEN), figures, shown, results,
                   CAPTIONS)  # fmt: skip
 
@@ -119,7 +126,9 @@ REMARKS = (
 CURVED = (
     "Near the closest approach (steps 251 to 350) the wavefronts at the array, 118 m long, are "
     "curved, and the sound speed changes along it: a path is not a plane wave, and at 20 dB a "
-    "gridless method estimates two or three components for it. The paper has no figures on this."
+    "gridless method estimates two or three components for it. The paper has no figures on this. "
+    f"{WITH_RANGE!r} has a curvature for each path, plane unless the data support one, and counts "
+    f"what is more than {RANGE_SNR_DB:g} dB below the field as noise."
 )
 
 
@@ -145,6 +154,10 @@ def tracker_of(trial: Trial, name: str) -> Tracker:
         return trial.tracker("valse", **quadrature(2000))
     if name == PAPER_FORM["svalse"]:
         return trial.tracker("svalse", motion=BernoulliVonMises(), **quadrature(1000))
+    if name == WITH_RANGE:
+        curved = trial.measurement.replace(unknowns="range")
+        solver = NewtonSolver(max_snr_db=RANGE_SNR_DB)
+        return trial.tracker("svalse", measurement=curved, solver=solver)
     return trial.tracker(name, **METHODS[name])
 
 
@@ -153,6 +166,14 @@ def strong_directions(run: Run) -> Float:
     size = np.nan_to_num(np.abs(run.amplitude))
     floor = size.max(axis=1, keepdims=True, initial=0.0) * 10 ** (-WITHIN_DB / 20)
     return np.where((size >= floor) & (size > 0), np.rad2deg(run.doa), np.nan)
+
+
+def _strays(step: Int, doa: Mapping[tuple[int, str], Sequence[Float]]) -> StrayFacts:
+    """Return the facts of the directions of the last block that are far from every path."""
+    late = step >= BLOCKS[-1][0]
+    scenario = TowPastLine(ranges=tuple(track()["range_m"][step[late] - 1].tolist()))
+    draws = {name: [draw[late] for draw in doa[63, name]] for name in ("cbf", "svalse", WITH_RANGE)}
+    return stray_facts(scenario, draws)
 
 
 def _row(
