@@ -61,6 +61,8 @@ class CandidateGrid(ABC):
         if L < 2 or (self.merge == 0 and self.merge_correlation is None):
             return np.full(B, -1)
         near = self.correlated(evaluation) if self.merge_correlation else self.close(evaluation)
+        if np.count_nonzero(near) == sum(evaluation.K.tolist()):  # each to itself only
+            return np.full(B, -1)
         later = np.asarray(np.tril(near, -1).any(axis=2))
         return np.where(later.any(axis=1), later.argmax(axis=1), -1)
 

@@ -178,14 +178,13 @@ class NewtonSolver(SolverSettings):
             StepInput(Y, prior, search.n_components)
             for Y, prior in zip(snapshots, priors, strict=True)
         ]
-        chart = search.response.chart
-        posteriors = [inactive_posterior(step, chart) for step in steps]
-        powered = [i for i, step in enumerate(steps) if not step.no_power]
-        if powered and search.max_active > 0:
-            solved = self._solve([steps[i] for i in powered], search)
-            for i, posterior in zip(powered, solved, strict=True):
-                posteriors[i] = posterior
-        return posteriors
+        powered = [i for i, step in enumerate(steps) if not step.no_power and search.max_active]
+        solved = self._solve([steps[i] for i in powered], search) if powered else []
+        posteriors = dict(zip(powered, solved, strict=True))
+        return [
+            posteriors.get(i) or inactive_posterior(step, search.response.chart)
+            for i, step in enumerate(steps)
+        ]
 
     def _solve(self, steps: list[StepInput], search: SupportSearch) -> list[ComponentPosterior]:
         """Alternate Newton steps and changes of the support until neither gains.

@@ -90,7 +90,7 @@ def negative_hessian(
     rows = -W.swapaxes(2, 3)[:, :, :, None, :, None]
     B: Complex = np.multiply(TA.conj()[:, :, None], rows, order="C")
     own = evaluation.h[:, :, 1 : 1 + d] - TA @ W[:, :, None]
-    diagonals(B)[...] += np.moveaxis(own, 4, 2)
+    diagonals(B)[...] += own.transpose(0, 1, 4, 2, 3)
     B = B.reshape(B_, F, N, d * L, L)
     gained = (B.conj() @ evaluation.G[:, :, None] @ B.swapaxes(3, 4)).real
     gained = gained[:, :, 0] if N == 1 else gained.sum(axis=2)
@@ -108,7 +108,7 @@ def add_blocks(H: Float, blocks: Float) -> None:
         diagonals(H)[...] += blocks[:, 0]
         return
     each = np.arange(L)
-    H.reshape(-1, d, L, d, L)[:, :, each, :, each] += np.moveaxis(full(blocks), 3, 0)
+    H.reshape(-1, d, L, d, L)[:, :, each, :, each] += full(blocks).transpose(3, 0, 1, 2)
 
 
 def ascent_direction(g: Float, N: Float, longest: float) -> Float:
