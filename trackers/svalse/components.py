@@ -119,6 +119,19 @@ class ComponentPosterior:
     curved: Bool | None = None
 
 
+class TrackedComponents(Protocol):
+    """Components with the modes of a walk that may stand still, as `SVALSE` has them."""
+
+    mu: Float
+    kappa: Float
+    modes: Float
+    curved: Bool
+
+    @property
+    def tracked(self) -> Bool:
+        """Slots that hold a tracked component."""
+
+
 class Solver(Protocol):
     """Maximization of the ELBO of one step: `NewtonSolver`, `CoordinateSolver` or a user's own."""
 

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
 
 from arrivals.measurement_models.manifolds.manifold import (
     Manifold,
-    PointManifold,
     angle_manifold,
     is_angle_manifold,
     is_point_manifold,
@@ -18,46 +16,34 @@ from arrivals.measurement_models.manifolds.manifold import (
 from arrivals.motion_models.bernoulli_von_mises import MIN_KAPPA, BernoulliVonMises
 from arrivals.motion_models.move_stop import MoveStopWalk
 from arrivals.motion_models.von_mises import wrap
-from arrivals.trackers.svalse.components import ComponentPosterior
-from arrivals.trackers.symmetric import inverse
-from arrivals.typing import Bool, Float
+from arrivals.trackers.svalse.components import ComponentPosterior, TrackedComponents
+from arrivals.trackers.svalse.point_prediction import (
+    MIN_INFORMATION,
+    predicted_points,
+    with_point_modes,
+)
+from arrivals.typing import Float
 
-MIN_INFORMATION = 1e-3  # of the data, relative to the prior's, for an update of the modes
 DEFAULT_MOTION = BernoulliVonMises(sigma_doa=np.deg2rad(1.5), still=0.1)
 
 
 def motion_on(manifold: Manifold, motion: BernoulliVonMises, memory: str) -> BernoulliVonMises:
-    """Return the motion model for a manifold: the default one never stops with two unknowns.
+    """Return the motion model for a memory: the default one of whole densities never stops.
 
     Raises
     ------
     ValueError
-        If a walk that may stop, or a memory of whole densities, is not supported.
+        If the memory of whole densities is not supported, or a walk that may stop with it.
     """
-    on_angle = is_angle_manifold(manifold)
-    if memory == "posterior" and not on_angle:
-        raise ValueError(f"memory must be 'von_mises' with two unknowns a source; got {memory!r}")
-    if on_angle and memory != "posterior":
+    if memory != "posterior":
         return motion
+    if not is_angle_manifold(manifold):
+        raise ValueError(f"memory must be 'von_mises' with two unknowns a source; got {memory!r}")
     if motion is DEFAULT_MOTION:
         return motion.replace(still=0.0)
     if motion.still:
-        where = "with two unknowns a source" if not on_angle else 'where memory is "posterior"'
-        raise ValueError(f"still must be 0 {where}; got {motion.still}")
+        raise ValueError(f'still must be 0 where memory is "posterior"; got {motion.still}')
     return motion
-
-
-class TrackedComponents(Protocol):
-    """Components with the modes of a walk that may stand still, as `SVALSE` has them."""
-
-    mu: Float
-    kappa: Float
-    modes: Float
-    curved: Bool
-
-    @property
-    def tracked(self) -> Bool:
-        """Slots that hold a tracked component."""
 
 
 def n_moments(manifold: Manifold, motion: BernoulliVonMises) -> int:
@@ -84,51 +70,11 @@ def predicted_components(
     tracked = np.stack([each.tracked for each in trackers])
     if is_point_manifold(manifold):
         curved = np.stack([each.curved for each in trackers])
-        mu, kappa = predicted_points(manifold, motion, mu, kappa, curved, dt)
-        return mu, kappa, modes, np.ones(tracked.shape)
+        return *predicted_points(manifold, motion, mu, kappa, modes, curved, dt), np.ones(
+            curved.shape
+        )
     slope = angle_manifold("svalse", manifold).slope(np.where(tracked, mu, 0.0))
     return *motion.predict_angles(mu, kappa, modes, dt, slope), slope
-
-
-def predicted_points(
-    manifold: PointManifold,
-    motion: BernoulliVonMises,
-    mu: Float,
-    kappa: Float,
-    curved: Bool,
-    dt: float,
-) -> tuple[Float, Float]:
-    """Return points and precisions after a step, P' = (P⁻¹ + Q)⁻¹ in the chart.
-
-    A plane wave stays one: its second unknown returns to its narrow prior.
-
-    Parameters
-    ----------
-    manifold : PointManifold
-    motion : BernoulliVonMises
-        Its step in direction is one along a great circle.
-    mu, kappa : ndarray, shapes (B, L, point_size), (B, L, d(d+1)/2)
-        Points, and upper triangles of precisions; NaN and 0 in unused slots.
-    curved : ndarray of bool, shape (B, L)
-        Which are curved waves.
-    dt : float
-        Length of the step.
-    """
-    unused = np.isnan(mu[..., :1])
-    x = np.where(unused, 0.0, mu).swapaxes(1, 2)
-    precision = np.where(
-        unused, np.eye(manifold.n_unknowns)[np.triu_indices(manifold.n_unknowns)], kappa
-    )
-    walk = motion.walk_range
-    Q = manifold.walk(x, float(motion.Q(dt)[0, 0]), None if walk is None else walk**2 * dt)
-    P = inverse(inverse(precision.swapaxes(1, 2)) + Q)
-    if manifold.spike_precision is not None:
-        S = inverse(P)
-        second = np.where(curved, 1 / S[:, 2], manifold.spike_precision)
-        P = np.stack([1 / S[:, 0], np.zeros_like(second), second], axis=1)
-        x = np.stack([x[:, 0], np.where(curved, x[:, 1], 0.0)], axis=1)
-    new = np.where(unused, np.nan, x.swapaxes(1, 2))
-    return new, np.where(unused, 0.0, P.swapaxes(1, 2))
 
 
 def drifted(nuisance: Float) -> Float:
@@ -147,8 +93,15 @@ def drifted(nuisance: Float) -> Float:
     return np.asarray((1 - 1e-4) * shifted + 1e-4 / nuisance.shape[-1])
 
 
+def n_mode_rows(manifold: Manifold) -> int:
+    """Return the rows of `modes`: offset, variance and weight, or their triangles."""
+    d = manifold.n_unknowns
+    return d + d * (d + 1) // 2 + 1
+
+
 def with_modes(
     walk: MoveStopWalk,
+    manifold: Manifold,
     priors: Sequence[TrackedComponents],
     posteriors: Sequence[ComponentPosterior],
 ) -> list[ComponentPosterior]:
@@ -159,6 +112,8 @@ def with_modes(
     Parameters
     ----------
     walk : MoveStopWalk
+    manifold : Manifold
+        Of all sensors.
     priors : sequence of TrackedComponents
         Predicted components, one record for each posterior.
     posteriors : sequence of ComponentPosterior
@@ -168,6 +123,8 @@ def with_modes(
     list of ComponentPosterior
         With `modes`, and the angles and variances of the mixtures.
     """
+    if is_point_manifold(manifold):
+        return with_point_modes(walk, manifold, priors, posteriors)
     n = [min(int(p.tracked.sum()), len(q.theta)) for p, q in zip(priors, posteriors, strict=True)]
     first = [np.flatnonzero(p.tracked)[:m] for p, m in zip(priors, n, strict=True)]
     mu = np.concatenate([p.mu[on] for p, on in zip(priors, first, strict=True)])

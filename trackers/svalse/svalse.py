@@ -28,6 +28,7 @@ from arrivals.trackers.svalse.prediction import (
     DEFAULT_MOTION,
     drifted,
     motion_on,
+    n_mode_rows,
     n_moments,
     nuisance_weights,
     predicted_components,
@@ -104,7 +105,8 @@ class SVALSE(VALSE):
     nuisance : ndarray, shape (L, n_nuisance)
         Their densities over the values of an unknown slowness or elevation.
     modes : ndarray, shape (3, L, 2)
-        Their modes where the motion may stand still, as in `MoveStopWalk`; else zeros.
+        Their modes where the motion may stand still, as in `MoveStopWalk`; else zeros. With two
+        unknowns a source the offsets, covariances and weights, (6, L, 2).
     bin_noise : ndarray, shape (n_bins,)
         Noise of each bin when it last had valid data; NaN before.
 
@@ -210,7 +212,9 @@ class SVALSE(VALSE):
     ) -> Sequence[ComponentPosterior]:
         """Return posteriors with updated modes of a walk that may stand still."""
         walk = self.motion.move_stop
-        return posteriors if walk is None else with_modes(walk, trackers, posteriors)
+        if walk is None:
+            return posteriors
+        return with_modes(walk, self.full_manifold, trackers, posteriors)
 
     def _predict_densities(self, slope: Float, dt: float) -> None:
         """Predict whole densities by the exact convolution, and those of the second unknown."""
@@ -291,7 +295,7 @@ class SVALSE(VALSE):
         self.age: Int = padded(age[order], n, 0).astype(np.int64)
         self.nuisance = np.tile(nuisance_weights(self.full_manifold), (n, 1))
         self.moments = np.zeros((n, self.n_moments), dtype=np.complex128)
-        self.modes = np.zeros((3, n, 2))
+        self.modes = np.zeros((n_mode_rows(self.full_manifold), n, 2))
         if posterior.modes is not None:
             self.modes[:, : len(order)] = posterior.modes[:, order]
         if posterior.nuisance is not None and posterior.moments is not None:
