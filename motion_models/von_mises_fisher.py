@@ -184,7 +184,9 @@ class VonMisesFisherWalk(MotionModel):
     @property
     def step_concentration(self) -> float:
         """Concentration of the step per unit of time."""
-        return self.kappa if self.sigma_doa is None else self.sigma_doa**-2  # type: ignore[return-value]  # one is given
+        if self.kappa is not None:
+            return float(self.kappa)
+        return float(np.clip(np.float64(self.sigma_doa), 1e-150, 1e150) ** -2)
 
     @property
     def dim_x(self) -> int:
@@ -200,8 +202,8 @@ class VonMisesFisherWalk(MotionModel):
         """Return the directions, of length one and otherwise unchanged."""
         time_step(dt)
         x = state(x, 3)
-        length = np.linalg.norm(x, axis=-1, keepdims=True)
-        return np.asarray(x / np.maximum(length, TINY))
+        x = x / np.maximum(np.abs(x).max(axis=-1, keepdims=True), TINY)
+        return np.asarray(x / np.maximum(np.linalg.norm(x, axis=-1, keepdims=True), TINY))
 
     def F(self, x: ArrayLike, dt: float = 1.0) -> Float:
         """Return the slope of `f` at one state, (I - n nᵀ) / |x|."""
@@ -209,7 +211,7 @@ class VonMisesFisherWalk(MotionModel):
         if x.ndim != 1:
             raise ValueError(f"x must have shape (3,); got {x.shape}")
         n = self.f(x, dt)
-        return np.asarray((np.eye(3) - np.outer(n, n)) / max(float(np.linalg.norm(x)), TINY))
+        return np.asarray((np.eye(3) - np.outer(n, n)) / max(float(n @ x), TINY))
 
     def Q(self, dt: float = 1.0) -> Float:
         """Return -ln A₃(κ) dt, the variance along each great circle, times I, in rad².
