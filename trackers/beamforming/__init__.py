@@ -6,8 +6,10 @@ from arrivals.trackers.beamforming.covariance import (
     diagonal_loading,
     spatial_smoothing,
 )
+from arrivals.trackers.beamforming.model_grid import scan_grid
 from arrivals.trackers.beamforming.mvdr import MVDR, capon_power
 from arrivals.trackers.beamforming.scan_ends import ends_coincide, scan_is_joined
+from arrivals.trackers.beamforming.scan_grid import AngleGrid, ScanGrid
 from arrivals.trackers.beamforming.spectrum import (
     bartlett_power,
     find_peaks,
@@ -18,11 +20,15 @@ from arrivals.trackers.beamforming.spectrum import (
     scan_directions,
     scan_steering_matrix,
 )
+from arrivals.trackers.beamforming.sphere_grid import SphereGrid
 
 __all__ = [
     "CBF",
     "MVDR",
+    "AngleGrid",
     "RunningCovariance",
+    "ScanGrid",
+    "SphereGrid",
     "bartlett_power",
     "capon_power",
     "diagonal_loading",
@@ -33,6 +39,7 @@ __all__ = [
     "parabolic_peak",
     "refine_peaks",
     "scan_directions",
+    "scan_grid",
     "scan_is_joined",
     "scan_steering_matrix",
     "spatial_smoothing",

@@ -103,7 +103,7 @@ class SphereBank(TrackBank):
         mean = self.mean[used]
         # the direction is the origin of its tangent plane
         step = F[:, 1:] @ mean[:, 1:]
-        predicted = self._replace_slots(used, mean=self._moved(mean[:, 0], step), covariance=P)
+        predicted = self.replace_slots(used, mean=self._moved(mean[:, 0], step), covariance=P)
         return replace(predicted, misses=self.misses + used)
 
     def update(self, slots: Int, residual: Float, variance: float) -> Self:
@@ -114,7 +114,7 @@ class SphereBank(TrackBank):
         mean = self.mean[slots]
         step = updated.x[..., None] * residual[:, None]  # K y
         step[:, 1:] += mean[:, 1:]
-        return self._replace_slots(
+        return self.replace_slots(
             slots,
             mean=self._moved(mean[:, 0], step),
             covariance=updated.P,

@@ -54,14 +54,14 @@ class TrackBank:
         """Return the bank after a step of a linear motion, so far without a measurement."""
         F, used = motion.F(np.zeros(motion.dim_x), dt), self.used
         P = predict_gaussian(self.covariance[used], F, motion.Q(dt))
-        moved = self._replace_slots(used, mean=self.mean[used] @ F.T, covariance=P)
+        moved = self.replace_slots(used, mean=self.mean[used] @ F.T, covariance=P)
         return replace(moved, misses=self.misses + used)
 
     def update(self, slots: Int, residual: Float, variance: float) -> Self:
         """Return the bank after a measurement of some tracks."""
         H, R = np.eye(1, self.mean.shape[1]), np.full((1, 1), variance)
         updated = update_gaussian(self.mean[slots], self.covariance[slots], residual[:, None], H, R)
-        return self._replace_slots(
+        return self.replace_slots(
             slots, mean=updated.x, covariance=updated.P, hits=self.hits[slots] + 1, misses=0
         )
 
@@ -74,16 +74,17 @@ class TrackBank:
         mean = np.zeros((len(free_slots), *self.mean.shape[1:]))
         mean[:, 0] = z[: len(free_slots)]
         label = self.n_labels + np.arange(len(free_slots))
-        bank = self._replace_slots(
+        bank = self.replace_slots(
             free_slots, mean=mean, covariance=covariance, label=label, hits=1, misses=0
         )
         return replace(bank, n_labels=self.n_labels + len(free_slots))
 
     def remove(self, slots: Bool) -> Self:
         """Return the bank without some tracks."""
-        return self._replace_slots(slots, mean=np.nan, covariance=0.0, label=-1, hits=0, misses=0)
+        return self.replace_slots(slots, mean=np.nan, covariance=0.0, label=-1, hits=0, misses=0)
 
-    def _replace_slots(self, slots: Int | Bool, **changes: Any) -> Self:
+    def replace_slots(self, slots: Int | Bool, **changes: Any) -> Self:
+        """Return the bank with new values of some arrays at some slots."""
         arrays = {name: getattr(self, name).copy() for name in changes}
         for name, values in changes.items():
             arrays[name][slots] = values
