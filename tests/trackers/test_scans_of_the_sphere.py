@@ -18,6 +18,7 @@ from arrivals.measurement_models.arrays.sphere import (
 from arrivals.scenarios import Trial, gospa
 from arrivals.scenarios.simulations.sources_on_sphere import SourcesOnSphere
 from arrivals.trackers import CBF, MUSIC, MVDR, SphereEstimate, create
+from arrivals.trackers.beamforming import mean_beam_power
 from arrivals.typing import Complex, Float
 
 GRID = 0.5 * np.stack(np.meshgrid(range(4), range(4)), axis=-1).reshape(-1, 2)
@@ -129,6 +130,14 @@ def test_number_of_sources_is_estimated() -> None:
     repeated = MUSIC(SQUARE, interval=20).run(z)
     np.testing.assert_array_equal(repeated.elevation[2], repeated.elevation[1])
     assert repeated.n_found.tolist() == [0, 2, 2]
+
+
+def test_beam_power_of_isotropic_sensors_needs_no_product() -> None:
+    rng = np.random.default_rng(0)
+    A = np.exp(1j * rng.random((1, 3, 5, 40)))
+    Y = rng.standard_normal((2, 3, 5, 4)) + 0j
+    Y[0, 1, 2, 3], Y[1, 2] = np.nan, np.nan
+    np.testing.assert_allclose(mean_beam_power(A, Y, isotropic=True), mean_beam_power(A, Y))
 
 
 def test_amplitude_of_one_snapshot_is_complex() -> None:

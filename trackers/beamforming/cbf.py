@@ -188,7 +188,7 @@ class CBF(DirectionTracker):
         else:
             A = plane_wave_responses(model, directions)
         Y, A = model.whitened(Y, A)
-        return mean_beam_power(A, Y)
+        return mean_beam_power(A, Y, isotropic=model.unknowns == "sphere")
 
     def block_amplitudes(self, directions: Float, Y: Complex) -> Complex:
         """Return the root of the mean power of plane waves over bins and snapshots.

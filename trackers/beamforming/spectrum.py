@@ -98,7 +98,7 @@ def bartlett_power(A: Complex, z: ArrayLike) -> Float:
     return np.asarray((beam.real**2 + beam.imag**2) / n_valid)
 
 
-def mean_beam_power(A: Complex, Y: Complex) -> Float:
+def mean_beam_power(A: Complex, Y: Complex, *, isotropic: bool = False) -> Float:
     """Return the mean of |aᴴy|² / ‖a‖² over bins and snapshots, the largest over a nuisance.
 
     Parameters
@@ -107,6 +107,8 @@ def mean_beam_power(A: Complex, Y: Complex) -> Float:
         Steering vectors for each value of the nuisance parameter: slowness or elevation.
     Y : ndarray, shape (..., n_bins, n_sensors, n_snapshots)
         Snapshots without valid data are left out, and sensors that are NaN are left out of theirs.
+    isotropic : bool
+        True if responses have unit modulus: ‖a‖² is the number of valid sensors, without a product.
 
     Returns
     -------
@@ -121,7 +123,10 @@ def mean_beam_power(A: Complex, Y: Complex) -> Float:
     valid = ~np.isnan(Y)
     # axes: ..., nuisance, bins, directions, snapshots; |aᴴy| = |aᵀy*|
     beam = np.swapaxes(A, 2, 3) @ np.where(valid, Y, 0).conj()[..., None, :, :, :]
-    norm = np.swapaxes(A.real**2 + A.imag**2, 2, 3) @ valid[..., None, :, :, :]
+    if isotropic:
+        norm = valid.sum(axis=-2)[..., None, :, None, :]
+    else:
+        norm = np.swapaxes(A.real**2 + A.imag**2, 2, 3) @ valid[..., None, :, :, :]
     power = (beam.real**2 + beam.imag**2) / np.maximum(norm, 1e-12)
     n_valid = np.maximum(valid.any(axis=-2).sum(axis=(-2, -1)), 1)
     return np.asarray(power.sum(axis=(-3, -1)).max(axis=-2) / n_valid[..., None])
