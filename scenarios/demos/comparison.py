@@ -6,13 +6,20 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from arrivals.measurement_models import ArraySnapshot
 from arrivals.trackers import Run, Tracker
 from arrivals.typing import Complex, Float
+
+Bar: TypeAlias = Callable[..., Any]
+
+
+def silent(steps: Complex, **_: Any) -> Complex:
+    """Return the steps, without a progress bar."""
+    return steps
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +53,7 @@ class MethodComparison:
         self,
         out: str | PathLike[str],
         methods: Mapping[str, tuple[str, Tracker]],
-        bar: Callable[..., Any] = lambda steps, **_: steps,
+        bar: Bar = silent,
         n_steps: int | None = None,
     ) -> None:
         """Run each method and write PREFIXmethod.csv and NAME.png.
@@ -62,22 +69,51 @@ class MethodComparison:
         n_steps : int, optional
             Maximum number of steps.
         """
+        runs = {
+            title: self.track(out, name, tracker, bar, n_steps)
+            for name, (title, tracker) in methods.items()
+        }
+        figure = Path(out) / f"{self.name}.png"
+        self._draw(figure, runs, self.steps[:n_steps])
+        print(figure)
+
+    def track(
+        self,
+        out: str | PathLike[str],
+        name: str,
+        tracker: Tracker,
+        bar: Bar = silent,
+        n_steps: int | None = None,
+    ) -> Run:
+        """Run one method and write PREFIXname.csv.
+
+        Parameters
+        ----------
+        out : path
+            Folder; created if missing.
+        name : str
+            Name of the method.
+        tracker : Tracker
+        bar : callable
+            As in `run`.
+        n_steps : int, optional
+            Maximum number of steps.
+
+        Returns
+        -------
+        Run
+        """
         from threadpoolctl import threadpool_limits
 
         folder = Path(out)
         folder.mkdir(parents=True, exist_ok=True)
-        steps, time = self.steps[:n_steps], self.time[:n_steps]
-        runs = {}
-        for name, (title, tracker) in methods.items():
-            with threadpool_limits(1, "blas"):
-                run = tracker.run(bar(steps, desc=f"{name:<6}")).at(time)
-            path = folder / f"{self.prefix}{name}.csv"
-            run.to_csv(path)
-            print(f"{path}: {_summary(run)}", flush=True)
-            runs[title] = run
-        figure = folder / f"{self.name}.png"
-        self._draw(figure, runs, steps)
-        print(figure)
+        with threadpool_limits(1, "blas"):
+            run = tracker.run(bar(self.steps[:n_steps], desc=f"{name:<6}"))
+        run = run.at(self.time[:n_steps])
+        path = folder / f"{self.prefix}{name}.csv"
+        run.to_csv(path)
+        print(f"{path}: {_summary(run)}", flush=True)
+        return run
 
     def _draw(self, path: Path, runs: Mapping[str, Run], steps: Complex) -> None:
         """Draw the tracks of each method over the beam power, one panel a method."""

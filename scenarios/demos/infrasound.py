@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from importlib.resources import as_file, files
 from os import PathLike
-from typing import Any
 
 import numpy as np
 
@@ -13,7 +11,7 @@ from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.motion_models import BernoulliVonMises
 from arrivals.recordings.framing import frame_recording
 from arrivals.recordings.readers import read
-from arrivals.scenarios.demos.comparison import MethodComparison
+from arrivals.scenarios.demos.comparison import Bar, MethodComparison, silent
 from arrivals.trackers import CBF, SVALSE, VALSE, NewtonSolver, Tracker
 from arrivals.typing import Complex, Float
 
@@ -78,7 +76,7 @@ def tracker(name: str, measurement: ArraySnapshot) -> Tracker:
 
 def infrasound(
     out: str | PathLike[str] = "arrivals-demo",
-    bar: Callable[..., Any] = lambda steps, **_: steps,
+    bar: Bar = silent,
     n_steps: int | None = None,
 ) -> None:
     """Track intermittent infrasound recorded by an array of four microphones.

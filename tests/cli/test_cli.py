@@ -128,7 +128,8 @@ def test_demo_writes_a_table_of_each_tracker_and_a_picture(
 ) -> None:
     demo(tmp_path / "new" / "folder", n_steps=10)
     folder = tmp_path / "new" / "folder"
-    assert sorted(os.listdir(folder)) == ["cbf.csv", "svalse.csv", "swellex96.png", "valse.csv"]
+    tables = ["cbf.csv", "svalse-range.csv", "svalse.csv", "valse.csv"]
+    assert sorted(os.listdir(folder)) == sorted([*tables, "swellex96-range.png", "swellex96.png"])
     assert str(folder / "swellex96.png") in capsys.readouterr().out
     rows = table((folder / "svalse.csv").read_text())
     loudest = [
@@ -137,6 +138,8 @@ def test_demo_writes_a_table_of_each_tracker_and_a_picture(
     ]
     # the strongest paths of the scene's first steps: BSBSBS, BSBSBSB and BSBSB
     assert all(10 < abs(float(row["doa_deg"])) < 20 for row in loudest)
+    with_range = table((folder / "svalse-range.csv").read_text())
+    assert list(with_range[0])[-4:-2] == ["range_m", "range_std_m"]
 
 
 @pytest.fixture

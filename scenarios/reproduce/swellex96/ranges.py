@@ -25,6 +25,9 @@ from arrivals.typing import Float, Int
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from arrivals.scenarios.base import Trial
+    from arrivals.trackers import Run
+
 MODELS = ("rays", "modes")
 BLOCKS = ((101, 200), (201, 250), (251, 350))  # steps, from 1
 LATE = BLOCKS[-1]
@@ -122,8 +125,21 @@ def ranges_of_draw(model: str, seed: int, draw: int, step: Int) -> PathRanges:
     distances = track()["range_m"][step - 1]
     scenario = TowPastLine(ranges=tuple(distances.tolist()), model=model)  # type: ignore[arg-type]  # one of MODELS
     trial = scenario.sample(np.random.default_rng([seed, draw]))
-    run = tracker_of(trial, WITH_RANGE).run(trial.measurements)
-    doa = strong_directions(run)
+    return path_ranges(tracker_of(trial, WITH_RANGE).run(trial.measurements), trial, step)
+
+
+def path_ranges(run: Run, trial: Trial, step: Int) -> PathRanges:
+    """Match the estimates of some steps of the tow to its paths.
+
+    Parameters
+    ----------
+    run : Run
+        Run of a tracker of direction and range.
+    trial : Trial
+    step : ndarray of int, shape (n_steps,)
+        Numbers of its steps in the experiment, from 1.
+    """
+    doa, distances = strong_directions(run), track()["range_m"][step - 1]
     near = np.abs(doa[:, :, None] - np.rad2deg(trial.truth)[:, None, :]) <= NEAR
     row, slot = np.nonzero(near.any(axis=2))
     R, cosine = run.range[row, slot], np.cos(run.doa[row, slot])

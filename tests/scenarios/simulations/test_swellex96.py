@@ -178,9 +178,9 @@ def test_swellex96_study_writes_table_claims_and_figures(
     with open(tmp_path / "swellex96.csv", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     methods = list(reproduce_swellex.METHODS)
-    assert len(rows) == 6 * 5 + 6 + 2
-    assert [row["method"] for row in rows[:30:5]] == methods
-    assert [row["method"] for row in rows[30:]] == [*methods, *PAPER_FORM.values()]
+    assert len(rows) == 7 * 5 + 7 + 2
+    assert [row["method"] for row in rows[:35:5]] == methods
+    assert [row["method"] for row in rows[35:]] == [*methods, *PAPER_FORM.values()]
     for row in rows:
         parts = [float(row[key]) for key in ("distance", "missed", "false")]
         assert float(row["GOSPA"]) == pytest.approx(sum(parts))
@@ -201,6 +201,14 @@ def test_paper_form_at_sea_is_coordinate_ascent_from_the_first_element() -> None
         params = reproduce_swellex.tracker_of(trial, label).get_params(deep=True)
         assert (params["reference"], params["solver__tolerance"]) == ("first", 1e-6)
         assert type(reproduce_swellex.tracker_of(trial, label)) is find(name)
+
+
+def test_svalse_with_range_has_the_motion_of_the_scene_and_a_floor_of_the_noise() -> None:
+    trial = TowPastLine(ranges=RANGES[:2]).sample(rng())
+    tracker = reproduce_swellex.tracker_of(trial, reproduce_swellex.WITH_RANGE)
+    params = tracker.get_params(deep=True)
+    assert (params["measurement__unknowns"], params["solver__max_snr_db"]) == ("range", 15.0)
+    assert params["motion"] == trial.motion
 
 
 # the recorded arrays
