@@ -164,7 +164,7 @@ def scores(draws: Sequence[PathRanges], block: tuple[int, int]) -> RangeScores:
     here = (step >= block[0]) & (step <= block[1])
     with_range = here & ~np.isnan(ratio)
     if not with_range.any():
-        return RangeScores(0.0, *[np.nan] * 5, 0.0)
+        return RangeScores(0.0, np.nan, np.nan, np.nan, np.nan, np.nan, 0.0)
     low, median, high = np.percentile(ratio[with_range], [16, 50, 84]).tolist()
     return RangeScores(
         float(with_range.sum()) / len(draws),

@@ -15,6 +15,7 @@ from arrivals.scenarios.demos.swellex96 import swellex96 as shipped
 from arrivals.scenarios.reproduce.studies import reproduce
 from arrivals.scenarios.reproduce.svalse.forms import PAPER_FORM
 from arrivals.scenarios.reproduce.swellex96 import figures_11_12 as reproduce_swellex
+from arrivals.scenarios.reproduce.swellex96.decisions import WITH_RANGE
 from arrivals.scenarios.reproduce.swellex96.field import beam
 from arrivals.scenarios.reproduce.swellex96.figures_11_12 import strong_directions
 from arrivals.scenarios.simulations.swellex96 import TowPastLine, environment, line, track
@@ -205,7 +206,7 @@ def test_paper_form_at_sea_is_coordinate_ascent_from_the_first_element() -> None
 
 def test_svalse_with_range_has_the_motion_of_the_scene_and_a_floor_of_the_noise() -> None:
     trial = TowPastLine(ranges=RANGES[:2]).sample(rng())
-    tracker = reproduce_swellex.tracker_of(trial, reproduce_swellex.WITH_RANGE)
+    tracker = reproduce_swellex.tracker_of(trial, WITH_RANGE)
     params = tracker.get_params(deep=True)
     assert (params["measurement__unknowns"], params["solver__max_snr_db"]) == ("range", 15.0)
     assert params["motion"] == trial.motion
