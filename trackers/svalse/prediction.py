@@ -100,18 +100,19 @@ def n_mode_rows(manifold: Manifold) -> int:
 
 
 def with_modes(
-    walk: MoveStopWalk,
+    walk: MoveStopWalk | None,
     manifold: Manifold,
     priors: Sequence[TrackedComponents],
     posteriors: Sequence[ComponentPosterior],
-) -> list[ComponentPosterior]:
+) -> Sequence[ComponentPosterior]:
     """Return posteriors in which the modes of the walk have been updated, in one array program.
 
     The data's part of each posterior, relative to its prior, is a measurement of the angle.
 
     Parameters
     ----------
-    walk : MoveStopWalk
+    walk : MoveStopWalk or None
+        None if it never stops.
     manifold : Manifold
         Of all sensors.
     priors : sequence of TrackedComponents
@@ -123,6 +124,8 @@ def with_modes(
     list of ComponentPosterior
         With `modes`, and the angles and variances of the mixtures.
     """
+    if walk is None:
+        return posteriors
     if is_point_manifold(manifold):
         return with_point_modes(walk, manifold, priors, posteriors)
     n = [min(int(p.tracked.sum()), len(q.theta)) for p, q in zip(priors, posteriors, strict=True)]

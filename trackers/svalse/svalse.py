@@ -211,10 +211,7 @@ class SVALSE(VALSE):
         self, trackers: Sequence[Self], posteriors: Sequence[ComponentPosterior]
     ) -> Sequence[ComponentPosterior]:
         """Return posteriors with updated modes of a walk that may stand still."""
-        walk = self.motion.move_stop
-        if walk is None:
-            return posteriors
-        return with_modes(walk, self.full_manifold, trackers, posteriors)
+        return with_modes(self.motion.move_stop, self.full_manifold, trackers, posteriors)
 
     def _predict_densities(self, slope: Float, dt: float) -> None:
         """Predict whole densities by the exact convolution, and those of the second unknown."""
