@@ -138,7 +138,7 @@ class VonMisesFisherWalk(MotionModel):
     """A direction on the sphere that takes a von Mises-Fisher step per unit of time.
 
     The state is the unit vector to the source, not azimuth and elevation: there the noise is the
-    same in all directions, and the zenith is no exception.
+    same in all directions, at the zenith, too.
 
     Parameters
     ----------

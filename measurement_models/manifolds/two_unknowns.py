@@ -1,4 +1,4 @@
-"""Choice of the manifold of two unknowns a source, and arrays that cannot tell them apart."""
+"""Choice of the manifold of two unknowns a source, and arrays that do not resolve them."""
 
 from __future__ import annotations
 

@@ -54,7 +54,7 @@ class SphereWaves(FrozenModel):
 
     @property
     def nuisance_weights(self) -> Float:
-        """One weight: there is no third unknown."""
+        """One weight: a third unknown does not exist."""
         return np.ones(1)
 
     def without(self, sensors: Sequence[int] | Int) -> SphereWaves:

@@ -12,7 +12,7 @@ from arrivals.trackers.svalse.newton.batch import ONE_ANGLE, Components
 from arrivals.typing import Complex, Float
 
 LOG_2PI = float(np.log(2 * np.pi))
-MAX_ANGLE_VARIANCE = 0.3  # rad²: a wider wrapped normal density is no longer normal
+MAX_ANGLE_VARIANCE = 0.3  # rad²: of a wider one the wrapped density is not normal
 
 
 class AngleChart:
