@@ -135,7 +135,7 @@ def test_number_of_sources_is_estimated() -> None:
 def test_beam_power_of_isotropic_sensors_needs_no_product() -> None:
     rng = np.random.default_rng(0)
     A = np.exp(1j * rng.random((1, 3, 5, 40)))
-    Y = rng.standard_normal((2, 3, 5, 4)) + 0j
+    Y = rng.standard_normal((2, 3, 5, 4)).astype(np.complex128)
     Y[0, 1, 2, 3], Y[1, 2] = np.nan, np.nan
     np.testing.assert_allclose(mean_beam_power(A, Y, isotropic=True), mean_beam_power(A, Y))
 
