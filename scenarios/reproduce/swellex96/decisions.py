@@ -208,8 +208,8 @@ CLAIMS: tuple[Claim, ...] = (
             ("most directions of SVALSE with range that are farther than 3 degrees from every "
              "path are within 1.5 degrees of a beam peak without noise: steps 251 to 350",
              partial(strays_are_peaks, WITH_RANGE)),
-            ("the mudstone below the sediment, which the paths leave out, causes a third or more "
-             "of these beam peaks", mudstone_reflects),
+            ("a third or more of these beam peaks are due to the mudstone below the sediment, "
+             "while the rays are reflected at the sea floor", mudstone_reflects),
         )
     ),
 )  # fmt: skip

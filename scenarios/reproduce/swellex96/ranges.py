@@ -107,8 +107,8 @@ REMARKS = (
     "deviations. Its range times the cosine of its elevation is compared with the horizontal "
     "range of the ship. NEES is the mean square of the error of 1/R over its standard deviation: "
     "1 where the deviations are right, more where they are too small.",
-    "In the field of modes, reflections from below the sediment, which the rays leave out, overlap "
-    "with the paths: ranges scatter more than in the field of rays.",
+    "Rays are reflected at the sea floor. In the field of modes reflections from the mudstone "
+    "below the sediment overlap with these paths, and ranges scatter more.",
 )
 CAPTIONS = {"track": "horizontal ranges of the paths, first draw of the noise"}
 
