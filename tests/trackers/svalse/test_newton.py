@@ -207,6 +207,16 @@ def test_candidates_keep_the_merge_distance_and_removed_components_return() -> N
     assert elsewhere.n[0] == 0 or abs(doa[0] - doa[1]) >= np.deg2rad(1.5)
 
 
+def test_duplicates_are_seen_beside_angles_without_a_direction() -> None:
+    response = ExpectedResponse(GAPS.angle_manifold())
+    state = scene(0, GAPS)
+    components = state.components.copy()
+    components.mu[0] = 2.9, -2.9, 0.5, 0.505, 1.5  # the first two beyond endfire
+    state = evaluation_of(response, state.Y, components)
+    grid = AngleCandidates(response, 8, merge=MERGE_DISTANCE)
+    assert grid.first_duplicate(state).tolist() == [3]
+
+
 # -- leading axes -----------------------------------------------------------------------------
 
 

@@ -60,9 +60,12 @@ class CandidateGrid(ABC):
         B, L = evaluation.used.shape
         if L < 2 or (self.merge == 0 and self.merge_correlation is None):
             return np.full(B, -1)
-        near = self.correlated(evaluation) if self.merge_correlation else self.close(evaluation)
-        if np.count_nonzero(near) == sum(evaluation.K.tolist()):  # each to itself only
+        if self.merge_correlation:
+            near = self.correlated(evaluation)
+        elif self.all_apart(evaluation):
             return np.full(B, -1)
+        else:
+            near = self.close(evaluation)
         later = np.asarray(np.tril(near, -1).any(axis=2))
         return np.where(later.any(axis=1), later.argmax(axis=1), -1)
 
@@ -98,6 +101,10 @@ class CandidateGrid(ABC):
         size = evaluation.X[:, :, 0].diagonal(axis1=2, axis2=3).real
         limit = self.merge_correlation * np.sqrt(size[..., None] * self.norm2[:, None])
         return np.asarray((np.abs(P) > limit).all(axis=1))
+
+    def all_apart(self, evaluation: Evaluation) -> bool:
+        """Return True if a quick test shows that no two components are close."""
+        return False
 
     @abstractmethod
     def close(self, evaluation: Evaluation) -> Bool:
@@ -162,12 +169,15 @@ class AngleCandidates(CandidateGrid):
             -2.0 if self.manifold.front_back_ambiguous else np.cos(min(largest, np.pi)) - 1e-12
         )
 
+    def all_apart(self, evaluation: Evaluation) -> bool:
+        """Return True if the angles alone show that no two components are close."""
+        theta = np.where(evaluation.used, evaluation.components.mu, np.nan)
+        near = np.cos(theta[:, :, None] - theta[:, None, :]) > self.cos_near
+        return np.count_nonzero(near) == sum(evaluation.K.tolist())  # each near to itself only
+
     def close(self, evaluation: Evaluation) -> Bool:
         """Return which components are nearer than `merge`, (B, L, L); each to itself, or none."""
         theta = np.where(evaluation.used, evaluation.components.mu, np.nan)
-        near = np.cos(theta[:, :, None] - theta[:, None, :]) > self.cos_near
-        if np.count_nonzero(near) == sum(evaluation.K.tolist()):  # each near to itself only
-            return np.asarray(near)
         doa = self.manifold.to_doa(theta)  # round the circle, too
         return np.asarray(np.cos(doa[:, :, None] - doa[:, None, :]) > self.cos_merge)
 
