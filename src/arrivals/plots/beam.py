@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 N_DIRECTIONS, N_COLUMNS = 361, 1500  # maximum size of the image
 N_STEPS = 6000  # maximum number of steps that are drawn
+ELEVATION_STEP = 10.0  # degrees, of the power on the sphere
 
 
 def draw_beam(
@@ -84,7 +85,14 @@ def _blocks(snapshots: Any, sizes: Int, shape: tuple[int, ...]) -> Iterator[Comp
 
 
 def _beam(measurement: ArraySnapshot, doa: Float) -> Callable[[Complex], Float]:
-    """Return the highest power in each direction of the steps of a block, as a function."""
+    """Return the highest power in each direction of the steps of a block, as a function.
+
+    On the sphere it is the highest over elevations, too.
+    """
+    if measurement.unknowns == "sphere":
+        lowest = 0.0 if measurement.half_space else -90.0
+        elevation = np.deg2rad(np.arange(lowest, 90.0, ELEVATION_STEP))
+        measurement = measurement.replace(unknowns="azimuth", elevation=elevation)
     isotropic = measurement.response is None
     if measurement.is_single and isotropic and measurement.coherence is None:
         single = measurement.steering_vector(doa)

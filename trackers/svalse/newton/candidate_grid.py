@@ -173,7 +173,7 @@ class AngleCandidates(CandidateGrid):
         """Return True if the angles alone show that no two components are close."""
         theta = np.where(evaluation.used, evaluation.components.mu, np.nan)
         near = np.cos(theta[:, :, None] - theta[:, None, :]) > self.cos_near
-        return np.count_nonzero(near) == sum(evaluation.K.tolist())  # each near to itself only
+        return bool(np.count_nonzero(near) == evaluation.K.sum())  # each near to itself only
 
     def close(self, evaluation: Evaluation) -> Bool:
         """Return which components are nearer than `merge`, (B, L, L); each to itself, or none."""
