@@ -36,7 +36,8 @@ class BernoulliVonMises(MotionModel):
         that stands still may move, as `MoveStopWalk` says. 0 for a walk that never stops.
     walk_range : float, optional
         Standard deviation of the step of 1/R per unit of time, 1/m, where sources have a range R;
-        None is a tenth of the largest 1/R that the measurement model expects.
+        None is a tenth of the largest 1/R that the measurement model expects, a fifth where its
+        wavefronts are parabolic.
 
     Raises
     ------

@@ -77,7 +77,7 @@ class SineLine(PhaseManifold):
         """Return sin β within ±1: (..., 1, L)."""
         return sine_limits(self.sine(x))[..., None, :]
 
-    def walk(self, x: Float, variance: float, curvature_variance: float | None = None) -> Float:
+    def walk(self, x: Float, variance: float, curvature_variance: float = 0.0) -> Float:
         """Return the covariance of a step of some variance, rad²: (..., 1, L)."""
         # Q = σ² cos²β
         return variance * cosine_squared(self.direction(x)) / self.unit[0] ** 2
@@ -126,7 +126,7 @@ class FresnelLine(SineLine):
 
     Notes
     -----
-    The steps of `walk` are those of c, which is 1/R at broadside; by default a tenth of σ.
+    The steps of `walk` are those of c, which is 1/R at broadside; by default a fifth of σ.
     A range is infinite where c is within three standard deviations of zero.
 
     Examples
@@ -143,6 +143,11 @@ class FresnelLine(SineLine):
     def spike_precision(self) -> float:
         """Prior precision of c of a plane wave."""
         return (1 / SPIKE_STD) ** 2
+
+    @property
+    def walk_range(self) -> float:
+        """Default standard deviation of the step of c per unit of time, 1/m."""
+        return CURVATURE_WALK_SHARE * self.curvature_std
 
     @property
     def slab_precision(self) -> float:
@@ -167,10 +172,8 @@ class FresnelLine(SineLine):
         bend = -0.5 * c * (self.positions**2).mean()
         return np.asarray(super().origin_phase(x) + self.waves.wavenumber[0] * bend)
 
-    def walk(self, x: Float, variance: float, curvature_variance: float | None = None) -> Float:
+    def walk(self, x: Float, variance: float, curvature_variance: float = 0.0) -> Float:
         """Return the covariance of a step of some variance, rad², and of one of c: (..., 3, L)."""
-        if curvature_variance is None:
-            curvature_variance = (CURVATURE_WALK_SHARE * self.curvature_std) ** 2
         along = super().walk(x, variance)
         return np.concatenate(
             [along, 0 * along, 0 * along + curvature_variance / self.unit[1] ** 2], axis=-2

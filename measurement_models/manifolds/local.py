@@ -145,7 +145,7 @@ class HorizontalWaves(LocalManifold):
         """Return the differences the shorter way round, and None for an identity."""
         return self.wrap((x - mean) * self.unit[0]) / self.unit[0], None
 
-    def walk(self, x: Float, variance: float, curvature_variance: float | None = None) -> Float:
+    def walk(self, x: Float, variance: float, curvature_variance: float = 0.0) -> Float:
         """Return the covariance of a step of some variance, rad²: (..., 1, L)."""
         return np.full(x.shape, variance / self.unit[0] ** 2)
 

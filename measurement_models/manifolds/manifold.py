@@ -159,6 +159,10 @@ class PointManifold(Manifold, Protocol):
         """Prior precision of the second unknown of a curved wave, where it may be plane."""
 
     @property
+    def walk_range(self) -> float:
+        """Default standard deviation of the step of 1/R per unit of time, 1/m; 0 without."""
+
+    @property
     def merge_correlation(self) -> float | None:
         """Correlation of two responses above which their sources count as one.
 
@@ -177,10 +181,10 @@ class PointManifold(Manifold, Protocol):
     def offset(self, x: Float, mean: Float) -> tuple[Float, Float | None]:
         """Return δ (..., d, L) in the chart at `mean`, and ∂δᵢ/∂xⱼ (..., d, d, L) or None for I."""
 
-    def walk(self, x: Float, variance: float, curvature_variance: float | None) -> Float:
+    def walk(self, x: Float, variance: float, curvature_variance: float) -> Float:
         """Return the covariance of a step of some variance, rad², along a great circle.
 
-        `curvature_variance` is that of 1/R, 1/m²; None for the default of the manifold.
+        `curvature_variance` is that of 1/R, 1/m².
         """
 
     def candidates(self) -> CandidatePoints:

@@ -159,7 +159,7 @@ class DirectionCosines(PhaseManifold):
         e = np.stack([np.where(far, u / radius, 1.0), np.where(far, v / radius, 0.0)], axis=-2)
         return e, np.maximum(cosines[..., 2, :], MIN_COSINE)
 
-    def walk(self, x: Float, variance: float, curvature_variance: float | None = None) -> Float:
+    def walk(self, x: Float, variance: float, curvature_variance: float = 0.0) -> Float:
         """Return the covariance (..., 3, L) of a step of some variance, rad², on a great circle."""
         e, w = self.rates(x)
         e1, e2 = e[..., 0, :], e[..., 1, :]

@@ -61,6 +61,11 @@ class PointResponse(ABC):
         return None
 
     @property
+    def walk_range(self) -> float:
+        """Default standard deviation of the step of 1/R per unit of time, 1/m; 0 without."""
+        return 0.0
+
+    @property
     def n_unknowns(self) -> int:
         """Number of unknowns of a source."""
         return len(self.unit)

@@ -131,10 +131,13 @@ class SphericalLine(LocalManifold):
         f = ((2 * p * u - p * p * v) / (1 + t)).mean(axis=1)
         return np.asarray(self.waves.wavenumber[0] * (f + self.centre[0] * u[:, 0]))
 
-    def walk(self, x: Float, variance: float, curvature_variance: float | None = None) -> Float:
+    @property
+    def walk_range(self) -> float:
+        """Default standard deviation of the step of 1/R per unit of time, 1/m."""
+        return WALK_SHARE * self.max_inverse
+
+    def walk(self, x: Float, variance: float, curvature_variance: float = 0.0) -> Float:
         """Return the covariance of a step of some variance, rad², and of 1/R: (..., 3, L)."""
-        if curvature_variance is None:
-            curvature_variance = (WALK_SHARE * self.max_inverse) ** 2
         along = variance * cosine_squared(self.direction(x)) / self.unit[0] ** 2
         return np.concatenate(
             [along, 0 * along, 0 * along + curvature_variance / self.unit[1] ** 2], axis=-2

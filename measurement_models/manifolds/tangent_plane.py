@@ -108,7 +108,7 @@ class TangentPlanes(LocalManifold):
         products = products.reshape(*shape[:-2], 2, 3, shape[-1])
         return products[..., 2, :] / self.unit[0], products[..., :2, :]
 
-    def walk(self, x: Float, variance: float, curvature_variance: float | None = None) -> Float:
+    def walk(self, x: Float, variance: float, curvature_variance: float = 0.0) -> Float:
         """Return the covariance (..., 3, L) of a step of some variance, rad², on a great circle."""
         one = np.full((*x.shape[:-2], x.shape[-1]), variance / self.unit[0] ** 2)
         return np.stack([one, np.zeros_like(one), one], axis=-2)

@@ -42,6 +42,8 @@ class ComponentPrior:
         Whole densities of the angles, ⟨exp(jiθ)⟩, i = 0, 1, ..., in place of `mu` and `kappa`.
     n_moments : int
         Number of moments of the posterior densities to return; 0 for von Mises densities only.
+    curved : ndarray of bool, shape (n_tracked,), optional
+        Which components are curved waves, of those that are plane or curved; None of plane ones.
     """
 
     mu: Float
@@ -54,6 +56,7 @@ class ComponentPrior:
     nuisance: Float | None = None
     moments: Complex | None = None
     n_moments: int = 0
+    curved: Bool | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +98,7 @@ class ComponentPosterior:
         Of a `PointManifold`, in place of `resultant`: upper triangles of the stated covariances;
         `theta` has points (n_components, point_size), `kappa` triangles of precisions.
     curved : ndarray of bool, shape (n_components,), optional
-        Which components have the prior of a curved wave.
+        Which components are curved waves, of those that are plane or curved.
     """
 
     theta: Float

@@ -64,8 +64,9 @@ def predicted_points(
     # all problems in one row
     x = np.where(unused, 0.0, mu.reshape(-1, p).T)
     precision = np.where(unused, identity(manifold.n_unknowns), kappa.reshape(B * L, -1).T)
-    S, walk = inverse(precision), motion.walk_range
-    Q = manifold.walk(x, step_variance(motion, dt), None if walk is None else walk**2 * dt)
+    S = inverse(precision)
+    range_step = manifold.walk_range if motion.walk_range is None else motion.walk_range
+    Q = manifold.walk(x, step_variance(motion, dt), range_step**2 * dt)
     if motion.move_stop is None:
         S = S + Q
     else:

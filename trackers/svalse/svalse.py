@@ -9,9 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.direction_measurement import DirectionMeasurement
-from arrivals.measurement_models.manifolds.manifold import (
-    Reference,
-)
+from arrivals.measurement_models.manifolds.manifold import Reference
 from arrivals.measurement_models.observed import ObservedSnapshots, merge_noise
 from arrivals.motion_models.bernoulli_von_mises import BernoulliVonMises
 from arrivals.motion_models.bessel import bessel_ratios
@@ -259,6 +257,7 @@ class SVALSE(VALSE):
             nuisance=self.nuisance[on],
             moments=self.moments[on] if self.moments.size else None,
             n_moments=self.moments.shape[1],
+            curved=self.curved[on],
         )
 
     def store(self, posterior: ComponentPosterior, observed: ObservedSnapshots) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from arrivals.measurement_models.manifolds.manifold import AngleManifold
 from arrivals.motion_models.bessel import bessel_ratio, log_i0
 from arrivals.trackers.svalse.newton.batch import ONE_ANGLE, Components
-from arrivals.typing import Complex, Float
+from arrivals.typing import Bool, Complex, Float
 
 LOG_2PI = float(np.log(2 * np.pi))
 MAX_ANGLE_VARIANCE = 0.3  # rad²: of a wider one the wrapped density is not normal
@@ -133,7 +133,7 @@ class AngleChart:
             "marginal_kappa": 1 / marginal[0],
         }
 
-    def prior_densities(self, mu: Float, kappa: Float) -> dict[str, Any]:
+    def prior_densities(self, mu: Float, kappa: Float, curved: Bool | None) -> dict[str, Any]:
         """Return those of a posterior that equals its prior."""
         return {"theta": mu, "resultant": bessel_ratio(kappa), "kappa": kappa}
 

@@ -106,21 +106,24 @@ class Layout:
         Unknowns d of a component.
     point_size : int
         Numbers p of a point.
+    has_waves : bool
+        True if components are plane or curved waves.
     """
 
     n_unknowns: int = 1
     point_size: int = 1
+    has_waves: bool = False
 
     @cached_property
     def rows(self) -> tuple[slice, slice, slice, slice]:
-        """Rows of point, covariance, prior mean and prior precision; three numbers follow."""
+        """Rows of point, covariance, prior mean and prior precision; single numbers follow."""
         p, q = self.point_size, self.n_unknowns * (self.n_unknowns + 1) // 2
         return slice(p), slice(p, p + q), slice(p + q, 2 * p + q), slice(2 * p + q, 2 * (p + q))
 
     @property
     def n_rows(self) -> int:
         """Number of rows."""
-        return 2 * self.point_size + self.n_unknowns * (self.n_unknowns + 1) + 3
+        return self.rows[3].stop + 3 + self.has_waves
 
 
 ONE_ANGLE = Layout()
@@ -204,6 +207,11 @@ class Components(BatchRecord):
     def prior_kappa(self) -> Float:
         """Concentration of the predicted density of one unknown, (B, L)."""
         return self.prior_precision[:, 0]
+
+    @property
+    def curved(self) -> Float:
+        """1 of a curved wave, else 0, (B, L); of a layout that has both."""
+        return self.packed[:, -4]
 
     @property
     def log_odds(self) -> Float:

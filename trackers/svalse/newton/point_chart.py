@@ -45,9 +45,9 @@ class PointChart:
     def __init__(self, manifold: PointManifold) -> None:
         self.manifold, self.n_bins = manifold, manifold.n_bins
         self.n_sensors, self.extent = manifold.n_sensors, float(manifold.n_sensors)
-        self.layout = Layout(manifold.n_unknowns, manifold.point_size)
-        self.norm2: Float = np.full((self.n_bins, 1), self.extent)
         self.has_curvature = manifold.spike_precision is not None
+        self.layout = Layout(manifold.n_unknowns, manifold.point_size, self.has_curvature)
+        self.norm2: Float = np.full((self.n_bins, 1), self.extent)
         self.is_linear, self.is_plain = manifold.is_linear, False
         self.longest_step, self.max_variance = LONGEST_STEP, MAX_VARIANCE
 
@@ -105,10 +105,10 @@ class PointChart:
             "kappa": inverse(components.covariance[0]).T,
             "marginal_kappa": inverse(marginal).T,
             "covariance": stated.T,
-            "curved": self.is_curved(components.prior_precision[0]),
+            "curved": components.curved[0] > 0 if self.has_curvature else None,
         }
 
-    def prior_densities(self, mu: Float, kappa: Float) -> dict[str, Any]:
+    def prior_densities(self, mu: Float, kappa: Float, curved: Bool | None) -> dict[str, Any]:
         """Return those of a posterior that equals its prior."""
         n, d = len(mu), self.layout.n_unknowns
         mu, kappa = mu.reshape(n, self.layout.point_size), kappa.reshape(n, d * (d + 1) // 2)
@@ -117,7 +117,7 @@ class PointChart:
             "resultant": np.full(n, np.nan),
             "kappa": kappa,
             "covariance": inverse(kappa.T).T,
-            "curved": self.is_curved(kappa.T),
+            "curved": curved,
         }
 
     @property
@@ -127,10 +127,3 @@ class PointChart:
         assert spike is not None
         assert slab is not None
         return spike, slab
-
-    def is_curved(self, precision: Float) -> Bool:
-        """Return which components of precisions (..., q, L) are curved waves, (..., L)."""
-        spike = self.manifold.spike_precision
-        if spike is None:
-            return np.ones(precision.shape[:-2] + precision.shape[-1:], dtype=np.bool_)
-        return np.asarray(precision[..., 2, :] < 0.5 * spike)

@@ -206,6 +206,8 @@ def tracked_components(steps: Sequence[StepInput], chart: Chart) -> Components:
         components.kl_constant[i, :n] = chart.prior_constant(
             components.prior_precision[i : i + 1, :, :n]
         )[0]
+        if step.prior.curved is not None and chart.has_curvature:
+            components.curved[i, :n] = step.prior.curved[:n]
         rho[i, :n] = step.prior.existence[:n]
     components.prior_mean[...] = components.point
     components.covariance[...] = chart.start_covariance(components.prior_precision)
@@ -277,9 +279,10 @@ def mean_amplitudes(W: Complex, power: Float) -> Complex:
 def inactive_posterior(step: StepInput, chart: Chart) -> ComponentPosterior:
     """Return the posterior of a step without a source: tracked components age, all is noise."""
     prior, n = step.prior, step.n_tracked
+    curved = None if prior.curved is None else prior.curved[:n]
     age = step.age + 1
     return ComponentPosterior(
-        **chart.prior_densities(prior.mu[:n], prior.kappa[:n]),
+        **chart.prior_densities(prior.mu[:n], prior.kappa[:n], curved),
         active=np.zeros(n, dtype=np.bool_),
         age=np.where(age > MAX_AGE, -1, age),
         amplitude=np.zeros(n, dtype=np.complex128),

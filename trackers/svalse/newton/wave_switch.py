@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arrivals.trackers.svalse.newton.batch import Components, any_set
+from arrivals.trackers.svalse.newton.batch import any_set
 from arrivals.trackers.svalse.newton.elbo import Evaluation, evaluate
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
 from arrivals.trackers.svalse.newton.point_chart import PointChart
@@ -59,15 +59,9 @@ def curvature_evidence(
     mean = (information * evaluation.components.point[:, 1] + pull) / precision
     # ½ p m² - ½ c ln p/p₁ + ln odds
     gain = 0.5 * (precision * mean**2 - kl_weight * np.log(precision / slab)) + log_odds
-    is_curved = is_curved_wave(response, evaluation.components) & evaluation.used
+    is_curved = (evaluation.components.curved > 0) & evaluation.used
     possible = evaluation.used & ~is_curved & (mean > 0)
     return CurvatureEvidence(information, mean, np.where(possible, gain, -np.inf), is_curved)
-
-
-def is_curved_wave(response: ExpectedResponse, components: Components) -> Bool:
-    """Return which components have the prior of a curved wave, (B, L)."""
-    assert isinstance(response.chart, PointChart)
-    return response.chart.is_curved(components.prior_precision)
 
 
 def trial_order(evidence: CurvatureEvidence, curvature: Float) -> tuple[Int, Bool]:
@@ -136,6 +130,7 @@ def switch_waves(
     components, each = trial.components.copy(), np.arange(len(row))
     old, new = components.prior_precision[each, 2, k], np.where(freed, slab, spike)
     components.kl_constant[each, k] += 0.5 * (np.log(old) - np.log(new))
+    components.curved[each, k] = freed
     components.log_odds[each, k] += np.where(freed, log_odds, -log_odds)
     components.prior_precision[each, 1, k] = 0.0
     components.prior_precision[each, 2, k] = new
