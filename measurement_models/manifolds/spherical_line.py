@@ -75,6 +75,12 @@ class SphericalLine(LocalManifold):
         low, high = (share * self.max_inverse for share in LIMITS)
         return np.minimum(np.maximum(x[..., 1, :] * self.unit[1], low), high)
 
+    def move(self, x: Float, step: Float) -> Float:
+        """Return the points after displacements, sin β within ±1: beyond, the response is constant."""
+        moved = x + step
+        moved[..., 0, :] = self.direction(moved)[..., 0, :] / self.unit[0]
+        return moved
+
     def relative_distance(self, x: Float) -> tuple[Float, Float, Float]:
         """Return u = sin β and v = 1/R (..., L, 1), and t = r/R of the sensors (..., L, M)."""
         u, v = self.direction(x)[..., 0, :, None], self.inverse_range(x)[..., None]

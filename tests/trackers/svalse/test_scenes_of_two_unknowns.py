@@ -35,6 +35,15 @@ def test_valse_near_a_line_reaches_the_bound_in_direction_and_range(
     assert stated == pytest.approx(np.sqrt(C[0, 1, 1]), rel=0.25)
 
 
+def test_valse_finds_a_near_source_at_the_end_of_a_line() -> None:
+    """Of noise that moves the best sine beyond 1."""
+    model = ArraySnapshot(SensorArray.ula(16, 0.5), 1.0, noise=0.03, unknowns="range", nearest=5.0)
+    doa, distance = np.full((20, 1), np.pi / 2), np.full((20, 1), 8.0)
+    z = model.simulate(doa, np.ones((20, 1)), np.random.default_rng(0), distance=distance)
+    run: Any = create("valse", measurement=model).run(z)
+    np.testing.assert_allclose(run.doa[:, 0], np.pi / 2, atol=0.2)
+
+
 def test_valse_finds_two_sources_in_one_direction() -> None:
     """Acceptance 9: 0.5 and 2 m, ten snapshots."""
     trial: Any = NearField([10, 10], [0.5, 2.0], n_snapshots=10, n_steps=12).sample(

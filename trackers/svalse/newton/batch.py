@@ -123,7 +123,8 @@ class Layout:
     @property
     def n_rows(self) -> int:
         """Number of rows."""
-        return self.rows[3].stop + 3 + self.has_waves
+        pairs = self.n_unknowns * (self.n_unknowns + 1)
+        return 2 * self.point_size + pairs + 3 + self.has_waves
 
 
 ONE_ANGLE = Layout()
