@@ -76,8 +76,8 @@ class SphericalLine(LocalManifold):
         return np.minimum(np.maximum(x[..., 1, :] * self.unit[1], low), high)
 
     def move(self, x: Float, step: Float) -> Float:
-        """Return the points after displacements, sin β within ±1: beyond, the response is constant."""
-        moved = x + step
+        """Return the points after displacements, sin β within ±1."""
+        moved = x + step  # beyond ±1 the response is constant, and nothing would stop a point
         moved[..., 0, :] = self.direction(moved)[..., 0, :] / self.unit[0]
         return moved
 

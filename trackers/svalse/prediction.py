@@ -58,6 +58,17 @@ def nuisance_weights(manifold: Manifold) -> Float:
     return manifold.nuisance_weights if is_angle_manifold(manifold) else np.ones(1)
 
 
+def same_unknowns(one: Manifold, other: Manifold) -> bool:
+    """Return True if components of one manifold mean the same in another.
+
+    Points have the units of their array; angles do not depend on it.
+    """
+    if is_point_manifold(one) or is_point_manifold(other):
+        return one is other
+    weights = nuisance_weights(one), nuisance_weights(other)
+    return one.n_bins == other.n_bins and len(weights[0]) == len(weights[1])
+
+
 def predicted_components(
     manifold: Manifold,
     motion: BernoulliVonMises,

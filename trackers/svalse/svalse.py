@@ -158,7 +158,6 @@ class SVALSE(VALSE):
         """Forget all components, labels and noise estimates."""
         self.n_labels, self.birth = 0, self.motion.p_activate
         self.expected_snr_db: float | None = None
-        self.bin_noise = np.full(len(self.bin_noise), np.nan)
         self._keep(no_components(self.full_manifold), np.zeros(0, dtype=np.int64))
         super().reset()
 

@@ -22,6 +22,7 @@ from arrivals.trackers.svalse.components import (
 )
 from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver, PosteriorName
 from arrivals.trackers.svalse.newton.solver import NewtonSolver
+from arrivals.trackers.svalse.prediction import same_unknowns
 from arrivals.trackers.svalse.reporting import (
     amplitudes,
     detected,
@@ -116,9 +117,21 @@ class VALSE(BatchDirectionTracker):
         manifold = measurement.manifold(self.reference)
         self.solver.check(manifold, getattr(measurement, "n_snapshots", 1), self.n_moments)
         warn_of_ambiguity(measurement)
-        self.estimate_kind = estimate_kind(manifold)
-        self.bin_noise = np.full(manifold.n_bins, np.nan)
         self.reset()
+
+    def reset(self) -> None:
+        """Report no direction, and forget the noise of each bin."""
+        self.estimate_kind = estimate_kind(self.full_manifold)
+        self.bin_noise = np.full(self.full_manifold.n_bins, np.nan)
+        super().reset()
+
+    def set_params(self, **params: Any) -> Self:
+        """Change parameters by name; reset if components do not mean the same any more."""
+        before = self.full_manifold
+        super().set_params(**params)
+        if not same_unknowns(before, self.full_manifold):
+            self.reset()
+        return self
 
     @property
     def full_manifold(self) -> Manifold:

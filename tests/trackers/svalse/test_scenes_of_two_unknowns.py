@@ -138,3 +138,26 @@ def test_missing_sensors_and_steps_leave_the_points_where_they_were(unknowns: An
     assert (~np.isnan(run.doa)).sum(axis=1)[valid].tolist() == [1] * 7
     np.testing.assert_allclose(run.doa[valid, 0], 0.4, atol=0.03)
     assert len(np.unique(run.label[valid, 0])) == 1
+
+
+@pytest.mark.parametrize("method", ["svalse", "valse"])
+def test_change_of_the_unknowns_starts_anew(method: str) -> None:
+    line = SensorArray.ula(9, 0.5)
+    models = [
+        ArraySnapshot(line, 1.0, noise=0.01),
+        ArraySnapshot(SPACE, [1.0, 1.2], n_snapshots=2, noise=0.01, unknowns="sphere"),
+        ArraySnapshot(line, 1.0, noise=0.01, unknowns="range"),
+        ArraySnapshot(line, 1.0, noise=0.01, unknowns="range", nearest=2.5),
+        ArraySnapshot(line, 1.0, n_snapshots=3, noise=0.01),
+    ]
+    tracker: Any = create(method, measurement=models[0])
+    for model in models:
+        tracker.set_params(measurement=model)
+        w = np.ones((3, *model.shape[:-1], 1))
+        z = model.simulate(np.full((3, 1), 0.4), w, np.random.default_rng(0))
+        fresh: Any = create(method, measurement=model)
+        np.testing.assert_array_equal(tracker.run(z).doa, fresh.run(z).doa)
+        kept = tracker.x.copy()
+        tracker.set_params(measurement=model.replace(noise=0.02))
+        np.testing.assert_array_equal(tracker.x, kept)
+        assert type(tracker.estimate) is fresh.estimate_kind
