@@ -100,13 +100,20 @@ class TangentPlanes(LocalManifold):
         return moved.reshape(x.shape)
 
     def offset(self, x: Float, mean: Float) -> tuple[Float, Float | None]:
-        """Return δ = E n/u on the tangents at `mean`, and its derivatives Eᵢ·eⱼ."""
+        """Return δ = E n/u on the tangents at `mean`, and its derivatives Eᵢ·eⱼ.
+
+        In the half of directions behind, |δ| goes on growing, from 1/u to 2/u.
+        """
         shape = np.broadcast_shapes(x.shape, mean.shape)
         rows = x.reshape(*x.shape[:-2], 3, 3, x.shape[-1])
-        axes = mean.reshape(*mean.shape[:-2], 3, 3, mean.shape[-1])[..., :2, :, :]
+        axes = mean.reshape(*mean.shape[:-2], 3, 3, mean.shape[-1])
         products = np.einsum("...iml,...jml->...ijl", axes, rows)
-        products = products.reshape(*shape[:-2], 2, 3, shape[-1])
-        return products[..., 2, :] / self.unit[0], products[..., :2, :]
+        products = products.reshape(*shape[:-2], 3, 3, shape[-1])
+        delta, slope = products[..., :2, 2, :], products[..., :2, :2, :]
+        behind = products[..., 2, 2, :] < 0
+        if behind.any():
+            delta, slope = reflected(delta, slope, behind)
+        return delta / self.unit[0], slope
 
     def walk(self, x: Float, variance: float, curvature_variance: float = 0.0) -> Float:
         """Return the covariance (..., 3, L) of a step of some variance, rad², on a great circle."""
@@ -136,6 +143,27 @@ class TangentPlanes(LocalManifold):
         return tangent_estimate(
             self.direction(x), axes, np.broadcast_to(u, (2, 2, x.shape[-1])), covariance
         )
+
+
+def reflected(delta: Float, slope: Float, behind: Bool) -> tuple[Float, Float]:
+    """Return offsets (..., 2, L) of length 2 - |δ| where directions are behind, and their slopes.
+
+    Examples
+    --------
+    >>> delta, slope = np.array([[0.6], [0.0]]), np.eye(2)[..., None]
+    >>> delta, slope = reflected(delta, slope, np.array([True]))
+    >>> delta.ravel(), slope[..., 0].round(2)
+    (array([1.4, 0. ]), array([[-1.  ,  0.  ],
+           [ 0.  ,  2.33]]))
+    """
+    length = np.maximum(np.hypot(delta[..., 0, :], delta[..., 1, :]), 1e-9)[..., None, :]
+    e = np.where(length > 1e-9, delta / length, [[1.0], [0.0]])
+    share = 2 / length - 1
+    along = (e[..., :, None, :] * slope).sum(axis=-3, keepdims=True)
+    # ∂δ' = (2/s - 1) ∂δ - 2/s e eᵀ ∂δ
+    turned = share[..., None, :] * slope - (share + 1)[..., None, :] * e[..., :, None, :] * along
+    at = behind[..., None, :]
+    return np.where(at, (2 - length) * e, delta), np.where(at[..., None, :], turned, slope)
 
 
 @lru_cache(maxsize=256)

@@ -38,14 +38,25 @@ def test_offset_is_the_inverse_of_a_small_move(m: Any) -> None:
         np.testing.assert_allclose(np.moveaxis(slope, -1, 0), [np.eye(2)] * 4, atol=1e-7)
 
 
-def test_offset_on_the_sphere_has_the_slope_that_is_stated() -> None:
+@pytest.mark.parametrize("angle", [0.5, 1.4, 1.7, 2.9])
+def test_offset_on_the_sphere_has_the_slope_that_is_stated(angle: float) -> None:
     m, h = MANIFOLDS["sphere"], 1e-6
     mean = points(m)
-    x = m.move(mean, np.random.default_rng(0).normal(size=(2, 4)))
+    step = np.random.default_rng(0).normal(size=(2, 4))
+    x = m.move(mean, angle / m.unit[0] * step / np.linalg.norm(step, axis=0))
     _, slope = m.offset(x, mean)
     for j in range(2):
         up, down = (m.offset(m.move(x, steps(m, j, side * h)), mean)[0] for side in (1, -1))
-        np.testing.assert_allclose((up - down) / (2 * h), slope[:, j], atol=1e-8)
+        np.testing.assert_allclose((up - down) / (2 * h), slope[:, j], rtol=1e-6, atol=1e-7)
+
+
+def test_offset_on_the_sphere_grows_as_far_as_the_opposite_direction() -> None:
+    m = MANIFOLDS["sphere"]
+    angles = np.linspace(0.0, np.pi, 40)
+    x = m.move(np.repeat(points(m, 1), 40, axis=1), np.stack([angles, 0 * angles]) / m.unit[0])
+    length = np.linalg.norm(m.offset(x, points(m, 1))[0], axis=0) * m.unit[0]
+    assert (np.diff(length) > 0).all()
+    assert length[-1] == pytest.approx(2.0)
 
 
 def test_moves_on_the_sphere_are_great_circles_with_orthonormal_tangents() -> None:
