@@ -69,13 +69,14 @@ def check_unknowns(
     if second:
         return
     what = f"array must not be collinear for {wanted}"
-    raise ValueError(f"{what}; got {array.n_sensors} sensors in a line: pass 1-D positions")
+    raise ValueError(f"{what}; got {array.n_sensors} sensors in a line")
 
 
 def _check_range(array: SensorArray, nearest: float | None) -> None:
     if array.dim != 1:
         raise ValueError(
-            f"array must be a line for unknowns='range'; got sensors in {array.dim} dimensions"
+            "array must be a line, with positions of one coordinate, for unknowns='range'; got "
+            f"sensors in {array.dim} dimensions"
         )
     if array.n_sensors < 3:
         got = array.n_sensors

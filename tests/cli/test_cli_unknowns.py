@@ -13,7 +13,10 @@ from two_unknowns import range_estimate, sphere_estimate
 import arrivals
 from arrivals.__main__ import main
 from arrivals.measurement_models import ArraySnapshot, SensorArray
+from arrivals.recordings.check import warn_of_faults
 from arrivals.recordings.choice import Choice, MeanSpectrum, TrackOptions, choose
+from arrivals.recordings.choice.unknowns import unknowns_in_words
+from arrivals.recordings.recording import Recording
 from arrivals.trackers import DirectionTracker, RangeEstimate, SphereEstimate, register
 
 PLANE = SensorArray.uca(8, radius=0.046, speed=343.0)
@@ -216,15 +219,17 @@ def test_track_of_a_tone_nearby_finds_its_range_and_a_far_one_has_none(
 # choice
 
 
-def test_wideband_sound_with_two_unknowns_gets_svalse_at_all_bins() -> None:
-    noise = np.random.default_rng(3).standard_normal((16000, 8))
-    spectrum = MeanSpectrum.of(noise, 16000.0)
+def test_talkers_get_wideband_mixture_on_the_sphere_and_svalse_for_ranges() -> None:
+    spectrum = MeanSpectrum.of(np.random.default_rng(3).standard_normal((16000, 8)), 16000.0)
     plain = choose(PLANE, 16000.0, spectrum)
-    choice = choose(PLANE, 16000.0, spectrum, TrackOptions(unknowns="sphere"))
-    assert (plain.tracker, choice.tracker) == ("wideband_mixture", "svalse")
-    assert choice.frequencies == plain.frequencies
-    assert choice.settings["solver__tempering"] == 4 * choice.n_snapshots
-    assert "--unknowns sphere" in str(choice)
+    sphere = choose(PLANE, 16000.0, spectrum, TrackOptions(unknowns="sphere"))
+    near = choose(SensorArray.ula(8, 0.04, speed=343.0), 16000.0, spectrum,
+                  TrackOptions(unknowns="range"))  # fmt: skip
+    chosen = [each.tracker for each in (plain, sphere, near)]
+    assert chosen == ["wideband_mixture", "wideband_mixture", "svalse"]
+    assert sphere.frequencies == plain.frequencies
+    assert near.settings["solver__tempering"] == 4 * near.n_snapshots
+    assert "--unknowns sphere" in str(sphere)
     given = choose(PLANE, 16000.0, spectrum, TrackOptions("cbf", unknowns="sphere"))
     assert given.tracker == "cbf"
 
@@ -233,3 +238,38 @@ def test_choice_is_written_as_options() -> None:
     choice = Choice("a tone", "svalse", (440.0,), unknowns="range", nearest=1.5)
     assert str(choice).endswith("--snapshots 1 --unknowns range --nearest 1.5")
     assert "unknowns" not in str(Choice("a tone", "svalse", (440.0,)))
+
+
+# words and warnings
+
+
+def test_side_of_a_plane_is_in_the_line() -> None:
+    square = np.stack(np.meshgrid([0.0, 1.0], [0.0, 1.0]), axis=-1).reshape(4, 2)
+    for columns, words in (((0, 1), "the upper half space alone"),
+                           ((0, 2), "about azimuth 90, elevation 0 degrees alone"),
+                           ((1, 2), "about azimuth 0, elevation 0 degrees alone")):  # fmt: skip
+        positions = np.zeros((4, 3))
+        positions[:, columns] = square
+        model = ArraySnapshot(SensorArray(positions), 3.0, unknowns="sphere")
+        assert words in unknowns_in_words(model)
+    tilted = np.array([[1.0, 0.0, -1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 1.0]])
+    model = ArraySnapshot(SensorArray(tilted), 3.0, unknowns="sphere")
+    assert "about azimuth 0, elevation 45 degrees alone" in unknowns_in_words(model)
+
+
+def test_delays_of_a_source_nearby_are_no_fault_of_the_wiring(
+    recwarn: pytest.WarningsRecorder,
+) -> None:
+    array = SensorArray.ula(12, 0.04, speed=343.0)
+    x = array.positions[:, 0] - array.positions.mean()
+    delay = np.hypot(x - 0.25, 0.54) / 343.0
+    source = np.fft.rfft(np.random.default_rng(0).standard_normal(16000))
+    turn = np.exp(-2j * np.pi * np.outer(np.fft.rfftfreq(16000, 1 / 16000), delay))
+    samples = np.fft.irfft(source[:, None] * turn, axis=0)
+    recording = Recording(samples, 16000.0, array=array)
+    warn_of_faults(recording)
+    assert any("late" in str(each.message) for each in recwarn)
+    recwarn.clear()
+    run = arrivals.track(recording, frequencies=3000, unknowns="range", nearest=0.4)
+    assert not recwarn.list
+    assert np.nanmedian(run.range) == pytest.approx(0.6, rel=0.03)

@@ -60,7 +60,7 @@ def _track_file(
         choice = choice_for(recording, options)
         measurement, tracker = assembled(recording.array or array, choice, recording.rate)
         steps = RecordedSteps(recording, choice)
-        warn_of_faults(recording, min(choice.frequencies))
+        warn_of_faults(recording, min(choice.frequencies), plane_waves=choice.unknowns != "range")
     time = steps.time if np.isfinite(steps.time).all() else None
     announced = map(_announcement(choice, options, measurement), steps)
     result = tracker.run(bar(announced, desc=choice.tracker, total=len(steps)))

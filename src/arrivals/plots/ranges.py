@@ -106,6 +106,7 @@ def _draw_bands(
 def _scale(ax: Axes, distance: Float) -> None:
     """Set the scale of the axis and its limits by the ranges alone, not by wide deviations."""
     if not len(distance):
+        ax.set_yticks([])  # plane waves alone
         return
     low, high = float(distance.min()), float(distance.max())
     if high > WIDEST * low:

@@ -107,7 +107,7 @@ def track(
     _check_arguments(more, choice.tracker)
     _, made = assembled(_array_of(recording), choice, recording.rate)
     steps = RecordedSteps(recording, choice)
-    warn_of_faults(recording, min(choice.frequencies))
+    warn_of_faults(recording, min(choice.frequencies), plane_waves=choice.unknowns != "range")
     with threadpool_limits(1, "blas"):  # matrices are small: more threads only wait
         run = made.run(steps)
     return run.at(steps.time) if np.isfinite(steps.time).all() else run

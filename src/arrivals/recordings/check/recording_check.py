@@ -105,7 +105,12 @@ def check(
     return _report(recording, recording.array if is_selected else array, frequency, Effort())
 
 
-def warn_of_faults(recording: Recording, frequency: float | None = None) -> None:
+LEVEL_FAULTS = ("channel count", "silent", "identical", "clipped", "hum")  # of any waves
+
+
+def warn_of_faults(
+    recording: Recording, frequency: float | None = None, *, plane_waves: bool = True
+) -> None:
     """Warn of each fault of a recording with an array, by a short check.
 
     Parameters
@@ -114,6 +119,8 @@ def warn_of_faults(recording: Recording, frequency: float | None = None) -> None
         With `array`.
     frequency : float, optional
         Frequency of complex snapshots, Hz.
+    plane_waves : bool
+        False if sources may be near: delays of curved waves are no fault of the wiring.
 
     Examples
     --------
@@ -125,6 +132,8 @@ def warn_of_faults(recording: Recording, frequency: float | None = None) -> None
     channel 3 is silent: connect its sensor, or add missing = [3] to the array file
     """
     faults = _report(recording, recording.array, frequency, SHORT).faults
+    if not plane_waves:
+        faults = tuple(fault for fault in faults if fault.kind in LEVEL_FAULTS)
     n_silent = sum(fault.kind == "silent" for fault in faults)
     if n_silent < recording.n_channels:  # else there is nothing to track, which is an error
         for fault in faults:

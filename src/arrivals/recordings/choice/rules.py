@@ -67,7 +67,7 @@ def choose(
     - with lines are tracked at these by `svalse`, 2 long windows a step;
     - without, by `wideband_mixture` at all bins of `BandLimits`: windows of 32 ms, every 16 ms,
       steps of 64 ms;
-    - below the frequencies of speech, and with two unknowns a source, by `svalse` at all bins, in
+    - below the frequencies of speech, and with direction and range, by `svalse` at all bins, in
       windows of three periods of the lowest, or of 32 ms.
 
     `svalse` gets settings for recorded data then: snapshots of a step and neighbouring bins are
@@ -234,7 +234,7 @@ def _of_band(limits: BandLimits, rate: float, options: TrackOptions) -> Choice:
     band = (float(f"{limits.low:.6g}"), float(f"{limits.high:.6g}"))
     frequencies = tuple(frequencies_in(band, rate, window))
     is_speech = limits.has_speech and len(frequencies) >= LEAST_BINS
-    is_speech &= options.unknowns == "azimuth"
+    is_speech &= options.unknowns != "range"
     tracker = options.tracker or (WIDEBAND if is_speech else NARROWBAND)
     reason = f"wideband sources, {len(frequencies)} bins"
     return Choice(reason, tracker, frequencies, band, *_frames(limits, rate, options, tracker))

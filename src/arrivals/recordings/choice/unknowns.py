@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from arrivals.measurement_models import ArraySnapshot
+from arrivals.measurement_models.arrays.sphere import azimuth_elevation
 from arrivals.measurement_models.manifolds.two_unknowns import fraunhofer_distance
+from arrivals.trackers.beamforming.sphere_grid import half_space_normal
 
 
 def unknowns_in_words(measurement: ArraySnapshot) -> str:
@@ -25,8 +29,13 @@ def unknowns_in_words(measurement: ArraySnapshot) -> str:
     'azimuth and elevation, in the upper half space alone: a planar array has no other'
     """
     if measurement.unknowns == "sphere":
-        half = ", in the upper half space alone: a planar array has no other"
-        return f"azimuth and elevation{half if measurement.half_space else ''}"
+        normal = half_space_normal(measurement)
+        if normal is None:
+            return "azimuth and elevation"
+        azimuth, elevation = np.rad2deg(azimuth_elevation(normal)).round() + 0.0
+        side = f"the half space about azimuth {azimuth:g}, elevation {elevation:g} degrees"
+        half = "the upper half space" if elevation == 90 else side
+        return f"azimuth and elevation, in {half} alone: a planar array has no other"
     limit = fraunhofer_distance(measurement.waves) / 4
     nearest = measurement.nearest or limit
     waves = (
