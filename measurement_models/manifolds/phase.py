@@ -22,6 +22,7 @@ from arrivals.measurement_models.manifolds.points import (
     PointResponse,
     cell_centres,
     cell_count,
+    lattice_images,
     sine_limits,
 )
 from arrivals.typing import Bool, Complex, Float
@@ -104,6 +105,8 @@ class DirectionCosines(PhaseManifold):
         As in `PointResponse`.
     axes : tuple of tuple of float
         Orthonormal axes of the plane, then its normal: (3, 3).
+    images : tuple of tuple of float
+        Changes of (u, v) that leave the response of the whole array as it is: (2, n).
 
     Examples
     --------
@@ -116,6 +119,7 @@ class DirectionCosines(PhaseManifold):
     """
 
     axes: tuple[tuple[float, ...], ...]
+    images: tuple[tuple[float, ...], ...]
 
     merge_correlation: ClassVar[float | None] = SAME_SOURCE
 
@@ -133,6 +137,24 @@ class DirectionCosines(PhaseManifold):
     def from_doa(self, doa: ArrayLike, elevation: ArrayLike = 0.0) -> Float:
         """Return the points (2, n) of azimuths and elevations (n,), rad."""
         return np.asarray(self.frame[:2] @ unit_vectors(doa, elevation).T / self.scale)
+
+    @cached_property
+    def shifts(self) -> Float:
+        """The images as displacements, (2, n, 1)."""
+        return np.array(self.images)[..., None] / self.scale[:, None]
+
+    def move(self, x: Float, step: Float) -> Float:
+        """Return the points after displacements; beyond the rim their images within, if any."""
+        moved = x + step
+        outside = ((moved * self.scale) ** 2).sum(axis=-2) > 1
+        if not (outside.any() and self.shifts.size):
+            return moved
+        images = moved[..., None, :] + self.shifts  # (..., 2, n, L)
+        square = ((images * self.scale[:, None]) ** 2).sum(axis=-3)
+        best = square.argmin(axis=-2)[..., None, :]
+        image = np.take_along_axis(images, best[..., None, :, :], axis=-2)[..., 0, :]
+        inside = np.take_along_axis(square, best, axis=-2)[..., 0, :] <= 1
+        return np.where((outside & inside)[..., None, :], image, moved)
 
     def plane_cosines(self, x: Float) -> Float:
         """Return u, v and the cosine with the normal, (..., 3, L); points beyond the rim on it."""
@@ -236,7 +258,14 @@ def direction_cosines(waves: PlaneWaves) -> DirectionCosines:
     p = frame[:2, : waves.array.dim] @ (waves.array.positions - waves.centre).T
     square = (waves.wavenumber**2).mean() * (p**2).mean(axis=1)
     unit = tuple((1 / np.sqrt(square)).tolist())
-    return DirectionCosines(waves, unit, tuple(waves.centre.tolist()), tuple(map(tuple, frame)))
+    images = lattice_images(p, waves.wavelengths[0]) if len(waves.wavelengths) == 1 else p[:, :0]
+    return DirectionCosines(
+        waves,
+        unit,
+        tuple(waves.centre.tolist()),
+        tuple(map(tuple, frame)),
+        tuple(map(tuple, images)),
+    )
 
 
 def plane_axes(p: Float) -> Float:

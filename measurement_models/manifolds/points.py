@@ -201,6 +201,40 @@ def cell_centres(n: int) -> Float:
     return -1 + 2 * (np.arange(n) + 0.5) / n
 
 
+def lattice_images(p: Float, wavelength: float) -> Float:
+    """Return changes of (u, v) that leave the response as it is, (2, n): of sensors on a lattice.
+
+    Parameters
+    ----------
+    p : ndarray, shape (2, n_sensors)
+        Coordinates in their plane, m.
+    wavelength : float
+        Wavelength, m.
+
+    Returns
+    -------
+    ndarray, shape (2, 8) or (2, 0)
+        The eight changes around zero; none where neighbours do not span the whole array.
+
+    Examples
+    --------
+    >>> lattice_images(np.array([[0.0, 0.5, 0.0, 0.5], [0.0, 0.0, 0.4, 0.4]]), 1.0).max(axis=1)
+    array([2. , 2.5])
+    """
+    apart = (p[:, :, None] - p[:, None]).reshape(2, -1)
+    length = np.hypot(*apart)
+    order = np.argsort(length, kind="stable")
+    apart = apart[:, order[length[order] > 1e-9 * length.max()]]
+    one, across = apart[:, 0], apart[0, 0] * apart[1] - apart[1, 0] * apart[0]
+    basis = np.stack([one, apart[:, (np.abs(across) > 1e-6 * np.abs(across).max()).argmax()]])
+    steps = np.linalg.solve(basis.T, p - p[:, :1])
+    if np.abs(steps - np.round(steps)).max() > 1e-6:
+        return np.zeros((2, 0))
+    i, j = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]).T
+    # k b·q = 2π n for both vectors b of the basis
+    return np.asarray(wavelength * np.linalg.solve(basis, np.stack([i, j]).astype(np.float64)))
+
+
 def sine_limits(sine: Float) -> Float:
     """Return sines cut to ±1."""
     return np.minimum(np.maximum(sine, -1.0), 1.0)

@@ -93,7 +93,8 @@ def test_mean_response_is_that_of_a_gaussian_around_the_point(m: Any) -> None:
     for k in range(4):
         full = S[:, k : k + 1] if d == 1 else S[np.array([[0, 1], [1, 2]]), k]
         spread = np.linalg.cholesky(full) @ nodes
-        a, _ = m.at(m.move(np.repeat(x[:, k : k + 1], len(weights), axis=1), spread))
+        start = np.repeat(x[:, k : k + 1], len(weights), axis=1)
+        a, _ = m.at(start + spread if m.is_linear else m.move(start, spread))
         expected = (weights[:, None] * a).sum(axis=1) / weights.sum()
         mean = m.responses(x[None], S[None])[0, :, 0, k]
         np.testing.assert_allclose(mean, expected, atol=1e-10 if m.is_linear else 5e-3)
@@ -239,3 +240,30 @@ def test_golden_numbers_of_planar_arrays() -> None:
 def test_golden_units_of_curved_lines() -> None:
     m = fresnel_line(PlaneWaves(SensorArray.ula(16, 0.5), (1.0,)), 0.05)
     assert m.unit == pytest.approx((0.069051, 0.067387), abs=1e-6)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.4])
+@pytest.mark.parametrize("shear", [0.0, 0.25])
+def test_points_beyond_the_rim_move_to_their_images_within(turn: float, shear: float) -> None:
+    """Of a lattice with a gap, in any orientation; with a sensor left out, too."""
+    axis = 0.5 * np.arange(4)
+    p = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)[1:] @ [[1.0, 0.0], [shear, 1.0]]
+    p = p @ np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    m = direction_cosines(PlaneWaves(SensorArray(p), (1.0,)))
+    uv = np.random.default_rng(0).uniform(-1.3, 1.3, (2, 200))
+    x = uv / m.scale
+    moved = m.without([2]).move(x, np.zeros_like(x))
+    radius, after = np.hypot(*uv), np.hypot(*(moved * m.scale))
+    np.testing.assert_array_equal(moved[:, radius <= 1], x[:, radius <= 1])
+    changed = (moved != x).any(axis=0)
+    assert (after[changed] <= 1).all()
+    assert changed.sum() > 20
+    one, other = m.at(x)[0], m.at(moved)[0]
+    np.testing.assert_allclose(np.abs((one.conj() * other).sum(axis=-1)), m.n_sensors)
+
+
+def test_sensors_off_a_lattice_and_several_bins_have_no_images() -> None:
+    for array, wavelengths in ((SensorArray.uca(8, 0.65), (1.0,)), (SQUARE, (1.0, 1.1))):
+        m = direction_cosines(PlaneWaves(array, wavelengths))
+        x = np.array([[1.2], [0.3]]) / m.scale
+        np.testing.assert_array_equal(m.move(x, np.zeros((2, 1))), x)

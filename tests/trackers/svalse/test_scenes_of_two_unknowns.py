@@ -83,6 +83,21 @@ def test_deviations_on_the_sphere_are_those_of_the_bound() -> None:
     assert np.sqrt((error**2).mean()) == pytest.approx(np.sqrt(np.trace(C)), rel=0.35)
 
 
+def test_source_seen_as_its_image_beyond_the_horizon_is_reported() -> None:
+    """Sensors half a wavelength apart: u = -1.21 has the response of u = 0.79."""
+    axis = 0.5 * np.arange(4)
+    square = SensorArray(np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2))
+    model = ArraySnapshot(square, 1.0, n_snapshots=10, unknowns="sphere")
+    doa, elevation = np.tile([0.3, 2.5], (4, 1)), np.tile([0.6, 1.1], (4, 1))
+    for seed in (5, 6):
+        rng = np.random.default_rng(seed)
+        w = np.exp(2j * np.pi * rng.random((4, 10, 2)))
+        run: Any = create("valse", measurement=model).run(model.simulate(doa, w, rng, elevation))
+        found = unit_vectors(run.doa, run.elevation)[..., None, :]
+        apart = great_circle(found, unit_vectors(doa, elevation)[:, None])
+        assert (np.nanmin(apart, axis=1) < 0.2).all()
+
+
 def turned(array: SensorArray, turn: Float) -> ArraySnapshot:
     return ArraySnapshot(
         SensorArray(array.positions @ turn.T), 1.0, n_snapshots=4, unknowns="sphere"
