@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -38,6 +38,8 @@ class SineLine(PhaseManifold):
     unit : tuple of float
     centre : tuple of float
         As in `PointResponse`.
+    period : float or None
+        Difference of sines of equal responses of the whole array; None without.
 
     Examples
     --------
@@ -47,11 +49,7 @@ class SineLine(PhaseManifold):
     0.3
     """
 
-    @cached_property
-    def period(self) -> float | None:
-        """Difference of sines of equal responses, of one bin on a uniform grid; None elsewhere."""
-        spacing = self.waves.array.spacing
-        return None if spacing is None or self.n_bins > 1 else self.waves.wavelengths[0] / spacing
+    period: float | None
 
     @property
     def path(self) -> Float:
@@ -62,16 +60,18 @@ class SineLine(PhaseManifold):
         """Return the points (1, n) of directions (n,), rad."""
         return np.asarray(np.sin(doa)[None] / self.scale)
 
-    def sine(self, x: Float) -> Float:
-        """Return sin β of points (..., d, L), (..., L).
+    def move(self, x: Float, step: Float) -> Float:
+        """Return the points after displacements; beyond ±1 their images within, if any."""
+        moved = x + step
+        if self.period is not None:
+            sine = self.sine(moved)
+            image = sine - self.period * np.round(sine / self.period)
+            moved[..., 0, :] = np.where(np.abs(sine) > 1, image / self.unit[0], moved[..., 0, :])
+        return moved
 
-        Where sines beyond ±1 have the response of one within, it is that one.
-        """
-        sine = x[..., 0, :] * self.unit[0]
-        if self.period is None:
-            return sine
-        image = sine - self.period * np.round(sine / self.period)
-        return np.where(np.abs(sine) > 1, image, sine)
+    def sine(self, x: Float) -> Float:
+        """Return sin β of points (..., d, L), (..., L)."""
+        return x[..., 0, :] * self.unit[0]
 
     def direction(self, x: Float) -> Float:
         """Return sin β within ±1: (..., 1, L)."""
@@ -121,6 +121,8 @@ class FresnelLine(SineLine):
     unit : tuple of float
     centre : tuple of float
         As in `PointResponse`.
+    period : float or None
+        As in `SineLine`.
     curvature_std : float
         σ, 1/m.
 
@@ -205,7 +207,7 @@ def sine_line(waves: PlaneWaves) -> SineLine:
     """Return the manifold of a line in sin β."""
     p = waves.array.positions[:, 0] - waves.centre
     unit = 1 / np.sqrt((waves.wavenumber**2).mean() * (p**2).mean())
-    return SineLine(waves, (float(unit),), tuple(waves.centre.tolist()))
+    return SineLine(waves, (float(unit),), tuple(waves.centre.tolist()), sine_period(waves))
 
 
 @lru_cache(maxsize=256)
@@ -219,7 +221,14 @@ def fresnel_line(waves: PlaneWaves, curvature_std: float) -> FresnelLine:
     curvature_std : float
         Standard deviation of the curvature of waves that are not plane, 1/m.
     """
-    return FresnelLine(waves, line_units(waves), tuple(waves.centre.tolist()), curvature_std)
+    centre, period = tuple(waves.centre.tolist()), sine_period(waves)
+    return FresnelLine(waves, line_units(waves), centre, period, curvature_std)
+
+
+def sine_period(waves: PlaneWaves) -> float | None:
+    """Return the difference of sines of equal responses, of one bin on a uniform grid, or None."""
+    spacing = waves.array.spacing
+    return None if spacing is None or len(waves.wavelengths) > 1 else waves.wavelengths[0] / spacing
 
 
 def line_units(waves: PlaneWaves) -> tuple[float, float]:

@@ -262,6 +262,16 @@ def test_points_beyond_the_rim_move_to_their_images_within(turn: float, shear: f
     np.testing.assert_allclose(np.abs((one.conj() * other).sum(axis=-1)), m.n_sensors)
 
 
+@pytest.mark.parametrize("missing", [[], [3], [1, 3, 5, 7]])
+def test_sines_beyond_one_move_to_their_images_of_the_whole_line(missing: list[int]) -> None:
+    m = fresnel_line(PlaneWaves(SensorArray.ula(9, 0.45), (1.0,)), 0.05).without(missing)
+    sine = np.array([0.4, 1.05, 1.15, -1.3, 2.0])
+    x = np.stack([sine, 0 * sine]) / m.scale
+    moved = m.move(x, np.zeros_like(x)) * m.scale
+    period = 1 / 0.45
+    np.testing.assert_allclose(moved[0], [0.4, 1.05, 1.15 - period, period - 1.3, 2 - period])
+
+
 def test_sensors_off_a_lattice_and_several_bins_have_no_images() -> None:
     for array, wavelengths in ((SensorArray.uca(8, 0.65), (1.0,)), (SQUARE, (1.0, 1.1))):
         m = direction_cosines(PlaneWaves(array, wavelengths))
