@@ -212,7 +212,7 @@ def is_angle_manifold(manifold: Manifold) -> TypeGuard[AngleManifold]:
     >>> is_angle_manifold(ArraySnapshot(SensorArray.ula(5, 0.5), wavelength=1.0).manifold())
     True
     """
-    return hasattr(manifold, "harmonics")
+    return not is_point_manifold(manifold)  # the harmonics of some are computed on each access
 
 
 def is_point_manifold(manifold: Manifold) -> TypeGuard[PointManifold]:
