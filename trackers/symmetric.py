@@ -10,6 +10,8 @@ from arrivals.typing import Float, Int
 
 PLACES = {1: np.array([[0]]), 2: np.array([[0, 1], [1, 2]])}  # of the entries ij, by d
 MIN_INDEPENDENCE = 1e-14  # one minus the square of a correlation
+PAIRS = {1: np.triu_indices(1), 2: np.triu_indices(2)}  # rows and columns of a triangle, by d
+IDENTITIES = {1: np.ones((1, 1)), 2: np.array([[1.0], [0.0], [1.0]])}
 SIZES = {1: 1, 3: 2}  # rows of a matrix, by the length of its triangle
 
 
@@ -41,7 +43,7 @@ def identity(d: int) -> Float:
     >>> identity(2).ravel()
     array([1., 0., 1.])
     """
-    return np.eye(d)[np.triu_indices(d)][:, None]
+    return IDENTITIES[d]
 
 
 def full(C: Float) -> Float:
@@ -51,7 +53,7 @@ def full(C: Float) -> Float:
 
 def triangle(C: Float) -> Float:
     """Return the triangles of matrices (..., d, d, L)."""
-    rows, columns = np.triu_indices(C.shape[-2])
+    rows, columns = PAIRS[C.shape[-2]]
     return np.asarray(C[..., rows, columns, :])
 
 

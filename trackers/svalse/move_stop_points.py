@@ -8,6 +8,7 @@ import numpy as np
 
 from arrivals.motion_models.move_stop import TINY, MoveStopWalk
 from arrivals.trackers.symmetric import (
+    PAIRS,
     SIZES,
     inverse,
     log_det,
@@ -90,7 +91,7 @@ def mixed(modes: PointModes) -> PointMixture:
 
 def spread_of(offset: Float) -> Float:
     """Return the triangles of o oᵀ, (d(d+1)/2, ...)."""
-    rows, columns = np.triu_indices(len(offset))
+    rows, columns = PAIRS[len(offset)]
     return np.asarray(offset[rows] * offset[columns])
 
 
