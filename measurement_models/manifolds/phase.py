@@ -223,11 +223,11 @@ class DirectionCosines(PhaseManifold):
     def located(self, x: Float, covariance: Float) -> dict[str, Float]:
         """Return doa (azimuth), std, elevation and covariance of points (2, L)."""
         e, w = self.rates(x)
-        n = self.direction(x)
+        cosines = self.plane_cosines(x)
+        n, height = self.frame.T @ cosines, cosines[2]
         # t: unit tangents with (u, v) parts w e and e⊥
         outwards = self.frame[:2].T @ e
         across = self.frame[:2].T @ np.stack([-e[1], e[0]])
-        height = self.plane_cosines(x)[2]
         away = height * outwards - np.sqrt(1 - height**2) * self.frame[2][:, None]
         inverse = np.stack([e / w, np.stack([-e[1], e[0]])]) * self.scale  # (2, 2, L): J⁻¹
         return tangent_estimate(n, np.stack([away, across]), inverse, covariance)

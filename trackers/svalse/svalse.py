@@ -172,7 +172,7 @@ class SVALSE(VALSE):
         return ~np.isnan(self.mu if self.mu.ndim == 1 else self.mu[:, 0])
 
     def predict(self, u: ArrayLike | None = None, *, dt: float = 1.0) -> None:
-        """Predict the angles' densities, births and deaths, (62)-(65)."""
+        """Predict the densities, births and deaths, (62)-(65)."""
         no_control(u)
         self.predict_batch([self], dt)
         self.report_prior()

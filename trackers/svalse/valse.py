@@ -48,7 +48,7 @@ class VALSE(BatchDirectionTracker):
         An `ArraySnapshot`, or a model with its methods: any array, with any number of frequencies
         and snapshots a step. Its noise is not used: the method estimates it.
     solver : NewtonSolver or CoordinateSolver
-        Maximization of the bound, with its settings: joint Newton steps on all angles, or the
+        Maximization of the bound, with its settings: joint Newton steps on all unknowns, or the
         paper's coordinate ascent, which takes three to thirty times as long and integrates the
         angles' densities. `NewtonSolver` serves every array, with any number of frequencies and
         snapshots; measurements with an unknown slowness or elevation it passes to coordinate

@@ -76,7 +76,7 @@ def grid_evidence(grid: CandidateGrid, evaluation: Evaluation) -> GridEvidence:
     """Return the evidence of one more component at each point."""
     P = evaluation.A.conj() @ grid.A.swapaxes(1, 2)  # âᴴa
     residual = evaluation.Y - evaluation.A.swapaxes(2, 3) @ evaluation.W
-    z = grid.A.conj() @ residual
+    z = grid.A @ residual.conj()  # of its conjugate, only |z|² counts
     z2 = over_snapshots(z.real**2 + z.imag**2)
     GP = evaluation.G @ P
     nu, tau = evaluation.nu[:, :, None], evaluation.tau[:, :, None]

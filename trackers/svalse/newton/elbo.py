@@ -165,7 +165,7 @@ def evaluate(
 def with_variances(
     response: ExpectedResponse, evaluation: Evaluation, nu: Float, tau: Float
 ) -> Evaluation:
-    """Return the evaluation with other variances; the angles stay."""
+    """Return the evaluation with other variances; the points stay."""
     J, H = evaluation.X[:, :, 0], evaluation.h[:, :, 0]
     W, G, explained, F = amplitudes(response, J, H, evaluation.used, evaluation.K, nu, tau)
     F = F + evaluation.log_prior

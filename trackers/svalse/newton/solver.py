@@ -1,7 +1,7 @@
 """Solver of VALSE and SVALSE by joint Newton steps and single changes of the support.
 
 The support is changed by one component at a time from that of the prediction, each change
-followed by a few Newton steps on all angles together; a change is kept only if it raises the
+followed by a few Newton steps on all unknowns together; a change is kept only if it raises the
 support criterion.
 """
 
@@ -50,7 +50,7 @@ FILL_SHARE = 0.5  # components added before the noise is estimated, per sensor o
 
 @dataclass(frozen=True)
 class NewtonSolver(SolverSettings):
-    """Joint Newton steps on all angles, and single changes of the support.
+    """Joint Newton steps on all unknowns, and single changes of the support.
 
     Parameters
     ----------

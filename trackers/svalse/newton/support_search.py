@@ -73,7 +73,7 @@ class SupportSearch:
     max_iterations : int
         Largest number of Newton steps.
     kl_weight : float
-        Share of the angles' KL divergences that is charged.
+        Share of the KL divergences that is charged.
     n_components : int
         Components whose activity is estimated.
     max_active, fill_target : int
