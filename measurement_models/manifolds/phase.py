@@ -28,6 +28,9 @@ from arrivals.measurement_models.manifolds.points import (
 from arrivals.typing import Bool, Complex, Float
 
 
+RIM_MARGIN = 0.5  # of points beyond the rim by noise, rad rms of the phases over the array
+
+
 @dataclass(frozen=True, eq=False)
 class PhaseManifold(PointResponse):
     """A response a(x) = exp(j K x) of constant phase slopes K.
@@ -143,10 +146,15 @@ class DirectionCosines(PhaseManifold):
         """The images as displacements, (2, n, 1)."""
         return np.array(self.images)[..., None] / self.scale[:, None]
 
+    @cached_property
+    def far_outside(self) -> float:
+        """Square of u and v beyond which a direction on the horizon is unlikely."""
+        return (1 + RIM_MARGIN * max(self.unit)) ** 2
+
     def move(self, x: Float, step: Float) -> Float:
-        """Return the points after displacements; beyond the rim their images within, if any."""
+        """Return the points after displacements; far beyond the rim their images, if any within."""
         moved = x + step
-        outside = ((moved * self.scale) ** 2).sum(axis=-2) > 1
+        outside = ((moved * self.scale) ** 2).sum(axis=-2) > self.far_outside
         if not (outside.any() and self.shifts.size):
             return moved
         images = moved[..., None, :] + self.shifts  # (..., 2, n, L)

