@@ -27,7 +27,6 @@ from arrivals.measurement_models.manifolds.points import (
 )
 from arrivals.typing import Bool, Complex, Float
 
-
 RIM_MARGIN = 0.5  # of points beyond the rim by noise, rad rms of the phases over the array
 
 

@@ -10,6 +10,7 @@ from arrivals.motion_models.move_stop import TINY, MoveStopWalk
 from arrivals.trackers.symmetric import (
     PAIRS,
     SIZES,
+    dot,
     inverse,
     log_det,
     times,
@@ -82,11 +83,15 @@ def renewed(walk: MoveStopWalk, modes: PointModes, covariance: Float) -> PointMo
 
 def mixed(modes: PointModes) -> PointMixture:
     """Return the moments of mixtures, and the modes with their offsets from the new mean."""
-    mean = (modes.weight * modes.offset).sum(axis=-1)
+    mean = of_both(modes.weight * modes.offset)
     offset = modes.offset - mean[..., None]
-    spread = modes.covariance + spread_of(offset)
-    covariance = (modes.weight * spread).sum(axis=-1)
+    covariance = of_both(modes.weight * (modes.covariance + spread_of(offset)))
     return PointMixture(mean, covariance, modes._replace(offset=offset))
+
+
+def of_both(values: Float) -> Float:
+    """Return sums over the last axis, of two modes: an addition is faster."""
+    return np.asarray(values[..., 0] + values[..., 1])
 
 
 def spread_of(offset: Float) -> Float:
@@ -140,8 +145,8 @@ def update(walk: MoveStopWalk, modes: PointModes, force: Float, information: Flo
     pull = b - times(D, o)
     shift = times(new, pull)
     # ln N(δ; o, P + D⁻¹) = ½ ln |P'|/|P| + b·o - ½ oᵀDo + ½ (D(δ - o))ᵀ P' D(δ - o) + const
-    log_w = 0.5 * (log_det(new) - log_det(P)) + (b * o - 0.5 * o * times(D, o)).sum(axis=0)
-    log_w = (log_w + 0.5 * (pull * shift).sum(axis=0)).reshape(L, 2)
+    log_w = 0.5 * (log_det(new) - log_det(P)) + dot(b - 0.5 * times(D, o), o)
+    log_w = (log_w + 0.5 * dot(pull, shift)).reshape(L, 2)
     log_w = log_w + np.log(np.maximum(modes.weight, TINY))
     w = np.exp(log_w - log_w.max(axis=-1, keepdims=True))
     w = w / w.sum(axis=-1, keepdims=True)

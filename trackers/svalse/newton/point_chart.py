@@ -11,6 +11,7 @@ from arrivals.trackers.svalse.newton.batch import Components, Layout
 from arrivals.trackers.symmetric import (
     clamped_inverse,
     congruent,
+    dot,
     identity,
     inverse,
     log_det,
@@ -74,7 +75,7 @@ class PointChart:
         """Return ½ (δᵀPδ + tr P'S), (B, L), its gradient, and its curvature P' = (∂δ)ᵀ P ∂δ."""
         delta, slope = self.manifold.offset(x, mean)
         force = times(precision, delta)
-        square = (delta * force).sum(axis=-2)
+        square = dot(delta, force)
         if slope is not None:
             force = (slope * force[..., :, None, :]).sum(axis=-3)
             precision = congruent(slope, precision)
@@ -83,7 +84,7 @@ class PointChart:
     def quadratic(self, x: Float, mean: Float, precision: Float, s: Float | None = None) -> Float:
         """Return ½ (δᵀPδ + tr PS) of points, (..., L)."""
         delta, _ = self.manifold.offset(x, mean)
-        square = (delta * times(precision, delta)).sum(axis=-2)
+        square = dot(delta, times(precision, delta))
         return np.asarray(
             0.5 * square if s is None else 0.5 * (square + trace_of_product(precision, s))
         )

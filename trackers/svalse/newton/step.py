@@ -121,7 +121,7 @@ def ascent_direction(g: Float, N: Float, longest: float) -> Float:
     steep = np.maximum(steep, MIN_RELATIVE_CURVATURE * steep.max(axis=1, keepdims=True) + 1e-300)
     flat = g.reshape(len(g), -1, 1)
     d = (V @ ((V.swapaxes(1, 2) @ flat) / steep[:, :, None])).reshape(g.shape)
-    size = np.abs(d) if g.shape[1] == 1 else np.sqrt((d**2).sum(axis=1, keepdims=True))
+    size = np.abs(d) if g.shape[1] == 1 else np.hypot(d[:, :1], d[:, 1:])
     size = size.max(axis=2, keepdims=True)
     return np.asarray(d * np.minimum(1.0, longest / np.maximum(size, 1e-300)))
 
