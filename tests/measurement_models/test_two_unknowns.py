@@ -224,7 +224,7 @@ def test_ambiguity_is_that_of_plane_waves_on_a_line_and_none_on_the_sphere() -> 
         (np.eye(3)[:1] * np.arange(4.0)[:, None], {"unknowns": "sphere"}, "collinear"),
         (np.eye(2), {"unknowns": "sphere"}, "at least 3 sensors .*; got 2"),
         (np.eye(3)[:2], {"unknowns": "sphere"}, "at least 3 sensors .*; got 2"),
-        (CIRCLE, {"unknowns": "range"}, "must be a line .*; got sensors in 2 dimensions"),
+        (CIRCLE, {"unknowns": "range"}, "must be a line, .*; got sensors in 2 dimensions"),
         (np.arange(2.0), {"unknowns": "range"}, "at least 3 sensors .*; got 2"),
         (LINE, {"unknowns": "range", "nearest": -1.0}, "nearest must be finite and positive"),
         (LINE, {"unknowns": "range", "nearest": np.nan}, "nearest must be finite and positive"),
