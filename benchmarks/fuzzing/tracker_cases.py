@@ -59,7 +59,10 @@ CIRCLE = ArraySnapshot(
 )
 SPHERE = CIRCLE.replace(wavelength=1.0, n_snapshots=1, unknowns="sphere")
 SPACE = CIRCLE.replace(array=SensorArray(0.4 * fibonacci_sphere(6)), unknowns="sphere")
-ON_SPHERE = ("cbf", "mvdr", "music", "peaks_gnn")
+RANGE = LINE.replace(unknowns="range")
+NEAR = LINE.replace(unknowns="range", nearest=1.0)
+NEWTON = ("svalse", "valse")
+ON_SPHERE = ("cbf", "mvdr", "music", "peaks_gnn", *NEWTON)
 BANDS = CIRCLE.replace(wavelength=list(np.linspace(1.0, 3.0, 12)), n_snapshots=4)
 BLOCK = LINE.replace(wavelength=[1.0, 1.3], n_snapshots=2)
 PAIRS = ArraySnapshot(SensorArray.symmetric([0.25, 0.5]), wavelength=1.0, noise=0.1)
@@ -83,8 +86,9 @@ def soundings() -> list[Any]:
 
 def snapshots(model: ArraySnapshot, n_steps: int = 6) -> list[Any]:
     elevation = np.full((n_steps, 2), [0.3, 1.0]) if model.unknowns == "sphere" else None
+    distance = np.full((n_steps, 2), [2.0, np.inf]) if model.unknowns == "range" else None
     doa = np.full((n_steps, 2), [0.5, -0.4])
-    return list(model.simulate(doa, [1.0, 0.7j], RNG, elevation))
+    return list(model.simulate(doa, [1.0, 0.7j], RNG, elevation, distance))
 
 
 def samples() -> list[Any]:
@@ -105,13 +109,15 @@ def imm() -> IMM:
 
 
 def direction(name: str, **params: Any) -> list[Case]:
-    """Return a tracker of directions on a line, on bins of a circle, and on the sphere.
+    """Return a tracker of directions on a line, on bins of a circle, on the sphere, with ranges.
 
-    The latter two where it works there.
+    The latter three where it works there.
     """
     models = [LINE, BLOCK if name in ("root_music", "esprit", "ssbl") else CIRCLE]
     if name in ON_SPHERE:
         models += [SPHERE, SPACE]
+    if name in NEWTON:
+        models += [RANGE, NEAR]
     return [
         (lambda model=model: create(name, measurement=model, **params), snapshots(model))  # type: ignore[misc]
         for model in models

@@ -33,6 +33,9 @@ SPHERE = CIRCLE.replace(unknowns="sphere")
 SPACE = ArraySnapshot(
     SensorArray(0.7 * fibonacci_sphere(12)), [1.0, 1.3], 1e-3, n_snapshots=2, unknowns="sphere"
 )
+RANGE = LINE.replace(unknowns="range")
+RANGE_BLOCK = LINE.replace(wavelength=[1.0, 1.3], n_snapshots=2, unknowns="range")
+NEAR = LINE.replace(unknowns="range", nearest=2.0)
 GAPS = ArraySnapshot(SensorArray.ula(10, 0.4, missing=[2]), wavelength=1.0, noise=1e-3)
 
 
@@ -41,7 +44,8 @@ def two_sources(model: ArraySnapshot, n_steps: int = 4) -> Measurements:
     on = np.arange(n_steps) > 0
     doa = np.stack([0.5 + 0.02 * np.arange(n_steps), np.where(on, -0.4, np.nan)], axis=-1)
     elevation = np.array([0.1, 1.0]) + 0 * doa if model.unknowns == "sphere" else None
-    z = model.simulate(doa, [1.0, 0.8j], np.random.default_rng(5), elevation)
+    distance = np.array([3.0, np.inf]) + 0 * doa if model.unknowns == "range" else None
+    z = model.simulate(doa, [1.0, 0.8j], np.random.default_rng(5), elevation, distance)
     z[1, ..., 3] = np.nan
     z[-1] = 0.0
     return z
@@ -129,4 +133,12 @@ TRACKERS: list[tuple[str, MakeTracker, Measurements]] = [
         talkers(MANY_BINS.replace(unknowns="sphere")),
     ),
     ("cbf", lambda: CBF(SPACE, n_directions=500, max_sources=3), two_sources(SPACE)),
+    ("svalse", lambda: SVALSE(SPHERE), two_sources(SPHERE)),
+    ("svalse", lambda: SVALSE(SPACE, BernoulliVonMises(kappa=50.0)), two_sources(SPACE)),
+    ("svalse", lambda: SVALSE(RANGE), two_sources(RANGE)),
+    ("svalse", lambda: SVALSE(NEAR), two_sources(NEAR)),
+    ("valse", lambda: VALSE(SPHERE), two_sources(SPHERE)),
+    ("valse", lambda: VALSE(SPACE), two_sources(SPACE)),
+    ("valse", lambda: VALSE(RANGE_BLOCK), two_sources(RANGE_BLOCK)),
+    ("valse", lambda: VALSE(NEAR), two_sources(NEAR)),
 ]

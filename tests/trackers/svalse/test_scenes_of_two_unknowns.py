@@ -176,3 +176,20 @@ def test_change_of_the_unknowns_starts_anew(method: str) -> None:
         tracker.set_params(measurement=model.replace(noise=0.02))
         np.testing.assert_array_equal(tracker.x, kept)
         assert type(tracker.estimate) is fresh.estimate_kind
+
+
+@pytest.mark.parametrize("array", [SensorArray.uca(7, 0.5), SPACE])
+def test_sensor_that_fails_is_as_an_array_without_it(array: SensorArray) -> None:
+    model = ArraySnapshot(array, 1.0, 1e-2, unknowns="sphere")
+    truth = np.full((4, 2), [0.5, -0.4]), np.full((4, 2), [0.3, 1.0])
+    z = model.simulate(truth[0], [1.0, 0.8j], np.random.default_rng(2), truth[1])
+    smaller = model.replace(array=array.without([2]))
+    less: Any = create("svalse", measurement=smaller).run(np.delete(z, 2, axis=-1))
+    z[..., 2] = np.nan
+    run: Any = create("svalse", measurement=model).run(z)
+    assert run.n_found.tolist() == less.n_found.tolist()
+    found = ~np.isnan(run.doa)
+    stds = run.std[found], np.sqrt(run.covariance[found][:, 0, 0])
+    for name, std in zip(("doa", "elevation"), stds, strict=True):
+        difference = getattr(run, name)[found] - getattr(less, name)[found]
+        assert (np.abs(difference) < 0.1 * std).all()
