@@ -133,6 +133,14 @@ class DirectionTracker(Tracker):
         """Report no direction; a subclass with a belief also returns to its initial one."""
         self.report_none()
 
+    def set_params(self, **params: Any) -> Self:
+        """Change parameters and keep the belief, unless sources have other unknowns then."""
+        before = getattr(getattr(self, "measurement", None), "unknowns", None)
+        super().set_params(**params)
+        if getattr(getattr(self, "measurement", None), "unknowns", None) != before:
+            self.reset()
+        return self
+
     def report_none(self) -> None:
         """Report no direction, as between measurements."""
         n = self.n_slots * self.estimate_kind.n_unknowns
@@ -169,16 +177,12 @@ class DirectionTracker(Tracker):
             Estimated noise variance of one sensor.
         """
         doa = np.asarray(doa, dtype=np.float64)
-        n = len(doa)
+        n, unknown = len(doa), np.full(len(doa), complex(np.nan, np.nan))
         self._estimate = estimate = DirectionEstimate(
             doa=doa,
-            std=np.full(n, np.nan) if std is None else np.asarray(std, np.float64),
-            existence=np.full(n, np.nan)
-            if existence is None
-            else np.asarray(existence, np.float64),
-            amplitude=np.full(n, complex(np.nan, np.nan))
-            if amplitude is None
-            else np.asarray(amplitude, np.complex128),
+            std=np.asarray(unknown.real if std is None else std, np.float64),
+            existence=np.asarray(unknown.real if existence is None else existence, np.float64),
+            amplitude=np.asarray(unknown if amplitude is None else amplitude, np.complex128),
             label=np.full(n, -1) if label is None else np.asarray(label, np.int64),
             converged=converged,
             iterations=iterations,

@@ -180,16 +180,59 @@ def test_change_of_the_unknowns_starts_anew(method: str) -> None:
 
 @pytest.mark.parametrize("array", [SensorArray.uca(7, 0.5), SPACE])
 def test_sensor_that_fails_is_as_an_array_without_it(array: SensorArray) -> None:
-    model = ArraySnapshot(array, 1.0, 1e-2, unknowns="sphere")
+    model = ArraySnapshot(array, 1.0, 1e-2, n_snapshots=3, unknowns="sphere")
     truth = np.full((4, 2), [0.5, -0.4]), np.full((4, 2), [0.3, 1.0])
-    z = model.simulate(truth[0], [1.0, 0.8j], np.random.default_rng(2), truth[1])
+    rng = np.random.default_rng(2)
+    z = model.simulate(truth[0], np.exp(6.28j * rng.random((4, 3, 2))), rng, truth[1])
     smaller = model.replace(array=array.without([2]))
     less: Any = create("svalse", measurement=smaller).run(np.delete(z, 2, axis=-1))
     z[..., 2] = np.nan
     run: Any = create("svalse", measurement=model).run(z)
     assert run.n_found.tolist() == less.n_found.tolist()
-    found = ~np.isnan(run.doa)
-    stds = run.std[found], np.sqrt(run.covariance[found][:, 0, 0])
-    for name, std in zip(("doa", "elevation"), stds, strict=True):
-        difference = getattr(run, name)[found] - getattr(less, name)[found]
-        assert (np.abs(difference) < 0.1 * std).all()
+    for step in range(4):
+        one, other = np.argsort(run.doa[step])[:2], np.argsort(less.doa[step])[:2]
+        variance = run.covariance[step, one].diagonal(axis1=1, axis2=2)  # elevation, azimuth
+        for name, std in (("elevation", variance[:, 0] ** 0.5), ("doa", run.std[step, one])):
+            difference = getattr(run, name)[step, one] - getattr(less, name)[step, other]
+            assert (np.abs(difference) < 0.1 * std).all()
+
+
+@pytest.mark.parametrize(
+    "name", ["svalse", "valse", "cbf", "mvdr", "music", "peaks_gnn", "wideband_mixture"]
+)
+def test_set_unknowns_restart_the_tracker(name: str) -> None:
+    sphere = ArraySnapshot(
+        SensorArray.uca(7, 0.5), list(np.linspace(1, 3, 10)), 1e-2, unknowns="sphere"
+    )
+    azimuth, rng = sphere.replace(unknowns="azimuth"), np.random.default_rng(0)
+    data = {
+        "sphere": sphere.simulate(np.full((6, 1), 0.4), 1.0, rng, np.full((6, 1), 0.7)),
+        "azimuth": azimuth.simulate(np.full((6, 1), 0.4), 1.0, rng),
+    }
+    tracker: Any = create(name, measurement=azimuth)
+    for unknowns in ("azimuth", "sphere", "azimuth"):
+        tracker.set_params(measurement__unknowns=unknowns)
+        run = tracker.run(data[unknowns])
+        again: Any = create(name, measurement=sphere.replace(unknowns=unknowns))
+        np.testing.assert_array_equal(run.doa, again.run(data[unknowns]).doa)
+        assert ("elevation" in run.fields) == (unknowns == "sphere")
+
+
+@pytest.mark.parametrize("name", ["svalse", "valse"])
+def test_array_or_bins_that_are_set_are_used_by_the_next_step(name: str) -> None:
+    circle = ArraySnapshot(SensorArray.uca(7, 0.5), 1.0, 1e-2)
+    bins = circle.replace(wavelength=[1.0, 1.3])
+    sphere = circle.replace(unknowns="sphere")
+    pairs = [
+        (circle, bins),
+        (sphere, sphere.replace(array=SPACE)),
+        (sphere, sphere.replace(noise=1e-3)),
+    ]
+    for model, other in pairs:
+        kwargs = {} if model is circle else {"elevation": np.full((3, 1), 0.7)}
+        tracker: Any = create(name, measurement=model)
+        tracker.run(model.simulate(np.full((3, 1), 0.4), 1.0, np.random.default_rng(0), **kwargs))
+        tracker.set_params(measurement=other)
+        z = other.simulate(np.full((3, 1), 0.4), 1.0, np.random.default_rng(1), **kwargs)
+        run = tracker.run(z)
+        np.testing.assert_allclose(run.doa[:, 0], 0.4, atol=0.05)
