@@ -13,7 +13,7 @@ from two_unknowns import range_estimate, run_of, sphere_estimate
 
 import arrivals
 from arrivals.measurement_models import ArraySnapshot, SensorArray
-from arrivals.plots import plot_range, plot_sky
+from arrivals.plots import plot_bearing_time, plot_range, plot_sky
 from arrivals.plots.bearing_time import save
 from arrivals.trackers import RangeEstimate, Run, SphereEstimate
 
@@ -154,3 +154,24 @@ def test_runs_of_other_kinds_are_refused() -> None:
         plot_range(sky(([0], [10])))
     with pytest.raises(ValueError, match="time"):
         plot_range(ranges([5.0]), time=[1.0, 2.0])
+
+
+@pytest.mark.parametrize("draw", [plot_sky, plot_range, plot_bearing_time])
+@pytest.mark.parametrize("run", [None, 3, "tracks.csv"])
+def test_what_is_no_run_is_refused(draw: Any, run: Any) -> None:
+    with pytest.raises(TypeError, match="run must be a Run; got"):
+        draw(run)
+
+
+@pytest.mark.parametrize("time", [[2.0, 1.0], [1.0, 1.0], [0.0, np.nan], [0.0, np.inf]])
+def test_times_must_increase(time: list[float]) -> None:
+    run = run_of([range_estimate(10.0, 5.0)] * 2, RangeEstimate)
+    for draw in (plot_range, plot_bearing_time):
+        with pytest.raises(ValueError, match="time must be finite and increasing; got "):
+            draw(run, time=time)
+
+
+def test_axis_without_ranges_has_no_ticks() -> None:
+    assert (
+        len(plot_range(run_of([range_estimate(10.0, np.inf)] * 2, RangeEstimate)).get_yticks()) == 0
+    )

@@ -12,10 +12,11 @@ from numpy.typing import ArrayLike
 
 from arrivals.files import atomic_write
 from arrivals.measurement_models import ArraySnapshot
+from arrivals.messages import shown
 from arrivals.plots.beam import N_STEPS, draw_beam
 from arrivals.trackers.run import Run
 from arrivals.typing import Bool, Complex, Float, Int
-from arrivals.validation import one_of, positive, shaped
+from arrivals.validation import instance, one_of, positive, shaped
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -82,10 +83,9 @@ def plot_bearing_time(
     >>> ax.get_xlabel(), ax.get_ylabel()
     ('step', 'direction of arrival, degrees')
     """
-    if "doa" not in run.fields:
-        raise TypeError(f"run must contain directions; got {run.kind.__name__}")
+    require_field(run, "doa", "directions")
     ax = new_axes((9.0, 4.5)) if ax is None else ax
-    at = np.arange(len(run), dtype=np.float64) if time is None else shaped("time", time, len(run))
+    at = step_times(run, time)
     if snapshots is not None:
         if measurement is None:
             raise ValueError("measurement must be set with snapshots; got None")
@@ -98,6 +98,22 @@ def plot_bearing_time(
         half = (at[-1] - at[0]) / max(1, len(at) - 1) / 2 or 0.5
         ax.set_xlim(at[0] - half, at[-1] + half)
     return ax
+
+
+def require_field(run: Run, name: str, words: str) -> None:
+    """Raise a TypeError unless a run has a field of its sources."""
+    if name not in instance("run", run, Run).fields:
+        raise TypeError(f"run must contain {words}; got {run.kind.__name__}")
+
+
+def step_times(run: Run, time: ArrayLike | None) -> Float:
+    """Return the times of the steps, s, increasing; their numbers if None."""
+    if time is None:
+        return np.arange(len(run), dtype=np.float64)
+    at = shaped("time", time, len(run))
+    if not np.isfinite(at).all() or (np.diff(at) <= 0).any():
+        raise ValueError(f"time must be finite and increasing; got {shown(at)}")
+    return at
 
 
 def _name_axes(ax: Axes, line: bool, steps: bool) -> None:

@@ -7,10 +7,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.plots.bearing_time import draw_tracks, new_axes, track_colours, track_order
+from arrivals.plots.bearing_time import (
+    draw_tracks,
+    new_axes,
+    require_field,
+    step_times,
+    track_colours,
+    track_order,
+)
 from arrivals.trackers.run import Run
 from arrivals.typing import Bool, Float
-from arrivals.validation import shaped
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -58,10 +64,9 @@ def plot_range(run: Run, *, time: ArrayLike | None = None, ax: Axes | None = Non
     >>> plot_range(recorder.run(dt=1.0, elapsed=0.0)).get_title()
     'without plane waves, 33 % of the estimates'
     """
-    if "range" not in run.fields:
-        raise TypeError(f"run must contain ranges; got {run.kind.__name__}")
+    require_field(run, "range", "ranges")
     ax = new_axes((9.0, 3.6)) if ax is None else ax
-    at = np.arange(len(run), dtype=np.float64) if time is None else shaped("time", time, len(run))
+    at = step_times(run, time)
     step, slot, joined = track_order(run)
     distance, std = run.range[step, slot], run.range_std[step, slot]
     near = np.isfinite(distance)

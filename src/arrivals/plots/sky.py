@@ -10,6 +10,7 @@ from arrivals.plots.bearing_time import (
     NEUTRAL,
     draw_tracks,
     new_axes,
+    require_field,
     track_colours,
     track_order,
 )
@@ -64,8 +65,7 @@ def plot_sky(run: Run, *, clockwise: bool = False, ax: Axes | None = None) -> Ax
     >>> [text.get_text() for text in plot_sky(recorder.run(dt=1.0, elapsed=0.0)).texts][:3]
     ['0° (x)', '90° (y)', '180°']
     """
-    if "elevation" not in run.fields:
-        raise TypeError(f"run must contain elevations; got {run.kind.__name__}")
+    require_field(run, "elevation", "elevations")
     below = bool((run.elevation < 0).any())
     ax = new_axes((9.6, 4.9) if below else (5.0, 5.0)) if ax is None else ax
     _draw_disc(ax, 0.0, "zenith" if below else "", clockwise)
