@@ -159,8 +159,9 @@ def test_runs_of_other_kinds_are_refused() -> None:
 @pytest.mark.parametrize("draw", [plot_sky, plot_range, plot_bearing_time])
 @pytest.mark.parametrize("run", [None, 3, "tracks.csv"])
 def test_what_is_no_run_is_refused(draw: Any, run: Any) -> None:
-    with pytest.raises(TypeError, match="run must be a Run; got"):
-        draw(run)
+    for plot, words in ((draw, "a Run"), (arrivals.plot, "a Run, or the result of locate")):
+        with pytest.raises(TypeError, match=f"run must be {words}; got"):
+            plot(run)
 
 
 @pytest.mark.parametrize("time", [[2.0, 1.0], [1.0, 1.0], [0.0, np.nan], [0.0, np.inf]])
@@ -172,6 +173,5 @@ def test_times_must_increase(time: list[float]) -> None:
 
 
 def test_axis_without_ranges_has_no_ticks() -> None:
-    assert (
-        len(plot_range(run_of([range_estimate(10.0, np.inf)] * 2, RangeEstimate)).get_yticks()) == 0
-    )
+    run = run_of([range_estimate(10.0, np.inf)] * 2, RangeEstimate)
+    assert len(plot_range(run).get_yticks()) == 0

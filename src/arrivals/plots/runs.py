@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Protocol
 
+from arrivals.messages import shown
 from arrivals.plots.bearing_time import plot_bearing_time
 from arrivals.plots.maps import plot_map
 from arrivals.plots.ranges import plot_range
@@ -63,6 +64,8 @@ def plot(run: Run | PlacedRuns, **more: Any) -> Axes:
     'direction of arrival, degrees'
     """
     if not isinstance(run, Run):
+        if not hasattr(run, "runs"):
+            raise TypeError(f"run must be a Run, or the result of locate; got {shown(run)}")
         return plot_map(run.runs, **{"sensors": run.sensors, "truth": run.truth} | more)
     if "elevation" in run.fields:
         return plot_sky(run, **{key: more[key] for key in more if key not in OVER_TIME})
