@@ -12,6 +12,7 @@ from wired_rooms import CIRCLE, LINE, RATE, SQUARE, delayed, inverted, swapped, 
 
 import arrivals
 from arrivals.measurement_models import SensorArray
+from arrivals.measurement_models.arrays.sphere import fibonacci_sphere, unit_vectors
 from arrivals.recordings import Recording
 from arrivals.recordings.check import CheckReport, check
 from arrivals.typing import Float
@@ -286,3 +287,18 @@ def test_track_warns_of_a_fault_and_not_without() -> None:
 def test_misspelt_argument_is_refused_with_the_right_one() -> None:
     with pytest.raises(TypeError, match="check has no argument 'rat': did you mean rate"):
         check(TALK, CIRCLE, rat=RATE)
+
+
+@pytest.mark.parametrize(("azimuth", "elevation"), [(150.0, -40.0), (40.0, 80.0), (45.0, 68.0)])
+def test_array_in_space_with_one_source_far_from_the_horizon_has_no_fault(
+    azimuth: float, elevation: float
+) -> None:
+    array = SensorArray(0.06 * fibonacci_sphere(12), speed=343.0)
+    towards = unit_vectors(*np.deg2rad([azimuth, elevation]))
+    rng = np.random.default_rng(0)
+    source = np.fft.rfft(rng.standard_normal(32000))
+    frequency = np.fft.rfftfreq(32000, 1 / 16000)
+    turn = np.exp(2j * np.pi * np.outer(frequency, array.positions @ towards / 343.0))
+    samples = np.fft.irfft(source[:, None] * turn, axis=0)
+    samples += 0.03 * rng.standard_normal(samples.shape)
+    assert check(samples, array, rate=16000.0).faults == ()

@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from arrivals.measurement_models import SensorArray
+from arrivals.measurement_models.arrays.sphere import fibonacci_sphere
 from arrivals.recordings.check.segments import PhaseSegments
 from arrivals.typing import Complex, Float, Int
 
 ELEVATIONS = (1.0, 0.9, 0.75)  # cosines: sources up to 40 degrees over a plane
 MIN_DIRECTIONS, MAX_DIRECTIONS = 36, 720
 PER_WAVELENGTH = 8  # directions for each wavelength of the diameter
+SPHERE = 4096  # directions on the sphere, above which they are twice as far apart
 MAX_BLOCK = 2**22  # complex numbers of the beams that are computed together: 32 MB
 
 
@@ -46,13 +48,11 @@ def scan_responses(array: SensorArray, frequency: Float) -> Complex:
 def _directions(dim: int, n: int) -> Float:
     if dim == 1:
         return np.linspace(-1, 1, n)[:, None]
-    azimuth = 2 * np.pi * np.arange(n) / n
-    circle = np.stack([np.cos(azimuth), np.sin(azimuth)], axis=1)
     if dim == 2:
+        azimuth = 2 * np.pi * np.arange(n) / n
+        circle = np.stack([np.cos(azimuth), np.sin(azimuth)], axis=1)
         return np.concatenate([cosine * circle for cosine in ELEVATIONS])
-    height = np.linspace(-1, 1, max(5, n // 4))
-    rings = [np.column_stack([np.sqrt(1 - z**2) * circle, np.full(n, z)]) for z in height]
-    return np.concatenate(rings)
+    return fibonacci_sphere(max(min(n * n, SPHERE), n * n // 4))
 
 
 def beam_power(segments: PhaseSegments, responses: Complex) -> Float:
