@@ -12,13 +12,13 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
+from horizontal_waves import horizontal_waves
 from scipy.optimize import linear_sum_assignment
 from svalse_fast import row
 from svalse_fast_speed import Counted
 
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.measurement_models.manifolds.line_phase import sine_line
-from arrivals.measurement_models.manifolds.local import horizontal_waves
 from arrivals.measurement_models.manifolds.manifold import Manifold, Reference
 from arrivals.scenarios import create, mean_gospa
 from arrivals.scenarios.bounds import range_bound

@@ -10,7 +10,6 @@ import pytest
 from arrivals.measurement_models import SensorArray
 from arrivals.measurement_models.arrays.plane_waves import PlaneWaves
 from arrivals.measurement_models.manifolds.line_phase import fresnel_line, sine_line
-from arrivals.measurement_models.manifolds.local import horizontal_waves
 from arrivals.measurement_models.manifolds.phase import direction_cosines
 from arrivals.measurement_models.manifolds.spherical_line import spherical_line
 from arrivals.measurement_models.manifolds.tangent_plane import tangent_planes
@@ -25,7 +24,6 @@ LINE = SensorArray(np.array([0.0, 0.4, 1.1, 2.0, 2.3, 3.1]) + 5.0)
 WAVES = (1.0, 1.25)
 MANIFOLDS: dict[str, Any] = {
     "sine": sine_line(PlaneWaves(LINE, WAVES)),
-    "azimuth": horizontal_waves(PlaneWaves(SPACE, WAVES)),
     "square": direction_cosines(PlaneWaves(SQUARE, (1.0,))),
     "tilted": direction_cosines(PlaneWaves(TILTED, WAVES)),
     "fresnel": fresnel_line(PlaneWaves(LINE, WAVES), 0.05),

@@ -71,12 +71,6 @@ def test_moves_on_the_sphere_are_great_circles_with_orthonormal_tangents() -> No
     np.testing.assert_allclose(m.move(m.move(x, 0.3 * step), 0.7 * step), moved, atol=1e-12)
 
 
-def test_azimuth_offset_goes_the_shorter_way_round() -> None:
-    m = MANIFOLDS["azimuth"]
-    offset, _ = m.offset(m.from_doa([3.0]), m.from_doa([-3.0]))
-    np.testing.assert_allclose(offset * m.unit[0], 6 - 2 * np.pi)
-
-
 @every_manifold
 def test_distance_is_the_angle_between_directions(m: Any) -> None:
     x = points(m)

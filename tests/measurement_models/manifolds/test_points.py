@@ -111,7 +111,7 @@ def test_phases_are_uncorrelated_with_the_unknowns_and_units_turn_them_by_one_ra
     rows = m.responses(x[None], 0 * covariances(m, x.shape[1])[None])[0]
     slopes = (rows[:, 1 : 1 + m.n_unknowns] / rows[:, :1]).imag
     np.testing.assert_allclose(slopes.mean(axis=-1), 0, atol=1e-9)
-    square = (slopes**2).mean(axis=(0, 3)) if m is not MANIFOLDS["azimuth"] else np.ones(1)
+    square = (slopes**2).mean(axis=(0, 3))
     if m is MANIFOLDS["sphere"]:  # all three axes together
         n, positions = m.direction(x), SPACE.positions - SPACE.positions.mean(axis=0)
         along = (
