@@ -63,8 +63,8 @@ def check_unknowns(
         return
     if array.dim == 1:
         raise ValueError(f"array must be in a plane or in space for {wanted}; got a line")
-    if array.n_sensors < 3:
-        raise ValueError(f"array must have at least 3 sensors for {wanted}; got {array.n_sensors}")
+    if array.n_sensors < 4:
+        raise ValueError(f"array must have at least 4 sensors for {wanted}; got {array.n_sensors}")
     _, second, _ = _extents(array)
     if second:
         return
