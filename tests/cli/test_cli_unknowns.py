@@ -252,7 +252,7 @@ def test_side_of_a_plane_is_in_the_line() -> None:
         positions[:, columns] = square
         model = ArraySnapshot(SensorArray(positions), 3.0, unknowns="sphere")
         assert words in unknowns_in_words(model)
-    tilted = np.array([[1.0, 0.0, -1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 1.0]])
+    tilted = np.array([[1.0, 0, -1], [0, 1, 0], [-1, 0, 1], [0, -1, 0]])
     model = ArraySnapshot(SensorArray(tilted), 3.0, unknowns="sphere")
     assert "about azimuth 0, elevation 45 degrees alone" in unknowns_in_words(model)
 

@@ -149,7 +149,7 @@ def can_scan(model: ArraySnapshot, sensors: Bool) -> bool:
     --------
     >>> from arrivals.measurement_models import SensorArray
     >>> model = ArraySnapshot(SensorArray.uca(5, 0.4), 1.0, unknowns="sphere")
-    >>> can_scan(model, np.arange(5) > 1), can_scan(model, np.arange(5) > 2)
+    >>> can_scan(model, np.arange(5) > 0), can_scan(model, np.arange(5) > 1)
     (True, False)
     """
     if model.unknowns == "azimuth":
