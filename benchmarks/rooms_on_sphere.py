@@ -11,7 +11,8 @@ import numpy as np
 import arrivals
 from arrivals.recordings.recording import Recording
 from arrivals.scenarios import mean_gospa
-from arrivals.scenarios.simulations.rooms import ARRAYS, RATE, TalkersInRoom
+from arrivals.scenarios.room_acoustics.speech_signals import RATE
+from arrivals.scenarios.simulations.rooms import ARRAYS, TalkersInRoom
 from arrivals.typing import Float
 
 CUT_OFF = 20.0  # degrees
