@@ -23,12 +23,12 @@ from arrivals.measurement_models.manifolds.manifold import Manifold, Reference
 from arrivals.scenarios import create, mean_gospa
 from arrivals.scenarios.bounds import range_bound
 from arrivals.scenarios.simulations import NearField
+from arrivals.symmetric import identity
 from arrivals.trackers import SVALSE, NewtonSolver
 from arrivals.trackers.svalse.newton.batch import Components
 from arrivals.trackers.svalse.newton.elbo import evaluate
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
 from arrivals.trackers.svalse.newton.step import newton_step
-from arrivals.trackers.symmetric import identity
 from arrivals.typing import Complex
 
 

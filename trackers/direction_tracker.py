@@ -178,7 +178,7 @@ class DirectionTracker(Tracker):
         """
         doa = np.asarray(doa, dtype=np.float64)
         n, unknown = len(doa), np.full(len(doa), complex(np.nan, np.nan))
-        self._estimate = estimate = DirectionEstimate(
+        estimate = DirectionEstimate(
             doa=doa,
             std=np.asarray(unknown.real if std is None else std, np.float64),
             existence=np.asarray(unknown.real if existence is None else existence, np.float64),
@@ -188,10 +188,7 @@ class DirectionTracker(Tracker):
             iterations=iterations,
             noise=noise,
         )
-        n_slots = self.n_slots
-        self.x = padded(estimate.doa, n_slots, np.nan)
-        variance = padded(estimate.std**2, n_slots, 0.0)
-        self.P = np.diag(np.nan_to_num(variance, posinf=np.inf))
+        self.report_estimate(estimate)
 
     def report_estimate(self, estimate: DirectionEstimate) -> None:
         """Make an estimate the present one, and set `x` and `P`, of one block a source.

@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 
-from arrivals.trackers.symmetric import limited
+from arrivals.symmetric import limited
 from arrivals.typing import Float
 
 MIN_EIGENVALUE = 1e-3  # of the matrix scaled to a unit diagonal

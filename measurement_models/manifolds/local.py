@@ -7,10 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from arrivals.measurement_models.manifolds.points import (
-    PAIRS,
-    PointResponse,
-)
+from arrivals.measurement_models.manifolds.points import PointResponse
+from arrivals.symmetric import PAIRS
 from arrivals.typing import Complex, Float
 
 HALVES = np.array([0.5, 1.0, 0.5])[:, None, None]  # of the elements 11, 12, 22 in ½ Σ Sᵢⱼ

@@ -6,7 +6,8 @@ import numpy as np
 
 from arrivals.measurement_models.arrays.sphere import azimuth_elevation
 from arrivals.measurement_models.manifolds.manifold import UNIFORM_STD_OF_CIRCLE
-from arrivals.measurement_models.manifolds.points import line_direction, matrices
+from arrivals.measurement_models.manifolds.points import line_direction
+from arrivals.symmetric import full
 from arrivals.typing import Float
 
 MIN_DEVIATIONS = 3.0  # of 1/R from zero, for a range
@@ -45,7 +46,7 @@ def tangent_estimate(n: Float, axes: Float, inverse: Float, covariance: Float) -
     rise = np.sin(elevation)
     own = np.stack([[-rise * c, -rise * s, level], [-s, c, 0 * c]])  # of elevation and azimuth
     turn = np.einsum("iml,jml->lij", own, axes) @ np.moveaxis(inverse, 2, 0)
-    C = turn @ matrices(covariance) @ turn.swapaxes(1, 2)
+    C = turn @ np.moveaxis(full(covariance), 2, 0) @ turn.swapaxes(1, 2)
     std = np.sqrt(np.maximum(C[:, 1, 1], 0.0)) / np.maximum(level, 1e-12)
     std = np.minimum(std, UNIFORM_STD_OF_CIRCLE)
     return {"doa": azimuth, "std": std, "elevation": elevation, "covariance": C}

@@ -16,7 +16,6 @@ from arrivals.measurement_models.manifolds.located import tangent_estimate
 from arrivals.measurement_models.manifolds.manifold import CandidatePoints
 from arrivals.measurement_models.manifolds.points import (
     MIN_COSINE,
-    PAIRS,
     SAME_SOURCE,
     SPACING_OF_TWO,
     PointResponse,
@@ -25,6 +24,7 @@ from arrivals.measurement_models.manifolds.points import (
     lattice_images,
     sine_limits,
 )
+from arrivals.symmetric import PAIRS
 from arrivals.typing import Bool, Complex, Float
 
 RIM_MARGIN = 0.5  # of points beyond the rim by noise, rad rms of the phases over the array

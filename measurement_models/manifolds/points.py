@@ -1,4 +1,4 @@
-"""Base of responses as functions of points, and small symmetric matrices as upper triangles."""
+"""Base of responses as functions of points, and what their grids and sines share."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from arrivals.measurement_models.arrays.plane_waves import PlaneWaves
 from arrivals.measurement_models.manifolds.manifold import UNIFORM_STD_OF_LINE, CandidatePoints
 from arrivals.typing import Bool, Complex, Float, Int
 
-PAIRS = {1: ((0, 0),), 2: ((0, 0), (0, 1), (1, 1))}  # of upper triangles, by number of unknowns
 SPACING_OF_ONE = 0.45  # of candidates, rad rms of the phases over the array
 SPACING_OF_TWO = 0.5
 SAME_SOURCE = 0.99  # correlation of the responses of two directions that count as one source
@@ -161,18 +160,6 @@ def _without(manifold: PointResponse, sensors: tuple[int, ...]) -> PointResponse
 @lru_cache(maxsize=256)
 def _only(manifold: PointResponse, bins: tuple[int, ...]) -> PointResponse:
     return replace(manifold, waves=manifold.waves.only(bins))
-
-
-def matrices(triangles: Float) -> Float:
-    """Return symmetric 2 x 2 matrices (n, 2, 2) of upper triangles (3, n).
-
-    Examples
-    --------
-    >>> matrices(np.array([[1.0], [2.0], [3.0]]))
-    array([[[1., 2.],
-            [2., 3.]]])
-    """
-    return np.moveaxis(triangles[np.array([[0, 1], [1, 2]])], 2, 0)
 
 
 def cell_count(*cells: float) -> list[int]:

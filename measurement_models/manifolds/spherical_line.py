@@ -118,13 +118,8 @@ class SphericalLine(LocalManifold):
 
     def size(self, x: Float) -> Float:
         """Return the root mean square of R/r over the sensors: (L,)."""
-        u, v, p = (
-            self.direction(x)[..., 0, :, None],
-            self.inverse_range(x)[..., None],
-            self.positions,
-        )
-        square = np.maximum(1 - 2 * p[:, 0] * u * v + (p[:, 0] * v) ** 2, MIN_SQUARE)
-        return np.asarray(np.sqrt((1 / square).mean(axis=-1)))
+        t = self.relative_distance(x)[2]
+        return np.asarray(np.sqrt((1 / t**2).mean(axis=-1)))
 
     def origin_phase(self, x: Float) -> Float:
         """Return the phase that is left out of a response, rad: (L,), at the first bin."""

@@ -52,9 +52,9 @@ def check_unknowns(
     if unknowns == "azimuth":
         return
     if not is_white:
-        raise ValueError(f"{wanted} requires noise_coherence='white'; got coherent noise")
+        raise ValueError(f"noise_coherence must be 'white' for {wanted}; got coherent noise")
     if waves.response is not None:
-        raise ValueError(f"response must be None for {wanted}: gains are functions of the azimuth")
+        raise ValueError(f"response must be None for {wanted}; got gains by azimuth alone")
     for name in ("slowness", "elevation"):
         if getattr(waves, name) is not None:
             raise ValueError(f"{name} must be None for {wanted}; got a grid of a third unknown")

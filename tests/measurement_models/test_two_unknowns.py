@@ -233,8 +233,16 @@ def test_ambiguity_is_that_of_plane_waves_on_a_line_and_none_on_the_sphere() -> 
         (LINE, {"unknowns": "range", "nearest": 0.7}, "quarter of the array's extent of 3.1 m"),
         (CIRCLE, {"unknowns": "sphere", "slowness": [1.0, 1.1]}, "slowness must be None"),
         (CIRCLE, {"unknowns": "sphere", "elevation": [0.0, 0.1]}, "elevation must be None"),
-        (CIRCLE, {"unknowns": "sphere", "noise_coherence": "diffuse"}, "noise_coherence='white'"),
-        (LINE, {"unknowns": "range", "noise_coherence": np.eye(6)}, "noise_coherence='white'"),
+        (
+            CIRCLE,
+            {"unknowns": "sphere", "noise_coherence": "diffuse"},
+            "noise_coherence must be 'white'",
+        ),
+        (
+            LINE,
+            {"unknowns": "range", "noise_coherence": np.eye(6)},
+            "noise_coherence must be 'white'",
+        ),
         (
             CIRCLE,
             {"unknowns": "sphere", "response": ElementResponse.first_order(np.arange(8.0))},

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arrivals.motion_models.move_stop import TINY, MoveStopWalk
-from arrivals.trackers.symmetric import (
+from arrivals.symmetric import (
     PAIRS,
     SIZES,
     dot,
@@ -96,8 +96,7 @@ def of_both(values: Float) -> Float:
 
 def spread_of(offset: Float) -> Float:
     """Return the triangles of o oᵀ, (d(d+1)/2, ...)."""
-    rows, columns = PAIRS[len(offset)]
-    return np.asarray(offset[rows] * offset[columns])
+    return np.stack([offset[i] * offset[j] for i, j in PAIRS[len(offset)]])
 
 
 def predict(walk: MoveStopWalk, modes: PointModes, Q: Float, dt: float = 1.0) -> PointMixture:

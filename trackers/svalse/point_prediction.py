@@ -10,6 +10,14 @@ import numpy as np
 from arrivals.measurement_models.manifolds.manifold import PointManifold
 from arrivals.motion_models.bernoulli_von_mises import BernoulliVonMises
 from arrivals.motion_models.move_stop import MoveStopWalk
+from arrivals.symmetric import (
+    clamped,
+    identity,
+    inverse,
+    log_det,
+    times,
+    trace_of_product,
+)
 from arrivals.trackers.svalse.components import ComponentPosterior, TrackedComponents
 from arrivals.trackers.svalse.move_stop_points import (
     PointModes,
@@ -17,14 +25,6 @@ from arrivals.trackers.svalse.move_stop_points import (
     predict,
     renewed,
     update,
-)
-from arrivals.trackers.symmetric import (
-    clamped,
-    identity,
-    inverse,
-    log_det,
-    times,
-    trace_of_product,
 )
 from arrivals.typing import Bool, Float
 

@@ -81,9 +81,8 @@ def predicted_components(
     tracked = np.stack([each.tracked for each in trackers])
     if is_point_manifold(manifold):
         curved = np.stack([each.curved for each in trackers])
-        return *predicted_points(manifold, motion, mu, kappa, modes, curved, dt), np.ones(
-            curved.shape
-        )
+        moved = predicted_points(manifold, motion, mu, kappa, modes, curved, dt)
+        return *moved, np.ones(curved.shape)
     slope = angle_manifold("svalse", manifold).slope(np.where(tracked, mu, 0.0))
     return *motion.predict_angles(mu, kappa, modes, dt, slope), slope
 

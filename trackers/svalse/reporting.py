@@ -13,10 +13,10 @@ from arrivals.measurement_models.manifolds.manifold import (
     is_point_manifold,
 )
 from arrivals.motion_models.bessel import bessel_ratio
+from arrivals.symmetric import inverse
 from arrivals.trackers.direction_estimates import RangeEstimate, SphereEstimate
 from arrivals.trackers.estimates import DirectionEstimate
 from arrivals.trackers.svalse.components import ComponentPosterior
-from arrivals.trackers.symmetric import inverse
 from arrivals.typing import Bool, Complex, Float
 
 

@@ -118,6 +118,9 @@ def _draw_disc(ax: Axes, centre: float, middle: str, clockwise: bool) -> None:
     for elevation in (0, *RINGS):
         at = (RIM - elevation) * diagonal
         words = f"{'−' if middle == 'nadir' else ''}{elevation}°" if elevation else "elevation 0°"
-        ax.text(centre + at + 1, -at - 1, words, fontsize=7, color="0.4", ha="left", va="top")
+        label = ax.text(
+            centre + at + 1, -at - 1, words, fontsize=7, color="0.4", va="top", zorder=5
+        )
+        label.set_bbox({"facecolor": "white", "alpha": 0.8, "edgecolor": "none", "pad": 0.6})
     if middle:
         ax.text(centre, RIM + 28, f"{middle} in the middle", fontsize=10, ha="center", va="center")

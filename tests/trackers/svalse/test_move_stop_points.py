@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.motion_models import BernoulliVonMises, MoveStopWalk
+from arrivals.symmetric import full, triangle
 from arrivals.trackers import SVALSE
 from arrivals.trackers.svalse.move_stop_points import (
     PointModes,
@@ -17,7 +18,6 @@ from arrivals.trackers.svalse.move_stop_points import (
     update,
 )
 from arrivals.trackers.svalse.point_prediction import step_variance
-from arrivals.trackers.symmetric import full, triangle
 from arrivals.typing import Float
 
 WALK = MoveStopWalk()

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from arrivals.symmetric import identity, log_det, places
 from arrivals.trackers.svalse.newton.batch import BatchRecord, Components
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse, diagonals
-from arrivals.trackers.symmetric import identity, log_det, places
 from arrivals.typing import Bool, Complex, Float, Int
 
 LOG_2PIE = float(np.log(2 * np.pi * np.e))

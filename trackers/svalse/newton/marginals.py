@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from arrivals.symmetric import clamped, clamped_inverse, inverse
 from arrivals.trackers.marginal_variances import marginal_covariances, student_factor
 from arrivals.trackers.svalse.newton.elbo import Evaluation
 from arrivals.trackers.svalse.newton.expected_response import (
@@ -24,7 +25,6 @@ from arrivals.trackers.svalse.newton.step import (
     slopes,
     weights,
 )
-from arrivals.trackers.symmetric import clamped, clamped_inverse, inverse
 from arrivals.typing import Complex, Float
 
 

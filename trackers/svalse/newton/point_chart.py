@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from arrivals.measurement_models.manifolds.manifold import PointManifold
-from arrivals.trackers.svalse.newton.batch import Components, Layout
-from arrivals.trackers.symmetric import (
+from arrivals.symmetric import (
     clamped_inverse,
     congruent,
     dot,
@@ -18,6 +17,7 @@ from arrivals.trackers.symmetric import (
     times,
     trace_of_product,
 )
+from arrivals.trackers.svalse.newton.batch import Components, Layout
 from arrivals.typing import Bool, Complex, Float
 
 LOG_2PI = float(np.log(2 * np.pi))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from arrivals.symmetric import between, clamped_inverse, full
 from arrivals.trackers.svalse.newton.batch import any_set
 from arrivals.trackers.svalse.newton.elbo import Evaluation, evaluate, with_variances
 from arrivals.trackers.svalse.newton.expected_response import (
@@ -15,7 +16,6 @@ from arrivals.trackers.svalse.newton.expected_response import (
     diagonals,
     over_snapshots,
 )
-from arrivals.trackers.symmetric import between, clamped_inverse, full
 from arrivals.typing import Bool, Complex, Float
 
 ROUNDING = 1e-7  # nats

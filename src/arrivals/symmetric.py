@@ -10,7 +10,7 @@ from arrivals.typing import Float, Int
 
 PLACES = {1: np.array([[0]]), 2: np.array([[0, 1], [1, 2]])}  # of the entries ij, by d
 MIN_INDEPENDENCE = 1e-14  # one minus the square of a correlation
-PAIRS = {1: np.triu_indices(1), 2: np.triu_indices(2)}  # rows and columns of a triangle, by d
+PAIRS = {1: ((0, 0),), 2: ((0, 0), (0, 1), (1, 1))}  # row and column of each entry, by d
 IDENTITIES = {1: np.ones((1, 1)), 2: np.array([[1.0], [0.0], [1.0]])}
 SIZES = {1: 1, 3: 2}  # rows of a matrix, by the length of its triangle
 
@@ -53,8 +53,7 @@ def full(C: Float) -> Float:
 
 def triangle(C: Float) -> Float:
     """Return the triangles of matrices (..., d, d, L)."""
-    rows, columns = PAIRS[C.shape[-2]]
-    return np.asarray(C[..., rows, columns, :])
+    return stacked(*(C[..., i, j, :] for i, j in PAIRS[C.shape[-2]]))
 
 
 def log_det(C: Float) -> Float:
