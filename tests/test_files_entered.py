@@ -81,7 +81,7 @@ def interpolation_ekf() -> tuple[Tracker, Any]:
 STEPS: list[tuple[Callable[[], tuple[Tracker, Any]], int]] = [
     (kalman, 7),
     (svalse, 31),
-    (wideband_mixture, 21),
+    (wideband_mixture, 22),
     (rss_vb, 15),
     (interpolation_ekf, 18),
 ]
