@@ -25,6 +25,7 @@ from arrivals.measurement_models.signal_strength.envelope import AveragedEnvelop
 from arrivals.measurement_models.signal_strength.gains import LogGains
 from arrivals.measurement_models.signal_strength.log_normal import LogNormalRSS
 from arrivals.measurement_models.snapshot_likelihood import composite
+from arrivals.measurement_models.station import Station, StationEntries
 
 __all__ = [
     "MeasurementModel",
@@ -43,6 +44,8 @@ __all__ = [
     "ArrayManifold",
     # bearings and signal strength
     "Bearing",
+    "Station",
+    "StationEntries",
     "LogNormalRSS",
     "AveragedEnvelope",
     "LogGains",
