@@ -36,6 +36,8 @@ class Trial:
         Elevations, rad, where the truth is azimuths on the sphere.
     range : ndarray, shape (n_steps, n_sources), optional
         Ranges, m, where waves are spherical; infinite for a plane wave.
+    cut_off : float, optional
+        Cut-off c of the metrics, degrees or m; 10 if None.
 
     Examples
     --------
@@ -52,6 +54,7 @@ class Trial:
     signals: Complex | Float | None = field(default=None, kw_only=True)
     elevation: Float | None = field(default=None, kw_only=True)
     range: Float | None = field(default=None, kw_only=True)
+    cut_off: float | None = field(default=None, kw_only=True)
 
     def tracker(self, name: str | type[Tracker], **params: Any) -> Tracker:
         """Make a tracker with those models of the trial that its constructor takes.

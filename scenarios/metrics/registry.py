@@ -1,7 +1,7 @@
 """Metrics of studies: functions of a trial and a run.
 
 Directions are scored in degrees, on the sphere along great circles, and positions in metres,
-according to the trial's truth.
+according to the trial's truth. The cut-off is that of the trial, else 10 degrees or m.
 """
 
 from __future__ import annotations
@@ -76,30 +76,35 @@ def sets(trial: Trial, run: Run) -> Sets:
     return Sets(np.rad2deg(trial.truth), np.rad2deg(run.fields[name]), period)
 
 
+def cut_off(trial: Trial) -> float:
+    """Return the cut-off c of a trial's metrics, degrees or m."""
+    return CUT_OFF if trial.cut_off is None else trial.cut_off
+
+
 @lru_cache(maxsize=1)  # shared by the metrics of its parts
 def gospa_of(trial: Trial, run: Run) -> Gospa:
     """Return GOSPA and its parts, degrees or m, averaged over the steps."""
     truth, estimate, period, distance = sets(trial, run)
-    return mean_gospa(truth, estimate, c=CUT_OFF, period=period, distance=distance)
+    return mean_gospa(truth, estimate, c=cut_off(trial), period=period, distance=distance)
 
 
 @lru_cache(maxsize=1)
 def pairs_of(trial: Trial, run: Run) -> Matches:
     """Return the pairs of truth and estimates, errors in rad or m."""
     truth, estimate, period, distance = sets(trial, run)
-    pairs = matches(truth, estimate, CUT_OFF, period, distance)
+    pairs = matches(truth, estimate, cut_off(trial), period, distance)
     return pairs if trial.truth.ndim == 3 else pairs._replace(error=np.deg2rad(pairs.error))
 
 
 def _rmse(trial: Trial, run: Run) -> float:
     truth, estimate, period, distance = sets(trial, run)
-    return mean_rmse(truth, estimate, CUT_OFF, period, distance)
+    return mean_rmse(truth, estimate, cut_off(trial), period, distance)
 
 
 def _ospa(trial: Trial, run: Run) -> float:
     truth, estimate, period, distance = sets(trial, run)
-    steps = zip(truth, estimate, strict=True)
-    return float(np.mean([ospa(t, f, CUT_OFF, period=period, distance=distance) for t, f in steps]))
+    steps, c = zip(truth, estimate, strict=True), cut_off(trial)
+    return float(np.mean([ospa(t, f, c, period=period, distance=distance) for t, f in steps]))
 
 
 def _cardinality(trial: Trial, run: Run) -> float:

@@ -37,6 +37,12 @@ from arrivals.scenarios.simulations.sampled_source import (
 from arrivals.scenarios.simulations.signal_strength import RSSTrial, Table1K3, Table1K7
 from arrivals.scenarios.simulations.sources_on_sphere import SourcesOnSphere
 from arrivals.scenarios.simulations.speech import SpeechField, SpeechOfOrderTwo
+from arrivals.scenarios.simulations.stations import (
+    StationsGhost,
+    StationsRadio,
+    StationsSound,
+    StationsTrial,
+)
 from arrivals.scenarios.simulations.swellex96 import TowPastLine
 
 __all__ = [
@@ -66,6 +72,10 @@ __all__ = [
     "StaticSources",
     "SpeechField",
     "SpeechOfOrderTwo",
+    "StationsGhost",
+    "StationsRadio",
+    "StationsSound",
+    "StationsTrial",
     "SwitchingWalks",
     "Table1K3",
     "Table1K7",
