@@ -2,28 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.direction_measurement import DirectionMeasurement
-from arrivals.measurement_models.manifolds.fourier import FourierManifold
-from arrivals.measurement_models.manifolds.manifold import Manifold, is_angle_manifold
-from arrivals.measurement_models.observed import ObservedSnapshots
 from arrivals.messages import shown
-from arrivals.typing import Complex, Float
+from arrivals.trackers.fusion.white_snapshots import StepSnapshots, step_snapshots
+from arrivals.typing import Float
 from arrivals.validation import count, real
 
 PRIOR_INFORMATION = 1.0  # rad⁻²: no direction has a standard deviation above 1 rad
 MAX_STEP = 0.1  # rad, of one Gauss-Newton step
 REGULARIZATION = 1e-6  # of the mean ‖a‖², in the Gram matrix of the responses
 MIN_RELATIVE_NOISE = 1e-15  # of the mean power; noiseless data have a finite information
-DIFFERENCE = 1e-5  # rad, of responses without an analytic derivative
-
-Response = Callable[[Float], tuple[Complex, Complex]]
 
 
 class DirectionFit(NamedTuple):
@@ -51,70 +44,6 @@ class DirectionFit(NamedTuple):
     explained: Float
 
 
-@dataclass(frozen=True, eq=False)
-class StepSnapshots:
-    """Valid snapshots of a step, in white noise, and the response of the sensors.
-
-    Parameters
-    ----------
-    Y : ndarray of complex, shape (n_bins, n_sensors, n)
-        Snapshots, or, of many, as few columns with the same covariance.
-    n_snapshots : int
-        Number of snapshots.
-    response : callable
-        Takes directions (K,), gives responses and derivatives, each (n_bins, n_sensors, K).
-    is_line : bool
-        True if directions are from broadside.
-    """
-
-    Y: Complex
-    n_snapshots: int
-    response: Response
-    is_line: bool
-
-    @property
-    def n_sensors(self) -> int:
-        """Number of valid sensors."""
-        return int(self.Y.shape[1])
-
-    @property
-    def energy(self) -> float:
-        """Energy of the snapshots."""
-        return float(np.vdot(self.Y, self.Y).real)
-
-
-def step_snapshots(measurement: DirectionMeasurement, z: ArrayLike | None) -> StepSnapshots | None:
-    """Return the valid snapshots of a measurement, None if all of it is missing.
-
-    Parameters
-    ----------
-    measurement : DirectionMeasurement
-        Coherent noise is whitened as `observe` does it. With a second unknown of a source, waves
-        are those of `steering_vector`: horizontal and plane.
-    z : array_like or None
-        Measurement.
-
-    Returns
-    -------
-    StepSnapshots or None
-
-    Raises
-    ------
-    ValueError
-        If the shape of the measurement is wrong.
-    """
-    observed = measurement.observe(z)
-    if observed is None:
-        return None
-    Y = observed.snapshots
-    n = Y.shape[2]
-    if n > 2 * Y.shape[1]:  # Y = R'Q', and all results depend on Y Y' = R'R alone
-        Y = np.swapaxes(np.linalg.qr(np.swapaxes(Y, 1, 2).conj(), mode="r"), 1, 2).conj()
-    array = getattr(measurement, "array", None)
-    is_line = bool(array is not None and array.dim == 1)
-    return StepSnapshots(Y, n, _response(measurement, observed), is_line)
-
-
 def fit_directions(step: StepSnapshots, doa: ArrayLike, *, n_steps: int = 2) -> DirectionFit:
     """Return directions of largest likelihood near some, by Gauss-Newton steps.
 
@@ -132,52 +61,92 @@ def fit_directions(step: StepSnapshots, doa: ArrayLike, *, n_steps: int = 2) -> 
     DirectionFit
         With as many sources as sensors or more, there is no information: the directions are the
         initial ones, each with a variance of 1 rad².
+
+    Raises
+    ------
+    ValueError
+        If a direction is not finite.
+
+    Examples
+    --------
+    >>> from arrivals.measurement_models import ArraySnapshot, SensorArray
+    >>> model = ArraySnapshot(SensorArray.uca(8, 0.65), wavelength=1.0)
+    >>> z = 3 * model.steering_vector(0.5) + 0.1 * np.exp(1j * np.arange(8) ** 2)
+    >>> fit = fit_directions(step_snapshots(model, z), [0.45, 2.0])
+    >>> fit.doa[:1].round(2), fit.explained > 20 * fit.noise
+    (array([0.5]), array([ True, False]))
     """
+    theta = _checked(doa)
+    n_steps = count("n_steps", n_steps, minimum=0)
+    K, M = len(theta), step.n_sensors
+    if K == 0 or K >= M:
+        return _without_information(step, theta)
+    for i in range(n_steps + 1):
+        at = _linearized(step, theta)
+        R = np.linalg.inv(at.information + PRIOR_INFORMATION * np.eye(K))
+        if i < n_steps:
+            # θ = θ + (J + I)⁻¹ g
+            theta = theta + np.clip(R @ at.gradient, -MAX_STEP, MAX_STEP)
+    if step.is_line:
+        side = np.where(np.cos(theta) < 0, -1.0, 1.0)  # of a mirror image
+        R = side[:, None] * R * side
+    R = (R + R.T) / 2
+    return DirectionFit(in_range(theta, step.is_line), R, at.noise, at.energy, at.explained)
+
+
+class _Linearized(NamedTuple):
+    """Information and gradient of the likelihood at some directions."""
+
+    information: Float
+    gradient: Float
+    noise: float
+    energy: float
+    explained: Float
+
+
+def _linearized(step: StepSnapshots, theta: Float) -> _Linearized:
+    Y, K = step.Y, len(theta)
+    F, M, N = Y.shape
+    A, D = step.response(theta)
+    AH = A.conj().swapaxes(1, 2)
+    gram = AH @ A
+    size = np.einsum("fkk->f", gram).real / K
+    inverse = np.linalg.inv(gram + (REGULARIZATION * size)[:, None, None] * np.eye(K))
+    # [W, C] = G⁻¹ A' [Y, D];   [E, P⊥D] = [Y, D] - A [W, C]
+    targets = np.concatenate([Y, D], axis=2)
+    solved = inverse @ (AH @ targets)
+    rest = targets - A @ solved
+    W, E = solved[:, :, :N], rest[:, :, :N]
+    # ν = ‖E‖² / (F N (M - K))
+    energy = float(np.vdot(E, E).real)
+    n_numbers = F * step.n_snapshots
+    least = MIN_RELATIVE_NOISE * step.energy / (n_numbers * M)
+    noise = max(energy / (n_numbers * (M - K)), least)
+    # J = 2/ν Σ_f Re[(D' P⊥D) ∘ (W W')ᵀ],   g_k = 2/ν Σ_f,n Re[W*_kn (D'E)_kn]
+    slopes = D.conj().swapaxes(1, 2) @ rest
+    products = W.conj() @ W.swapaxes(1, 2)
+    J = 2 / noise * (slopes[:, :, N:] * products).real.sum(axis=0)
+    g = 2 / noise * (W.conj() * slopes[:, :, :N]).real.sum(axis=(0, 2))
+    # without source k, ‖E‖² rises by |w_k|² / [G⁻¹]_kk
+    powers = np.einsum("fkk->fk", products).real
+    explained = (powers / np.einsum("fkk->fk", inverse).real).sum(axis=0)
+    return _Linearized(J, g, noise, energy, explained)
+
+
+def _without_information(step: StepSnapshots, theta: Float) -> DirectionFit:
+    """Return the fit of no source, or of too many: its energy is zero and its noise NaN."""
+    K = len(theta)
+    n_numbers = step.Y.shape[0] * step.n_snapshots * step.n_sensors
+    energy, noise = (0.0, np.nan) if K else (step.energy, step.energy / n_numbers)
+    prior = np.eye(K) / PRIOR_INFORMATION
+    return DirectionFit(in_range(theta, step.is_line), prior, noise, energy, np.zeros(K))
+
+
+def _checked(doa: ArrayLike) -> Float:
     theta = real("doa", doa)
     if theta.ndim != 1 or not np.isfinite(theta).all():
         raise ValueError(f"doa must be finite, of shape (n_sources,); got {shown(doa)}")
-    n_steps = count("n_steps", n_steps, minimum=0)
-    Y = step.Y
-    F, M, N = Y.shape
-    K = len(theta)
-    if K == 0 or K >= M:
-        noise = step.energy / (F * step.n_snapshots * M) if K == 0 else np.nan
-        energy = step.energy if K == 0 else 0.0
-        return DirectionFit(_in_range(theta, step.is_line), np.eye(K), noise, energy, np.zeros(K))
-    identity = np.eye(K)
-    n_free = F * step.n_snapshots * (M - K)
-    floor = MIN_RELATIVE_NOISE * step.energy / (F * M * step.n_snapshots)
-    for i in range(n_steps + 1):
-        A, D = step.response(theta)
-        AH = A.conj().swapaxes(1, 2)
-        gram = AH @ A
-        gram = (
-            gram
-            + REGULARIZATION * np.trace(gram, axis1=1, axis2=2).real[:, None, None] / K * identity
-        )
-        # [W, C, G⁻¹] = G⁻¹ [A'Y, A'D, I];   E = Y - A W,  P⊥D = D - A C
-        targets = np.concatenate([Y, D], axis=2)
-        right = np.concatenate([AH @ targets, np.broadcast_to(identity, (F, K, K))], axis=2)
-        solved = np.linalg.solve(gram, right)
-        rest = targets - A @ solved[:, :, : N + K]
-        W, E = solved[:, :, :N], rest[:, :, :N]
-        energy = float(np.vdot(E, E).real)
-        noise = max(energy / n_free, floor)
-        projected = D.conj().swapaxes(1, 2) @ rest  # D'E, D'P⊥D
-        # J = 2/ν Σ_f Re[(D' P⊥ D) ∘ (W W')ᵀ]
-        WW = W.conj() @ W.swapaxes(1, 2)
-        J = 2 / noise * (projected[:, :, N:] * WW).real.sum(axis=0)
-        R = np.linalg.inv(J + PRIOR_INFORMATION * identity)
-        if i == n_steps:
-            break
-        # g_k = 2/ν Σ_f,n Re[W*_kn (D'E)_kn];   θ = θ + (J + I)⁻¹ g
-        g = 2 / noise * (W.conj() * projected[:, :, :N]).real.sum(axis=(0, 2))
-        theta = theta + np.clip(R @ g, -MAX_STEP, MAX_STEP)
-    # ‖E‖² rises by |w_k|² / [G⁻¹]_kk without source k
-    lost = (np.abs(W) ** 2).sum(axis=2) / np.diagonal(solved[:, :, N + K :], axis1=1, axis2=2).real
-    return DirectionFit(
-        *_folded(theta, (R + R.T) / 2, step.is_line), noise, energy, lost.sum(axis=0)
-    )
+    return theta
 
 
 def bearings(
@@ -232,68 +201,22 @@ def bearings(
     """
     step = step_snapshots(measurement, z)
     if step is None:
-        theta = np.array(real("doa", doa))
-        return theta, np.eye(len(theta)) / PRIOR_INFORMATION, np.nan
+        theta = _checked(doa)
+        return theta.copy(), np.eye(len(theta)) / PRIOR_INFORMATION, np.nan
     fit = fit_directions(step, doa, n_steps=n_steps)
     return fit.doa, fit.covariance, fit.noise
 
 
-def _response(measurement: DirectionMeasurement, observed: ObservedSnapshots) -> Response:
-    """Return the response of the valid sensors and bins, and its derivative."""
-    manifold = observed.full_manifold
-    if manifold is not None and not (observed.bins.all() and observed.sensors.all()):
-        manifold = observed.manifold
-    if isinstance(manifold, FourierManifold) and len(manifold.coefficients) == 1:
-        return _fourier_response(manifold)
-    values = _steering(measurement, observed, manifold)
+def in_range(theta: Float, is_line: bool) -> Float:
+    """Return directions in [-π, π), of a line in [-π/2, π/2].
 
-    def response(doa: Float) -> tuple[Complex, Complex]:
-        K = len(doa)
-        a = values(np.concatenate([doa, doa - DIFFERENCE, doa + DIFFERENCE]))
-        return a[:, :, :K], (a[:, :, 2 * K :] - a[:, :, K : 2 * K]) / (2 * DIFFERENCE)
-
-    return response
-
-
-def _fourier_response(manifold: FourierManifold) -> Response:
-    G, k = manifold.coefficients[0], 1j * manifold.harmonics[:, None]
-
-    def response(doa: Float) -> tuple[Complex, Complex]:
-        # a = G d,  ∂a/∂θ = G (jk ∘ d)
-        d = np.exp(k * doa)
-        both = G @ np.concatenate([d, k * d], axis=1)
-        return both[:, :, : len(doa)], both[:, :, len(doa) :]
-
-    return response
-
-
-def _steering(
-    measurement: DirectionMeasurement, observed: ObservedSnapshots, manifold: Manifold | None
-) -> Callable[[Float], Complex]:
-    """Return the function of directions (K,) whose values are responses (n_bins, n_sensors, K)."""
-    if manifold is not None and is_angle_manifold(manifold) and len(manifold.nuisance_weights) == 1:
-        series = manifold
-        return lambda doa: series.steering(series.from_doa(doa))[0]
-    whitening = getattr(measurement, "whitening", None)
-    L = None if whitening is None else whitening(observed.sensors)[observed.bins]
-
-    def steering(doa: Float) -> Complex:
-        a = measurement.steering_vector(doa).reshape(len(doa), len(observed.bins), -1)
-        a = np.moveaxis(a[:, observed.bins][:, :, observed.sensors], 0, 2)
-        return a if L is None else np.asarray(L @ a)
-
-    return steering
-
-
-def _folded(theta: Float, covariance: Float, is_line: bool) -> tuple[Float, Float]:
-    """Return directions in [-π, π), of a line in [-π/2, π/2], and their covariance."""
-    if is_line:
-        side = np.where(np.cos(theta) < 0, -1.0, 1.0)  # of a mirror image
-        covariance = side[:, None] * covariance * side
-    return _in_range(theta, is_line), covariance
-
-
-def _in_range(theta: Float, is_line: bool) -> Float:
+    Examples
+    --------
+    >>> np.rad2deg(in_range(np.deg2rad([200.0, 95.0]), False)).round(6)
+    array([-160.,   95.])
+    >>> np.rad2deg(in_range(np.deg2rad([-30.0, 95.0]), True)).round(6)
+    array([-30.,  85.])
+    """
     wrapped = (theta + np.pi) % (2 * np.pi) - np.pi
     if not is_line:
         return np.asarray(wrapped)
