@@ -5,7 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from arrivals.measurement_models import ArraySnapshot, LogNormalRSS, Station
+from arrivals.motion_models import ConstantVelocity
 from arrivals.scenarios.base import Trial
 from arrivals.trackers.rss.settings import AmplitudePrior
 from arrivals.typing import Float
@@ -24,7 +27,7 @@ class StationsTrial(Trial):
         Positions, m; NaN while a source is inactive.
     measurement : ArraySnapshot
         Measurement model of every station.
-    motion : MotionModel
+    motion : ConstantVelocity
         Motion model of the sources.
     stations, true_stations : tuple of Station
         The stations as a tracker is told, and with their true positions and headings.
@@ -42,7 +45,6 @@ class StationsTrial(Trial):
 
     Examples
     --------
-    >>> import numpy as np
     >>> from arrivals.scenarios import create
     >>> trial = create("stations_radio", n_stations=3).sample(np.random.default_rng(0))
     >>> trial.measurements.shape, trial.truth.shape, trial.cut_off
@@ -51,6 +53,7 @@ class StationsTrial(Trial):
 
     measurements: Any
     measurement: ArraySnapshot
+    motion: ConstantVelocity
     stations: tuple[Station, ...]
     true_stations: tuple[Station, ...]
     power: Float
@@ -64,6 +67,11 @@ class StationsTrial(Trial):
         """Longer side of the area, m."""
         x0, y0, x1, y1 = self.area
         return max(x1 - x0, y1 - y0)
+
+    @property
+    def P0(self) -> Float:
+        """Covariance of the state x, vx, y, vy of a new source: anywhere in the area, (4, 4)."""
+        return np.diag([self.size, self.speed_std] * 2) ** 2
 
     def tracker_arguments(self) -> dict[str, Any]:
         """Return models, stations and area by the names of a tracker's parameters."""
