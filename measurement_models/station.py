@@ -16,6 +16,7 @@ from arrivals.validation import LARGEST, constant, instance, not_negative, numbe
 
 SIDES = np.array([1.0, -1.0])  # of a line
 MIN_SQUARED_RANGE = 1e-9  # m²; at the station itself the azimuth has no slope
+MIN_LAG = 1e-12  # s
 
 
 class StationEntries(NamedTuple):
@@ -26,7 +27,8 @@ class StationEntries(NamedTuple):
     position : (int, int)
         Entries that are x and y.
     velocity : (int, int), optional
-        Entries that are the velocities along x and y; required if waves are late.
+        Entries that are the velocities along x and y. If None, sources do not move while their
+        waves travel.
     errors : int, optional
         First of the three entries that are the station's errors: of its heading, rad, of x and
         of y, m. If None it has none.
@@ -110,7 +112,7 @@ class Station(FrozenModel):
             raise ValueError(f"wave_speed must be positive; got {wave_speed}")
         own = {
             "measurement": measurement,
-            "position": constant("position", place[None])[0],
+            "position": constant("position", place[None] + 0.0)[0],
             "heading": _finite("heading", heading),
             "heading_std": not_negative("heading_std", heading_std),
             "position_std": not_negative("position_std", position_std),
@@ -141,6 +143,11 @@ class Station(FrozenModel):
             return _wrap(self.heading + (np.pi / 2 - doa) * SIDES)
         return _wrap(self.heading + doa)
 
+    def from_map(self, azimuth: ArrayLike) -> Float:
+        """Return directions at the array of azimuths on the map, rad: the inverse of `to_map`."""
+        relative = _wrap(real("azimuth", azimuth) - self.heading)
+        return np.asarray(np.pi / 2 - np.abs(relative)) if self.is_line else relative
+
     def azimuth(self, x: ArrayLike, entries: StationEntries = IN_PLANE) -> Float:
         """Return the azimuths of states on the map, (..., n) -> (...), rad.
 
@@ -156,19 +163,23 @@ class Station(FrozenModel):
     def slope(self, x: ArrayLike, entries: StationEntries = IN_PLANE) -> Float:
         """Return the gradients of `azimuth` at states, (..., n) -> (..., n).
 
-        (-d_y, d_x)/r² of x and y, the opposite of the errors of x and y, -1 of that of the
-        heading, and -r/c times that of x and y of the velocity.
+        g = (-d_y, d_x)/|d|² of d; q = p - s - e_xy, r = |q|: g - (g·v/c) q/r of x and y, the
+        opposite of the errors of x and y, -1 of that of the heading, and -r/c g of the velocity.
         """
         x = real("x", x)
+        i, j = entries.position
+        q_x, q_y = self._offset(x, entries)
         east, north, lag = self._vector(x, entries)
         square = np.maximum(east * east + north * north, MIN_SQUARED_RANGE)
         along_x, along_y = -north / square, east / square
         slope = np.zeros_like(x)
-        i, j = entries.position
-        slope[..., i], slope[..., j] = along_x, along_y
         if entries.velocity is not None and self.is_late:
             k, m = entries.velocity
             slope[..., k], slope[..., m] = -lag * along_x, -lag * along_y
+            radial = along_x * x[..., k] + along_y * x[..., m]
+            radial = radial / (self.wave_speed**2 * np.maximum(lag, MIN_LAG))
+            along_x, along_y = along_x - radial * q_x, along_y - radial * q_y
+        slope[..., i], slope[..., j] = along_x, along_y
         if (e := entries.errors) is not None:
             slope[..., e] = -1.0
             slope[..., e + 1], slope[..., e + 2] = -along_x, -along_y
@@ -179,12 +190,17 @@ class Station(FrozenModel):
         """True if the waves take time: `wave_speed` is finite."""
         return self.wave_speed < np.inf
 
-    def _vector(self, x: Float, entries: StationEntries) -> tuple[Float, Float, Float | float]:
-        """Return x and y from the station to where the waves left the source, and r/c, s."""
+    def _offset(self, x: Float, entries: StationEntries) -> tuple[Float, Float]:
+        """Return x and y from the station to the source."""
         i, j = entries.position
         east, north = x[..., i] - self.position[0], x[..., j] - self.position[1]
         if (e := entries.errors) is not None:
             east, north = east - x[..., e + 1], north - x[..., e + 2]
+        return east, north
+
+    def _vector(self, x: Float, entries: StationEntries) -> tuple[Float, Float, Float | float]:
+        """Return x and y from the station to where the waves left the source, and r/c, s."""
+        east, north = self._offset(x, entries)
         if not self.is_late or entries.velocity is None:
             return east, north, 0.0
         lag = np.hypot(east, north) / self.wave_speed
