@@ -26,7 +26,7 @@ def associate(odds: ArrayLike, *, n_sweeps: int = 30, tol: float = 1e-4) -> tupl
     Returns
     -------
     probabilities : ndarray, shape (..., n_tracks, n_detections)
-        Rows sum to at most one, columns up to the tolerance.
+        Rows and columns sum to at most one.
     log_evidence : ndarray, shape (...)
         Bethe approximation of the logarithm of Σ Π odds over all associations.
 
@@ -58,23 +58,36 @@ def associate(odds: ArrayLike, *, n_sweeps: int = 30, tol: float = 1e-4) -> tupl
         raise ValueError(f"odds must lie in [0, {LARGEST}]; got {shown(odds)}")
     if odds.size == 0:
         return np.zeros(odds.shape), np.zeros(odds.shape[:-2])
-    # sums over all others, without the cancellation of a total minus one of its terms
-    other_tracks, other_detections = (1.0 - np.eye(n) for n in odds.shape[-2:])
-    n = np.ones(odds.shape)
-    running = np.ones((*odds.shape[:-2], 1, 1), dtype=np.bool_)
-    for _ in range(n_sweeps):
-        # mu = odds / (1 + Σ_l≠j p),  p = odds n;   n = 1 / (1 + Σ_k≠i mu)
-        mu = odds / (1 + (odds * n) @ other_detections)
-        new = 1 / (1 + other_tracks @ mu)
-        change = np.abs(new - n).max(axis=(-2, -1), keepdims=True)
-        n = np.where(running, new, n)
-        running = running & (change >= tol)
-        if not running.any():
-            break
+    n = _messages(odds, n_sweeps, tol)
     p = odds * n
-    mu = odds / (1 + p @ other_detections)
+    mu = odds / (1 + p @ _others(odds.shape[-1]))
     row = p.sum(axis=-1)
     # ln Z = Σ_i ln(1 + Σ_j p) + Σ_j ln(1 + Σ_i mu) - Σ_ij ln(1 + n mu)
     log_evidence = np.log1p(row).sum(axis=-1) + np.log1p(mu.sum(axis=-2)).sum(axis=-1)
     log_evidence = log_evidence - np.log1p(n * mu).sum(axis=(-2, -1))
-    return p / (1 + row[..., None]), np.asarray(log_evidence)
+    # β = p / (1 + Σ_j p); columns sum to one at most where the sweeps have converged
+    beta = p / (1 + row[..., None])
+    return beta / np.maximum(beta.sum(axis=-2, keepdims=True), 1.0), np.asarray(log_evidence)
+
+
+def _messages(odds: Float, n_sweeps: int, tol: float) -> Float:
+    """Return the messages of detections to tracks, (..., n_tracks, n_detections)."""
+    others_i, others_j = (_others(size) for size in odds.shape[-2:])
+    n = np.ones(odds.shape)
+    is_batch = odds.ndim > 2
+    running = np.ones((*odds.shape[:-2], 1, 1), dtype=np.bool_)
+    for _ in range(n_sweeps):
+        # mu = odds / (1 + Σ_l≠j p),  p = odds n;   n = 1 / (1 + Σ_k≠i mu)
+        mu = odds / (1 + (odds * n) @ others_j)
+        new = 1 / (1 + others_i @ mu)
+        change = np.abs(new - n).max(axis=(-2, -1), keepdims=is_batch)
+        n = np.where(running, new, n) if is_batch else new
+        running = running & (change >= tol)
+        if not running.any():
+            break
+    return n
+
+
+def _others(size: int) -> Float:
+    """Return the matrix of sums over all others, free of the cancellation of a difference."""
+    return np.asarray(1.0 - np.eye(size))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.messages import shown
-from arrivals.validation import count, number, real
+from arrivals.validation import count, not_negative, real
 
 
 def packings(
@@ -57,7 +57,7 @@ def packings(
         raise ValueError(f"weights must have shape ({len(members)},); got {w.shape}")
     if not ((w > 0) & (w < np.inf)).all():
         raise ValueError(f"weights must be finite and positive; got {shown(w)}")
-    within = number("within", within)
+    within = not_negative("within", within)
     order = np.argsort(-w, kind="stable")[: count("max_sets", max_sets)].tolist()
     w_sorted = w[order].tolist()
     bits = _masks([members[i] for i in order])
