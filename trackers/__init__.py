@@ -15,6 +15,10 @@ from arrivals.trackers.estimates import (
     PositionEstimate,
     StateEstimate,
 )
+from arrivals.trackers.fusion.fused import Fused
+from arrivals.trackers.fusion.fused_estimate import FusedEstimate
+from arrivals.trackers.fusion.settings import BearingDetection, GlobalHypotheses
+from arrivals.trackers.fusion.single_step_bearings import bearings
 from arrivals.trackers.gaussian.base import GaussianFilter
 from arrivals.trackers.gaussian.ekf import EKF
 from arrivals.trackers.gaussian.filterpy_adapter import as_filterpy
@@ -53,6 +57,7 @@ from arrivals.trackers.wideband.wideband_mixture import WidebandMixture
 __all__ = [
     "ARKalmanQRDRLS",
     "AmplitudePrior",
+    "BearingDetection",
     "BirthDeath",
     "CBF",
     "CoordinateSolver",
@@ -63,10 +68,13 @@ __all__ = [
     "Estimate",
     "Filter",
     "FixedPointSolver",
+    "Fused",
+    "FusedEstimate",
     "IMM",
     "InterpolationEKF",
     "Kalman",
     "GaussianFilter",
+    "GlobalHypotheses",
     "GridSearch",
     "MAPSolver",
     "MUSIC",
@@ -96,6 +104,7 @@ __all__ = [
     "WidebandMixture",
     "as_filterpy",
     "available",
+    "bearings",
     "create",
     "find",
     "find_peaks",

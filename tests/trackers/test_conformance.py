@@ -7,6 +7,7 @@ family.
 import pytest
 from conformance_cases.autoregressive import TRACKERS as AUTOREGRESSIVE
 from conformance_cases.directions import TRACKERS as DIRECTIONS
+from conformance_cases.fusion import TRACKERS as FUSION
 from conformance_cases.gaussian import TRACKERS as GAUSSIAN
 from conformance_cases.interpolation import TRACKERS as INTERPOLATION
 from conformance_cases.rss import TRACKERS as RSS
@@ -15,7 +16,7 @@ from conformance_cases.subspace import TRACKERS as SUBSPACE
 from arrivals.trackers import available, find
 from arrivals.trackers.conformance import CHECKS, Check, MakeTracker, Measurements
 
-TRACKERS = [*DIRECTIONS, *GAUSSIAN, *INTERPOLATION, *AUTOREGRESSIVE, *SUBSPACE, *RSS]
+TRACKERS = [*DIRECTIONS, *GAUSSIAN, *INTERPOLATION, *AUTOREGRESSIVE, *SUBSPACE, *RSS, *FUSION]
 IDS = [f"{name}-{n}" for n, (name, _, _) in enumerate(TRACKERS)]
 N_SOURCES = [2] * len(DIRECTIONS) + [1] * (len(TRACKERS) - len(DIRECTIONS))
 

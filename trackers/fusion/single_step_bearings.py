@@ -16,8 +16,7 @@ from arrivals.validation import count, real
 
 PRIOR_INFORMATION = 1.0  # rad⁻²: no direction has a standard deviation above 1 rad
 MAX_STEP = 0.1  # rad, of one Gauss-Newton step
-REGULARIZATION = 1e-6  # of the mean ‖a‖², in the Gram matrix of the responses
-MIN_RELATIVE_NOISE = 1e-15  # of the mean power; noiseless data have a finite information
+REGULARIZATION = 1e-6  # of the mean ‖a‖², in the Gram matrix; leaves a residual of noiseless data
 
 
 class DirectionFit(NamedTuple):
@@ -120,9 +119,7 @@ def _linearized(step: StepSnapshots, theta: Float) -> _Linearized:
     W, E = solved[:, :, :N], rest[:, :, :N]
     # ν = ‖E‖² / (F N (M - K))
     energy = float(np.vdot(E, E).real)
-    n_numbers = F * step.n_snapshots
-    least = MIN_RELATIVE_NOISE * step.energy / (n_numbers * M)
-    noise = max(energy / (n_numbers * (M - K)), least)
+    noise = energy / (F * step.n_snapshots * (M - K))
     # J = 2/ν Σ_f Re[(D' P⊥D) ∘ (W W')ᵀ],   g_k = 2/ν Σ_f,n Re[W*_kn (D'E)_kn]
     slopes = D.conj().swapaxes(1, 2) @ rest
     products = W.conj() @ W.swapaxes(1, 2)

@@ -1,0 +1,1 @@
+"""Births of tracks: crossings of bearings, rays with signal strength."""
