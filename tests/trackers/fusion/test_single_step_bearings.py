@@ -211,6 +211,22 @@ def test_line_beyond_endfire_is_the_mirror_image() -> None:
     np.testing.assert_allclose(on_map[0, 0], np.pi / 2 - found[0])
 
 
+def test_mirror_image_of_one_source_changes_the_sign_of_its_covariance() -> None:
+    z = drawn(LINE, np.array([1.1, 0.7]), 1e3, 1)
+    found, R, _ = bearings(LINE, z, [1.1, 0.7])
+    mirrored, same, _ = bearings(LINE, z, [np.pi - 1.1, 0.7])
+    np.testing.assert_allclose(mirrored, found, atol=1e-9)
+    np.testing.assert_allclose(same, R, rtol=1e-6)
+    assert abs(R[0, 1]) > 1e-3 * R[0, 0]
+
+
+def test_steps_are_at_most_a_tenth_of_a_radian() -> None:
+    z, start = drawn(NARROW, np.array([0.5]), 1e3, 0), np.array([0.5 + 0.25])
+    for n_steps in range(3):
+        doa, _, _ = bearings(NARROW, z, start, n_steps=n_steps)
+        assert doa[0] == pytest.approx(start[0] - 0.1 * n_steps)
+
+
 def test_explained_energy_is_what_a_fit_without_the_source_loses() -> None:
     doa = np.array([-0.6, -0.1, 0.5, 2.0])
     for model in (NARROW, WIDE, DIFFUSE):
