@@ -32,6 +32,13 @@ class StationEntries(NamedTuple):
     errors : int, optional
         First of the three entries that are the station's errors: of its heading, rad, of x and
         of y, m. If None it has none.
+
+    Examples
+    --------
+    >>> station = Station(None, [0.0, 0.0], heading_std=0.1)
+    >>> turned = station.azimuth([5.0, 0.0, 5.0, 0.0, np.pi / 4, 0.0, 0.0], StationEntries(errors=4))
+    >>> float(turned.round(6))
+    0.0
     """
 
     position: tuple[int, int] = (0, 2)
