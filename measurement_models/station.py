@@ -35,8 +35,8 @@ class StationEntries(NamedTuple):
 
     Examples
     --------
-    >>> station = Station(None, [0.0, 0.0], heading_std=0.1)
-    >>> turned = station.azimuth([5.0, 0.0, 5.0, 0.0, np.pi / 4, 0.0, 0.0], StationEntries(errors=4))
+    >>> station, entries = Station(None, [0.0, 0.0], heading_std=0.1), StationEntries(errors=4)
+    >>> turned = station.azimuth([5.0, 0.0, 5.0, 0.0, np.pi / 4, 0.0, 0.0], entries)
     >>> float(turned.round(6))
     0.0
     """
