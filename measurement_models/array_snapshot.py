@@ -35,10 +35,10 @@ from arrivals.measurement_models.manifolds.two_unknowns import (
 )
 from arrivals.measurement_models.manifolds.uniform_line import grid_line
 from arrivals.measurement_models.manifolds.whitened import whitened_manifold
-from arrivals.measurement_models.snapshot_likelihood import (
+from arrivals.measurement_models.snapshots.likelihood import (
     of_state,
 )
-from arrivals.measurement_models.snapshot_noise import SnapshotNoise
+from arrivals.measurement_models.snapshots.noise import SnapshotNoise
 from arrivals.typing import Complex
 from arrivals.validation import count, instance, one_of, positive
 

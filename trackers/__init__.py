@@ -18,7 +18,7 @@ from arrivals.trackers.estimates import (
 from arrivals.trackers.fusion.fused import Fused
 from arrivals.trackers.fusion.fused_estimate import FusedEstimate
 from arrivals.trackers.fusion.settings import BearingDetection, GlobalHypotheses
-from arrivals.trackers.fusion.single_step_bearings import bearings
+from arrivals.trackers.fusion.stations.single_step_bearings import bearings
 from arrivals.trackers.gaussian.base import GaussianFilter
 from arrivals.trackers.gaussian.ekf import EKF
 from arrivals.trackers.gaussian.filterpy_adapter import as_filterpy

@@ -19,7 +19,7 @@ from arrivals.trackers.base import Tracker
 from arrivals.trackers.direction_tracker import DirectionTracker
 from arrivals.trackers.fusion.births.area import Area
 from arrivals.trackers.fusion.signal_strength import ValidReadings
-from arrivals.trackers.fusion.station_update import StationBearings
+from arrivals.trackers.fusion.stations.station_update import StationBearings
 from arrivals.trackers.registry import find
 from arrivals.validation import instance, items
 

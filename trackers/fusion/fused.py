@@ -24,19 +24,19 @@ from arrivals.trackers.fusion.arguments import (
     valid_readings,
 )
 from arrivals.trackers.fusion.births.initiation import Labels
-from arrivals.trackers.fusion.feedback import expected_directions, guided_fit
 from arrivals.trackers.fusion.fused_estimate import FusedEstimate, report
 from arrivals.trackers.fusion.fusion_step import FusionModel, fused_step, predicted_bank
 from arrivals.trackers.fusion.hypotheses import Bank, Hypothesis
 from arrivals.trackers.fusion.settings import BearingDetection, GlobalHypotheses
 from arrivals.trackers.fusion.signal_strength import ValidReadings
-from arrivals.trackers.fusion.single_step_bearings import (
+from arrivals.trackers.fusion.state_layout import StateLayout
+from arrivals.trackers.fusion.stations.feedback import expected_directions, guided_fit
+from arrivals.trackers.fusion.stations.single_step_bearings import (
     StepSnapshots,
     fit_directions,
     step_snapshots,
 )
-from arrivals.trackers.fusion.state_layout import StateLayout
-from arrivals.trackers.fusion.station_update import StationBearings
+from arrivals.trackers.fusion.stations.station_update import StationBearings
 from arrivals.trackers.fusion.tracks import Tracks
 from arrivals.trackers.registry import register
 from arrivals.trackers.rss.settings import AmplitudePrior

@@ -16,7 +16,7 @@ from arrivals.trackers.fusion.hypotheses import Bank, Hypothesis, tidied
 from arrivals.trackers.fusion.settings import BearingDetection, GlobalHypotheses
 from arrivals.trackers.fusion.signal_strength import ValidReadings, update_by_levels
 from arrivals.trackers.fusion.state_layout import StateLayout
-from arrivals.trackers.fusion.station_update import StationBearings, update_by_station
+from arrivals.trackers.fusion.stations.station_update import StationBearings, update_by_station
 from arrivals.trackers.fusion.tracks import stacked, unstacked
 from arrivals.typing import Float
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from arrivals.measurement_models.signal_strength.path_loss import PropagationModel, slopes
 from arrivals.trackers.fusion.state_layout import StateLayout
-from arrivals.trackers.fusion.station_update import MAX_EXISTENCE
+from arrivals.trackers.fusion.stations.station_update import MAX_EXISTENCE
 from arrivals.trackers.fusion.tracks import Tracks
 from arrivals.typing import Bool, Float
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from arrivals.trackers.fusion.association import associate
+from arrivals.trackers.fusion.stations.association import associate
 from arrivals.typing import Float
 
 small = st.tuples(st.integers(1, 3), st.integers(1, 3))

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
 from arrivals.measurement_models import Bearing
-from arrivals.trackers.fusion.crossings import crossing
+from arrivals.trackers.fusion.births.crossings import crossing
 from arrivals.typing import Float
 
 STATIONS = np.array([[0.0, 0.0], [1000.0, 0.0], [500.0, 900.0]])

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from arrivals.trackers.fusion.packings import packings
+from arrivals.trackers.fusion.births.packings import packings
 
 Sets = list[frozenset[tuple[int, int]]]
 detections = st.tuples(st.integers(0, 2), st.integers(0, 2))

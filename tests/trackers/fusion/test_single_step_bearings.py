@@ -10,8 +10,8 @@ from scipy.optimize import minimize
 
 from arrivals.measurement_models import ArraySnapshot, ElementResponse, SensorArray
 from arrivals.measurement_models.station import Station
-from arrivals.trackers.fusion.single_step_bearings import bearings, fit_directions
-from arrivals.trackers.fusion.white_snapshots import StepSnapshots, step_snapshots
+from arrivals.trackers.fusion.stations.single_step_bearings import bearings, fit_directions
+from arrivals.trackers.fusion.stations.white_snapshots import StepSnapshots, step_snapshots
 from arrivals.typing import Complex, Float
 
 CIRCLE = SensorArray.uca(8, 0.65)

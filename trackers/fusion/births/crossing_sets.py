@@ -10,9 +10,9 @@ import numpy as np
 from arrivals.measurement_models import Station
 from arrivals.motion_models.von_mises import wrap
 from arrivals.trackers.fusion.births.area import Area
-from arrivals.trackers.fusion.crossings import crossing
+from arrivals.trackers.fusion.births.crossings import crossing
 from arrivals.trackers.fusion.settings import BearingDetection
-from arrivals.trackers.fusion.station_update import StationBearings
+from arrivals.trackers.fusion.stations.station_update import StationBearings
 from arrivals.typing import Bool, Float, Int
 
 MIN_UNEXPLAINED = 0.3  # probability that a bearing is of no track, for a birth

@@ -9,8 +9,8 @@ import numpy as np
 
 from arrivals.trackers.fusion.births.crossing_sets import BirthModel, CrossingSets, Detections
 from arrivals.trackers.fusion.births.new_tracks import ErrorBelief, new_tracks
+from arrivals.trackers.fusion.births.packings import packings
 from arrivals.trackers.fusion.hypotheses import Hypothesis, agree
-from arrivals.trackers.fusion.packings import packings
 from arrivals.trackers.fusion.settings import GlobalHypotheses
 from arrivals.trackers.fusion.state_layout import StateLayout
 from arrivals.typing import Bool, Float, Int

@@ -9,8 +9,8 @@ import numpy as np
 from arrivals.measurement_models import Station
 from arrivals.measurement_models.station import StationEntries
 from arrivals.motion_models.von_mises import wrap
-from arrivals.trackers.fusion.association import associate
 from arrivals.trackers.fusion.settings import BearingDetection
+from arrivals.trackers.fusion.stations.association import associate
 from arrivals.trackers.fusion.tracks import Tracks
 from arrivals.typing import Float
 

@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.direction_measurement import DirectionMeasurement
 from arrivals.messages import shown
-from arrivals.trackers.fusion.white_snapshots import StepSnapshots as StepSnapshots
-from arrivals.trackers.fusion.white_snapshots import step_snapshots as step_snapshots
+from arrivals.trackers.fusion.stations.white_snapshots import StepSnapshots as StepSnapshots
+from arrivals.trackers.fusion.stations.white_snapshots import step_snapshots as step_snapshots
 from arrivals.typing import Float
 from arrivals.validation import count, real
 

@@ -8,7 +8,7 @@ from scipy.optimize import linear_sum_assignment
 from arrivals.measurement_models import Station
 from arrivals.measurement_models.station import StationEntries
 from arrivals.motion_models.von_mises import wrap
-from arrivals.trackers.fusion.single_step_bearings import (
+from arrivals.trackers.fusion.stations.single_step_bearings import (
     DirectionFit,
     StepSnapshots,
     fit_directions,
@@ -83,7 +83,7 @@ def guided_fit(step: StepSnapshots, doa: Float, expected: Float, variance: Float
     Examples
     --------
     >>> from arrivals.measurement_models import ArraySnapshot, SensorArray
-    >>> from arrivals.trackers.fusion.single_step_bearings import step_snapshots
+    >>> from arrivals.trackers.fusion.stations.single_step_bearings import step_snapshots
     >>> model = ArraySnapshot(SensorArray.uca(8, 0.65), wavelength=1.0)
     >>> z = model.steering_vector([0.5, 2.0]).sum(axis=0) + 0.1 * np.exp(1j * np.arange(8) ** 2)
     >>> step = step_snapshots(model, z)

@@ -1,0 +1,1 @@
+"""Bearings of one station in a step, and their association with tracks."""
