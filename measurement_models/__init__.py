@@ -24,7 +24,7 @@ from arrivals.measurement_models.signal_strength.decibels import (
 from arrivals.measurement_models.signal_strength.envelope import AveragedEnvelope
 from arrivals.measurement_models.signal_strength.gains import LogGains
 from arrivals.measurement_models.signal_strength.log_normal import LogNormalRSS
-from arrivals.measurement_models.snapshots.likelihood import composite
+from arrivals.measurement_models.snapshot_likelihood import composite
 from arrivals.measurement_models.station import Station, StationEntries
 
 __all__ = [

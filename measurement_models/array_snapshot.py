@@ -35,7 +35,7 @@ from arrivals.measurement_models.manifolds.two_unknowns import (
 )
 from arrivals.measurement_models.manifolds.uniform_line import grid_line
 from arrivals.measurement_models.manifolds.whitened import whitened_manifold
-from arrivals.measurement_models.snapshots.likelihood import (
+from arrivals.measurement_models.snapshot_likelihood import (
     of_state,
 )
 from arrivals.measurement_models.snapshots.noise import SnapshotNoise

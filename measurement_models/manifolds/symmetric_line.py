@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.arrays.sensor_array import SensorArray
-from arrivals.measurement_models.snapshots.single_source import SingleSourceSnapshot
+from arrivals.measurement_models.single_source import SingleSourceSnapshot
 from arrivals.typing import Complex, Float, Int
 from arrivals.validation import instance, positive
 

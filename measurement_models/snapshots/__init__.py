@@ -1,1 +1,1 @@
-"""Parts of the model of snapshots: gate of data, noise, waves, likelihood of states."""
+"""Parts of the model of snapshots: gate of data, noise, waves."""

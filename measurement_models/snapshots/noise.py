@@ -17,13 +17,13 @@ from arrivals.measurement_models.arrays.noise_coherence import (
 from arrivals.measurement_models.arrays.plane_waves import PlaneWaves
 from arrivals.measurement_models.manifolds.manifold import Reference
 from arrivals.measurement_models.observed import MISSING, ObservedSnapshots
-from arrivals.measurement_models.snapshots.gate import SnapshotGate
-from arrivals.measurement_models.snapshots.likelihood import (
+from arrivals.measurement_models.single_source import SingleSourceSnapshot
+from arrivals.measurement_models.snapshot_likelihood import (
     from_composite,
     log_known,
     log_marginal,
 )
-from arrivals.measurement_models.snapshots.single_source import SingleSourceSnapshot
+from arrivals.measurement_models.snapshots.gate import SnapshotGate
 from arrivals.measurement_models.snapshots.waves import SnapshotWaves
 from arrivals.typing import Bool, Complex, Float
 from arrivals.validation import real

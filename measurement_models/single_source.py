@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.base import MeasurementModel
-from arrivals.measurement_models.snapshots.likelihood import composite
+from arrivals.measurement_models.snapshot_likelihood import composite
 from arrivals.typing import Complex, Float
 from arrivals.validation import shaped, state
 
