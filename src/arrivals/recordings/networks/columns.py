@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from arrivals.measurement_models.arrays.positions import UNITS
@@ -32,10 +32,25 @@ NAMES: dict[str, tuple[str, dict[str, float]]] = {
     "x": ("x xpos posx east easting", METRES),
     "y": ("y ypos posy north northing", METRES),
 }  # fmt: skip
-ALIASES = {
-    role: {name + unit: scale for name in names.split() for unit, scale in units.items()}
-    for role, (names, units) in NAMES.items()
-}
+
+
+def aliases_of(
+    names: Mapping[str, tuple[str, Mapping[str, float]]],
+) -> dict[str, dict[str, float]]:
+    """Return the plain names with units, and the factors of these, of each role.
+
+    Examples
+    --------
+    >>> aliases_of({"bearing": ("doa aoa", {"": 1.0, "deg": 1.0})})
+    {'bearing': {'doa': 1.0, 'doadeg': 1.0, 'aoa': 1.0, 'aoadeg': 1.0}}
+    """
+    return {
+        role: {name + unit: scale for name in known.split() for unit, scale in units.items()}
+        for role, (known, units) in names.items()
+    }
+
+
+ALIASES = aliases_of(NAMES)
 
 
 @dataclass(frozen=True)
@@ -46,7 +61,11 @@ class Column:
     scale: float = 1.0
 
 
-def roles(columns: Iterable[str], wanted: Iterable[str] = tuple(NAMES)) -> dict[str, Column]:
+def roles(
+    columns: Iterable[str],
+    wanted: Iterable[str] = tuple(NAMES),
+    known: Mapping[str, Mapping[str, float]] = ALIASES,
+) -> dict[str, Column]:
     """Return the columns of a table by role; each column has one role.
 
     Parameters
@@ -55,6 +74,8 @@ def roles(columns: Iterable[str], wanted: Iterable[str] = tuple(NAMES)) -> dict[
         Names in the header.
     wanted : iterable of str
         Roles, in order of preference.
+    known : mapping
+        Plain names, and the factors of their units, by role, as `aliases_of` returns them.
 
     Returns
     -------
@@ -70,7 +91,7 @@ def roles(columns: Iterable[str], wanted: Iterable[str] = tuple(NAMES)) -> dict[
     free = {plain_name(name): name for name in reversed(list(columns))}
     found = {}
     for role in wanted:
-        aliases = ALIASES[role]
+        aliases = known[role]
         key = next((alias for alias in aliases if alias in free), None)
         if key is not None:
             found[role] = Column(free.pop(key), aliases[key])
