@@ -1,14 +1,16 @@
-"""Maps of estimated positions: sensors, tracks and error ellipses."""
+"""Maps of estimated positions: sensors, stations, tracks and error ellipses."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from arrivals.measurement_models import Station
 from arrivals.plots.bearing_time import NEUTRAL, PALETTE, new_axes
+from arrivals.plots.station_map import draw_bearings, draw_stations
 from arrivals.trackers.run import Run
 from arrivals.typing import Float
 from arrivals.validation import count, real
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
 
 CONFIDENCE = 0.95
 MAX_NAMES = 12  # in the legend
+MARGIN = 0.12  # of a map with stations, for their names
 
 
 def plot_map(
@@ -25,10 +28,12 @@ def plot_map(
     *,
     sensors: ArrayLike | None = None,
     truth: ArrayLike | None = None,
+    stations: Sequence[Station] | None = None,
+    bearings: Sequence[ArrayLike | None] | None = None,
     n_ellipses: int = 12,
     ax: Axes | None = None,
 ) -> Axes:
-    """Draw positions over time with 95 % ellipses, and the sensors.
+    """Draw positions over time with 95 % ellipses, the sensors and the stations.
 
     Parameters
     ----------
@@ -38,6 +43,10 @@ def plot_map(
         Sensor positions, m; rows with NaN are left out.
     truth : array_like, shape (n_steps, n_sources, 2), optional
         True positions, m.
+    stations : sequence of Station, optional
+        Stations, with their names and headings.
+    bearings : sequence of (array_like or None), optional
+        Azimuths of each station, rad, drawn as rays; such as those of the last step.
     n_ellipses : int
         Maximum number for each label; the last position always has one.
     ax : matplotlib Axes, optional
@@ -52,6 +61,8 @@ def plot_map(
     ------
     TypeError
         If the run does not have positions.
+    ValueError
+        If there are bearings without stations, or not one entry a station.
 
     Examples
     --------
@@ -69,7 +80,8 @@ def plot_map(
     ax = new_axes((7.0, 6.4)) if ax is None else ax
     if sensors is not None:
         x, y = real("sensors", sensors).T
-        ax.scatter(x, y, s=16, color="0.6", marker="^", label="sensors")
+        marker = "^" if stations is None else "s"  # stations are triangles
+        ax.scatter(x, y, s=16, color="0.6", marker=marker, label="sensors")
     if truth is not None:
         for j, path in enumerate(np.moveaxis(real("truth", truth), 1, 0)):
             ax.plot(*path.T, color="black", linewidth=0.8, linestyle=":",
@@ -82,13 +94,29 @@ def plot_map(
             text = " ".join(filter(None, (name, number))) if first < MAX_NAMES else None
             _draw_track(ax, one, label, n_ellipses, text, PALETTE[(first + label) % len(PALETTE)])
         first += max(labels, default=-1) + 1
+    if stations is not None:
+        draw_stations(ax, stations)
+        ax.margins(MARGIN)
+    if bearings is not None:
+        if stations is None:
+            raise ValueError("bearings must come with stations; got None")
+        draw_bearings(ax, stations, bearings)
     ax.set(xlabel="x, m", ylabel="y, m")
     ax.set_aspect("equal", adjustable="datalim")
     ax.grid(color="0.92")
     ax.set_axisbelow(True)
-    if ax.get_legend_handles_labels()[0]:
-        ax.legend(fontsize=8, loc="best")
+    _add_legend(ax, outside=stations is not None)
     return ax
+
+
+def _add_legend(ax: Axes, outside: bool) -> None:
+    """Add a legend where it hides least; beside a map with stations."""
+    if not ax.get_legend_handles_labels()[0]:
+        return
+    if outside:
+        ax.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    else:
+        ax.legend(fontsize=8, loc="best")
 
 
 def _draw_track(

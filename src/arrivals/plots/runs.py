@@ -43,7 +43,7 @@ def plot(run: Run | PlacedRuns, **more: Any) -> Axes:
 
     Parameters
     ----------
-    run : Run, or the result of `arrivals.locate`
+    run : Run, or the result of `arrivals.locate` or `arrivals.fuse`
         Run of a tracker of directions or of positions, or several of positions.
     **more : object
         Arguments of these functions; the times are those of the run. Times and snapshots are not
@@ -73,7 +73,9 @@ def plot(run: Run | PlacedRuns, **more: Any) -> Axes:
         return _plot_directions_and_ranges(run, **{"time": run.time} | more)
     if "doa" in run.fields:
         return plot_bearing_time(run, **{"time": run.time} | more)
-    return plot_map(run, **more)
+    # a run of `arrivals.fuse` has stations, and perhaps sensors
+    known = {name: getattr(run, name, None) for name in ("stations", "bearings", "sensors")}
+    return plot_map(run, **{name: one for name, one in known.items() if one is not None} | more)
 
 
 def _plot_directions_and_ranges(run: Run, *, time: Any, **more: Any) -> Axes:
