@@ -1,4 +1,4 @@
-"""Parser of the command line: track, check, demo, locate, reproduce, list."""
+"""Parser of the command line: track, check, demo, locate, fuse, reproduce, list."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from typing import Any, NoReturn
 import arrivals
 from arrivals import scenarios
 from arrivals.cli.check import add_check
+from arrivals.cli.fuse import add_fuse
 from arrivals.cli.locate import add_locate
 from arrivals.cli.reading import add_reading
 from arrivals.cli.track import track
@@ -93,6 +94,7 @@ def _parser() -> argparse.ArgumentParser:
     add_check(commands)
     _add_demo(commands)
     add_locate(commands, _bar)
+    add_fuse(commands, _bar, _setting)
     add_reproduce(commands)
     listing = commands.add_parser("list", help="list trackers, arrays by name, and scenarios")
     listing.set_defaults(command=_list)

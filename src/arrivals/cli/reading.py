@@ -32,6 +32,19 @@ def add_reading(option: Any, stream: str = "") -> None:
     """
     option("file", metavar="FILE", nargs="+", action=_Files,
            help=f"recording; several files have the channels of one{stream}")  # fmt: skip
+    add_file_options(option, "standard input or a raw file" if stream else "a raw file")
+
+
+def add_file_options(option: Any, files: str = "a raw file") -> None:
+    """Add the options that concern the files of recordings.
+
+    Parameters
+    ----------
+    option : callable
+        Adds an argument, as `argparse.ArgumentParser.add_argument`.
+    files : str
+        Files without a header, of which the number of channels is given.
+    """
     option("--format", metavar="NAME",
            help="format of a file, in place of its suffix, such as cs16 of raw IQ")  # fmt: skip
     option("--rate", type=float, metavar="HZ",
@@ -39,7 +52,6 @@ def add_reading(option: Any, stream: str = "") -> None:
     option("--center", type=float, metavar="HZ",
            help="centre frequency of complex samples (IQ), if the file does not contain "
                 "it")  # fmt: skip
-    files = "standard input or a raw file" if stream else "a raw file"
     option("--channels", type=int, metavar="N",
            help=f"number of channels of {files} (those of the array)")  # fmt: skip
     option("--variable", metavar="NAME", help="name of the array in a file of several")
