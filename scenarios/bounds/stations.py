@@ -68,12 +68,10 @@ def bearing_information(measurement: ArraySnapshot, doa: ArrayLike, power: Array
     beta = np.where(absent, 0.0, beta)
     around = beta + SLOPE_STEP * np.array([-1, 0, 1]).reshape(3, *np.ones(beta.ndim, dtype=int))
     a = model.steering_vector(around).reshape(*around.shape, model.n_bins, -1)
-    a = np.where(absent[..., None, None], 0.0, np.moveaxis(a, -3, -1))  # (3, ..., F, M, K)
+    a = np.where(absent[..., None, None, :], 0.0, np.moveaxis(a, -3, -1))  # (3, ..., F, M, K)
     A, D = a[1], (a[2] - a[0]) / (2 * SLOPE_STEP)
-    AH = A.conj().swapaxes(-1, -2)
-    G = AH @ A + np.where(absent, 1.0, 0.0)[..., None, None, :] * np.eye(beta.shape[-1])
-    # P⊥D = D - A (AᴴA)⁻¹ Aᴴ D
-    residual = D - A @ np.linalg.solve(G, AH @ D)
+    # P⊥D = D - A A⁺ D
+    residual = D - A @ (np.linalg.pinv(A) @ D)
     curvature = (D.conj() * residual).real.sum(axis=(-3, -2))
     J = 2 * model.n_snapshots / model.noise * np.where(absent, 0.0, P) * curvature
     return np.asarray(J)

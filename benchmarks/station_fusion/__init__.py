@@ -1,0 +1,1 @@
+"""Cells, methods and scores of benchmarks/fusion.py."""
