@@ -33,6 +33,7 @@ POSITION_SCATTER = 0.02  # of the size, standard deviation of stations about the
 NEAREST = 0.03  # of the size: power does not grow below
 CUT_OFF = 0.05  # of the size
 MAX_STEPS, MAX_SOURCES, MAX_STATIONS = 100, 6, 8
+MAX_SNR_DB = 300
 RING = 0.4  # of the size, radius of the RSS sensors about the centre
 SHADOWING_DB, LEVEL_STD_DB, ALPHA = 4.0, 3.0, 3.0
 
@@ -89,7 +90,8 @@ class StationsScenario(Scenario):
         count("n_steps", self.n_steps, maximum=MAX_STEPS)
         count("n_missing", self.n_missing, minimum=0, maximum=self.n_stations - 1)
         count("n_rss_sensors", self.n_rss_sensors, minimum=0, maximum=1000)
-        number("snr_db", self.snr_db)
+        if not abs(number("snr_db", self.snr_db)) <= MAX_SNR_DB:
+            raise ValueError(f"snr_db must be within ±{MAX_SNR_DB}; got {self.snr_db}")
         for name in ("heading_std", "position_std", "separation"):
             not_negative(name, getattr(self, name))
         positive("spread", self.spread)
