@@ -177,8 +177,9 @@ class StationsScenario(Scenario):
         """Draw powers (n_steps, n_stations, n_sources) and snapshots of the stations."""
         model, far = self.measurement, 0.5 * self.size
         d = truth[:, None] - np.stack([station.position for station in stations])[:, None]
-        heading = np.array([station.heading for station in stations])[:, None]
-        doa = np.arctan2(d[..., 1], d[..., 0]) - heading
+        azimuth = np.arctan2(d[..., 1], d[..., 0])
+        each = [station.from_map(azimuth[:, n]) for n, station in enumerate(stations)]
+        doa = np.stack(each, axis=1)
         r = np.maximum(np.linalg.norm(d, axis=-1), NEAREST * self.size)
         power = 10 ** (self.snr_db / 10) * (far / r) ** 2
         w = complex_normal(rng, (*doa.shape[:2], *model.shape[:-1], doa.shape[-1]))
