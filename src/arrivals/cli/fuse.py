@@ -126,9 +126,10 @@ def run_fuse(arguments: argparse.Namespace, bar: Callable[..., Any]) -> None:
     if arguments.transpose is False:
         options.pop("transpose")
     settings = dict(arguments.set)
-    doubled = sorted(options.keys() & settings.keys())
+    doubled = [name for name in NAMES if name in settings]
     if doubled:
-        raise ValueError(f"--set must not have options; got {doubled[0]}: pass --{doubled[0]}")
+        option = doubled[0].replace("_", "-")
+        raise ValueError(f"--set must not have options; got {doubled[0]}: pass --{option}")
     fused = fuse(
         stations,
         arguments.files or None,
@@ -163,9 +164,11 @@ def _check_outputs(arguments: argparse.Namespace, files: tuple[str, ...]) -> Non
     outputs = [each for each in (arguments.out, arguments.plot) if each]
     inputs = [*files, *arguments.files, *(arguments.bearings or ())]
     inputs += [each for each in (arguments.rss, arguments.sensors) if each]
+    words = "outputs, and the files that are read,"
+    check_different(words, *outputs)
     for one in outputs:
-        for other in (*inputs, *(each for each in outputs if each is not one)):
-            check_different("outputs, and the files that are read,", one, other)
+        for other in inputs:
+            check_different(words, one, other)
         check_output(one)
     if arguments.plot:
         picture_format(arguments.plot)

@@ -113,6 +113,8 @@ def fuse(
     own = checked_options({name: arguments.get(name) for name in ARGUMENTS})
     own = merged(own, {"settings": of_trackers} if of_trackers else {})
     plans = [replace(one, options=merged(one.options, own)) for one in contents.plans]
+    area = checked_area(arguments.get("area")) or contents.area
+    motion = {**contents.motion, **checked_motion(arguments)}
     given = {"readings": rss, "sensors": sensors}
     strength = {**contents.strength, **checked_strength(arguments)}
     strength |= {name: value for name, value in given.items() if value is not None}
@@ -126,12 +128,10 @@ def fuse(
         if bearings is None or isinstance(bearings, BearingTable)
         else (read_bearings(bearings, plans))
     )
-    motion = {**contents.motion, **checked_motion(arguments)}
     steps = fusion_steps(
         plans, _recorded(plans, recordings, table), table, readings,
         step=motion.get("step"), options=strength,
     )  # fmt: skip
-    area = checked_area(arguments.get("area")) or contents.area
     fused = _fused(steps, area, motion, of_fused)
     with threadpool_limits(1, "blas"):  # matrices are small: more threads only wait
         run, last = _run(fused, steps, progress)

@@ -245,7 +245,7 @@ def _check_overlap(found: FusionSteps) -> None:
     if not alone or (together.any() and not found.recorded):
         return
     spans = ", ".join(
-        f"{station.name!r} {time[0] - half:g} to {time[-1] + half:g} s"
+        f"{station.name!r} {round(time[0] - half, 2):g} to {round(time[-1] + half, 2):g} s"
         for station, time, half in (
             (found.stations[k], found.time[present[:, k]], found.duration / 2)
             for k in range(len(found.stations))
