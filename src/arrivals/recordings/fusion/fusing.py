@@ -19,7 +19,13 @@ from arrivals.recordings.choice.options import NARROWBAND, WIDEBAND
 from arrivals.recordings.fusion.bearing_tables import BearingTable, read_bearings
 from arrivals.recordings.fusion.fused_run import FusedRun
 from arrivals.recordings.fusion.fusion_steps import FusionSteps, fusion_steps
-from arrivals.recordings.fusion.station_options import TRACKING, checked_options, merged
+from arrivals.recordings.fusion.station_options import (
+    STRENGTH,
+    TRACKING,
+    checked_options,
+    checked_strength,
+    merged,
+)
 from arrivals.recordings.fusion.station_plan import StationPlan
 from arrivals.recordings.fusion.stations_file import (
     StationsFile,
@@ -28,7 +34,6 @@ from arrivals.recordings.fusion.stations_file import (
     read_stations,
 )
 from arrivals.recordings.fusion.strength import StrengthTable, read_strength
-from arrivals.recordings.fusion.strength_options import STRENGTH, checked_strength
 from arrivals.trackers import AmplitudePrior, Fused, find
 from arrivals.trackers.fusion.arguments import area_of, default_speed_std
 from arrivals.trackers.fusion.stations.single_step_bearings import bearings as single_step_bearings

@@ -25,12 +25,13 @@ from arrivals.recordings.fusion.placement import (
 )
 from arrivals.recordings.fusion.station_options import (
     OPTIONS,
+    STRENGTH,
     checked_options,
+    checked_strength,
     merged,
     refuse_unknown,
 )
 from arrivals.recordings.fusion.station_plan import StationPlan, of_station
-from arrivals.recordings.fusion.strength_options import STRENGTH, checked_strength
 from arrivals.typing import Float
 from arrivals.validation import instance, items, not_negative, number, positive, shaped
 
@@ -52,7 +53,7 @@ class StationsFile:
     motion : mapping of str to float
         `speed`, `q` and `step`, as far as they are given.
     strength : mapping of str to object
-        `sensors`, `readings` and the settings of `strength_options`, as far as they are given.
+        `sensors`, `readings` and the settings of `station_options`, as far as they are given.
     plane : LocalPlane, optional
         Plane of positions by latitude and longitude.
     files : tuple of str

@@ -13,7 +13,7 @@ import numpy as np
 from arrivals.measurement_models import LogNormalRSS
 from arrivals.measurement_models.arrays.local_plane import LocalPlane
 from arrivals.recordings.fusion.common_steps import nearest_steps
-from arrivals.recordings.fusion.strength_options import path_loss, source_power
+from arrivals.recordings.fusion.station_options import path_loss, source_power
 from arrivals.recordings.networks.network import Network
 from arrivals.recordings.networks.network_files import read_npz
 from arrivals.recordings.networks.sensor_tables import named
@@ -201,7 +201,7 @@ def strength_steps(
     duration : float
         Of a step, s.
     options : mapping of str to object
-        Settings of `strength_options`.
+        Settings of `station_options`.
 
     Returns
     -------
