@@ -72,7 +72,11 @@ def test_recordings_of_two_sources_are_tracked_within_a_decimetre(folder: Path) 
     assert "3 stations (mast, roof, gate); wideband sources, " in run.understood
     assert " bins: --tracker wideband_mixture --band 280.094 " in run.understood
     assert f"{len(run)} steps of 0.064 s; --speed 1 --q 0.01" in run.understood
-    # bearings of the last step pass their sources
+
+
+def test_bearings_of_the_last_step_pass_the_last_positions(folder: Path) -> None:
+    run = arrivals.fuse(folder / "stations.toml", band=BAND, window=256, snapshots=16,
+                        tracker="svalse", speed=1.0)  # fmt: skip
     for station, azimuths in zip(run.stations, run.bearings, strict=True):
         d = run.position[-1] - station.position
         assert azimuths is not None
