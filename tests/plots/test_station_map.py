@@ -1,5 +1,6 @@
 """Maps with stations: marks, names, heading ticks, rays, and legends beside the map."""
 
+from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
@@ -91,3 +92,13 @@ def test_bearings_must_fit_the_stations() -> None:
     ax = new_axes((3.0, 3.0))
     draw_bearings(ax, run.stations, [None, None, None])  # nothing sets the limits
     assert rays(ax)[0].get_segments() == []
+
+
+def test_tracks_have_different_colours_whatever_their_labels() -> None:
+    run = fused()
+    labels = np.where(run.label >= 0, 10 * np.arange(len(run))[:, None] + 1, -1)
+    spread = replace(run, fields={**run.fields, "label": labels})
+    ax = plot_map(spread)
+    tracks = [line for line in ax.lines if str(line.get_label()).startswith("source")]
+    assert [line.get_label() for line in tracks] == [f"source {10 * k + 1}" for k in range(5)]
+    assert len({line.get_color() for line in tracks}) == 5

@@ -86,14 +86,14 @@ def plot_map(
         for j, path in enumerate(np.moveaxis(real("truth", truth), 1, 0)):
             ax.plot(*path.T, color="black", linewidth=0.8, linestyle=":",
                     label=None if j else "truth")  # fmt: skip
-    first = 0  # colour of a run's label 0
+    n_drawn = 0  # colours follow the tracks that are there, not their labels
     for name, one in runs.items():
         labels = np.unique(one.label[one.label >= 0]).tolist()
         for label in labels:
             number = f"source {label}" if not name or len(labels) > 1 else ""
-            text = " ".join(filter(None, (name, number))) if first < MAX_NAMES else None
-            _draw_track(ax, one, label, n_ellipses, text, PALETTE[(first + label) % len(PALETTE)])
-        first += max(labels, default=-1) + 1
+            text = " ".join(filter(None, (name, number))) if n_drawn < MAX_NAMES else None
+            _draw_track(ax, one, label, n_ellipses, text, PALETTE[n_drawn % len(PALETTE)])
+            n_drawn += 1
     if stations is not None:
         draw_stations(ax, stations)
         ax.margins(MARGIN)
