@@ -16,19 +16,21 @@ NAMES = {
         yule_walker
     """,
     "measurement_models": """
-        AngleManifold ArrayManifold ArraySamples ArraySnapshot Autoregressive AveragedEnvelope
-        Bearing CombinedMeasurement DelayInterpolator DelayLine DirectionMeasurement
-        ElementResponse FlatBand FunctionMeasurement InterpolationDelay LinearMeasurement LogGains
-        LogNormalRSS Manifold MeasurementModel NoiseCoherence Phasor PointManifold SensorArray
-        Tones composite db_to_neper dbm_to_neper neper_to_db steering_vector
+        AngleManifold ArrayManifold ArraySamples ArraySnapshot Autoregressive
+        AveragedEnvelope Bearing CombinedMeasurement DelayInterpolator DelayLine
+        DirectionMeasurement ElementResponse FlatBand FunctionMeasurement InterpolationDelay
+        LinearMeasurement LogGains LogNormalRSS Manifold MeasurementModel NoiseCoherence
+        Phasor PointManifold SensorArray Station StationEntries Tones composite db_to_neper
+        dbm_to_neper neper_to_db steering_vector
     """,
     "trackers": """
-        ARKalmanQRDRLS AmplitudePrior BirthDeath CBF CoordinateSolver DirectionEstimate
-        DirectionTracker EKF ESPRIT Estimate Filter FixedPointSolver GaussianFilter GridSearch
-        IMM InterpolationEKF Kalman MAPSolver MUSIC MVDR MixtureSettings NewtonSolver PAST
-        Particle PeaksGNN PositionEstimate QRDRLS RSSML RSSVB RangeEstimate RootMUSIC Run SBL
-        SSBL SVALSE SourceEstimate SphereEstimate StateEstimate Tracker UKF VALSE
-        VariationalSolver WidebandMixture as_filterpy available create find find_peaks is_missing
+        ARKalmanQRDRLS AmplitudePrior BearingDetection BirthDeath CBF CoordinateSolver
+        DirectionEstimate DirectionTracker EKF ESPRIT Estimate Filter FixedPointSolver Fused
+        FusedEstimate GaussianFilter GlobalHypotheses GridSearch IMM InterpolationEKF Kalman
+        MAPSolver MUSIC MVDR MixtureSettings NewtonSolver PAST Particle PeaksGNN
+        PositionEstimate QRDRLS RSSML RSSVB RangeEstimate RootMUSIC Run SBL SSBL SVALSE
+        SourceEstimate SphereEstimate StateEstimate Tracker UKF VALSE VariationalSolver
+        WidebandMixture as_filterpy available bearings create find find_peaks is_missing
         refine_peaks register update_by_cells
     """,
     "trackers.filterpy": "ExtendedKalmanFilter IMMEstimator KalmanFilter UnscentedKalmanFilter",

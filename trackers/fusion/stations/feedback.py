@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from arrivals.measurement_models import Station
 from arrivals.measurement_models.station import StationEntries
@@ -52,8 +51,10 @@ def unmatched(expected: Float, variance: Float, doa: Float) -> np.ndarray:
     >>> unmatched(np.array([0.1, 1.0]), np.full(2, 1e-4), np.array([0.12]))
     array([False,  True])
     """
-    if not len(doa):
+    if not len(doa) or not len(expected):
         return np.ones(len(expected), dtype=np.bool_)
+    from scipy.optimize import linear_sum_assignment
+
     distance = np.abs(wrap(expected[:, None] - doa))
     row, column = linear_sum_assignment(np.minimum(distance, 1.0))
     is_near = distance[row, column] < REACH + 2 * np.sqrt(variance[row])
