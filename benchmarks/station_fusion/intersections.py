@@ -139,7 +139,7 @@ class Intersections:
 def positions(
     x: Float, covariance: Float, label: Int | None = None, existence: Float | None = None
 ) -> PositionEstimate:
-    """Return an estimate of positions (n, 2), without what is not given."""
+    """Return an estimate of positions (n, 2); existence NaN and labels -1 if None."""
     n = len(x)
     return PositionEstimate(
         x.reshape(n, 2),

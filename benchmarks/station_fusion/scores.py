@@ -29,7 +29,7 @@ class Score:
     ospa : float
         m.
     error, bound : ndarray, shape (n_pairs,)
-        Distances of matched positions, and roots of the trace of the bound, m.
+        Distances of matched positions, and roots of the trace of the bound from the arrays, m.
     square : ndarray, shape (n_pairs,)
         eᵀ P⁻¹ e; NaN without covariances.
     switches : int

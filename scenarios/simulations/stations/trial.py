@@ -1,4 +1,4 @@
-"""Trial of several stations: their measurements, as told to a tracker and as they are."""
+"""Trial of several stations: measurements, truth, and nominal and true stations."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from arrivals.typing import Float
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class StationsTrial(Trial):
-    """One draw of sources and of what several stations receive of them.
+    """One draw of sources and of the snapshots of several stations.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ class StationsTrial(Trial):
     motion : ConstantVelocity
         Motion model of the sources.
     stations, true_stations : tuple of Station
-        The stations as a tracker is told, and with their true positions and headings.
+        Stations with their nominal positions and headings, which trackers have, and the true ones.
     power : ndarray, shape (n_steps, n_stations, n_sources)
         Mean power of the sources at one sensor; NaN where a station is missing or a source is
         inactive.

@@ -124,15 +124,15 @@ def test_missing_station_has_no_data_in_the_middle_third() -> None:
     np.testing.assert_array_equal(np.isnan(gap.power).all(axis=2), missing)
 
 
-def test_errors_of_stations_are_told_by_their_deviation_alone() -> None:
+def test_nominal_stations_differ_from_the_true_ones_by_their_deviations() -> None:
     scene = StationsRadio(n_stations=8, n_steps=1, heading_std=0.02, position_std=10.0)
     turns, shifts = [], []
     for seed in range(100):
         trial = drawn(scene, seed)
-        for told, true in zip(trial.stations, trial.true_stations, strict=True):
-            turns.append(true.heading - told.heading)
-            shifts.append(true.position - told.position)
-            assert (told.heading_std, told.position_std) == (0.02, 10.0)
+        for nominal, true in zip(trial.stations, trial.true_stations, strict=True):
+            turns.append(true.heading - nominal.heading)
+            shifts.append(true.position - nominal.position)
+            assert (nominal.heading_std, nominal.position_std) == (0.02, 10.0)
     assert np.std(turns) == pytest.approx(0.02, rel=0.1)
     assert np.std(shifts) == pytest.approx(10.0, rel=0.1)
     exact = drawn(StationsRadio())
