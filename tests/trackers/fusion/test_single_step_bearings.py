@@ -168,7 +168,11 @@ def test_many_snapshots_count_as_their_covariance() -> None:
     whole = StepSnapshots(z.T[None], 40, step.response, is_line=False)
     assert step.Y.shape == (1, 5, 5)
     few, all_of_them = fit_directions(step, [-0.6, 0.9]), fit_directions(whole, [-0.6, 0.9])
-    check_equal(few[:3], all_of_them[:3])
+    check_equal(
+        (few.doa, few.covariance, few.noise),
+        (all_of_them.doa, all_of_them.covariance, all_of_them.noise),
+    )
+    np.testing.assert_allclose(few.error_covariance, all_of_them.error_covariance, rtol=1e-5)
     assert few.energy == pytest.approx(all_of_them.energy)
     np.testing.assert_allclose(few.explained, all_of_them.explained)
 
@@ -300,3 +304,23 @@ def test_noiseless_snapshots_have_a_finite_covariance() -> None:
 def test_bearings_invalid_argument_raises(z: Any, doa: Any, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         bearings(NARROW, z, doa)
+
+
+@pytest.mark.parametrize("snr_db", [-6.0, 0.0, 15.0])
+def test_error_covariance_counts_noise_in_the_amplitudes(snr_db: float) -> None:
+    """Of 400 draws: mean squared error over mean stated variance, of one source."""
+    model, rng = (
+        ArraySnapshot(SensorArray.uca(8, 0.65), 1.0, n_snapshots=20),
+        np.random.default_rng(7),
+    )
+    squares, inverse, stated = [], [], []
+    for _ in range(400):
+        w = 10 ** (snr_db / 20) * np.exp(2j * np.pi * rng.random((20, 1)))
+        step = step_snapshots(model, model.simulate([0.5], w, rng))
+        assert step is not None
+        fit = fit_directions(step, [0.5], n_steps=3)
+        squares.append((fit.doa[0] - 0.5) ** 2)
+        inverse.append(fit.covariance[0, 0])
+        stated.append(fit.error_covariance[0, 0])
+    assert np.mean(squares) / np.mean(stated) == pytest.approx(1.0, abs=0.25)
+    assert (np.mean(squares) > 1.3 * np.mean(inverse)) == (snr_db < 5)

@@ -14,6 +14,7 @@ from arrivals.trackers.fusion.stations.white_snapshots import step_snapshots as 
 from arrivals.typing import Float
 from arrivals.validation import count, real
 
+MAX_EXCESS = 0.9  # of the information, from noise in the amplitudes
 PRIOR_INFORMATION = 1.0  # rad⁻²: no direction has a standard deviation above 1 rad
 MAX_STEP = 0.1  # rad, of one Gauss-Newton step
 REGULARIZATION = 1e-6  # of the mean ‖a‖², in the Gram matrix; leaves a residual of noiseless data
@@ -28,6 +29,8 @@ class DirectionFit(NamedTuple):
         Directions, rad.
     covariance : ndarray, shape (n_sources, n_sources)
         Inverse of the joint information, rad².
+    error_covariance : ndarray, shape (n_sources, n_sources)
+        Covariance of the errors, with the noise in the amplitudes, rad².
     noise : float
         Variance of the residual at a sensor; NaN without a degree of freedom for it.
     energy : float
@@ -39,6 +42,7 @@ class DirectionFit(NamedTuple):
 
     doa: Float
     covariance: Float
+    error_covariance: Float
     noise: float
     energy: float
     explained: Float
@@ -83,15 +87,52 @@ def fit_directions(step: StepSnapshots, doa: ArrayLike, *, n_steps: int = 2) -> 
         return _without_information(step, theta)
     for i in range(n_steps + 1):
         at = _linearized(step, theta)
-        R = np.linalg.inv(at.information + PRIOR_INFORMATION * np.eye(K))
+        J = at.information + PRIOR_INFORMATION * np.eye(K)
+        R = np.linalg.inv(J)
         if i < n_steps:
             # θ = θ + (J + I)⁻¹ g
             theta = theta + np.clip(R @ at.gradient, -MAX_STEP, MAX_STEP)
+    error = error_covariance(J, at.excess)
     if step.is_line:
         side = np.where(np.cos(theta) < 0, -1.0, 1.0)  # of a mirror image
-        R = side[:, None] * R * side
-    R = (R + R.T) / 2
-    return DirectionFit(in_range(theta, step.is_line), R, at.noise, at.energy, at.explained)
+        R, error = side[:, None] * R * side, side[:, None] * error * side
+    R, theta = (R + R.T) / 2, in_range(theta, step.is_line)
+    return DirectionFit(theta, R, error, at.noise, at.energy, at.explained)
+
+
+def error_covariance(J: Float, excess: Float) -> Float:
+    """Return the covariance of errors of directions, noise of their amplitudes included.
+
+    Amplitudes are estimated from the same noise, which enters the information J as an excess B
+    and the variance of the gradient twice: the errors have the covariance (J - B)⁻¹ J (J - B)⁻¹.
+
+    Parameters
+    ----------
+    J : ndarray, shape (n_sources, n_sources)
+        Information with estimated amplitudes, rad⁻².
+    excess : ndarray, shape (n_sources, n_sources)
+        B = 2N Σ_f Re[(D' P⊥D) ∘ (A'A)⁻ᵀ], rad⁻²; it counts as at most 0.9 of J.
+
+    Returns
+    -------
+    ndarray, shape (n_sources, n_sources)
+        rad².
+
+    References
+    ----------
+    Stoica and Nehorai, "Performance study of conditional and unconditional direction-of-arrival
+    estimation", IEEE Trans. ASSP 38(10), 1990.
+
+    Examples
+    --------
+    >>> error_covariance(np.array([[4.0]]), np.array([[2.0]]))
+    array([[1.]])
+    """
+    L_inverse = np.linalg.inv(np.linalg.cholesky(J))
+    # J = L L', B = L U diag(e) U' L':  (J - B)⁻¹ J (J - B)⁻¹ = L⁻ᵀ U diag(1 - e)⁻² U' L⁻¹
+    e, U = np.linalg.eigh(L_inverse @ excess @ L_inverse.T)
+    root = L_inverse.T @ (U / (1 - np.minimum(e, MAX_EXCESS)))
+    return np.asarray(root @ root.T)
 
 
 class _Linearized(NamedTuple):
@@ -102,6 +143,7 @@ class _Linearized(NamedTuple):
     noise: float
     energy: float
     explained: Float
+    excess: Float
 
 
 def _linearized(step: StepSnapshots, theta: Float) -> _Linearized:
@@ -128,7 +170,9 @@ def _linearized(step: StepSnapshots, theta: Float) -> _Linearized:
     # without source k, ‖E‖² rises by |w_k|² / [G⁻¹]_kk
     powers = np.einsum("fkk->fk", products).real
     explained = (powers / np.einsum("fkk->fk", inverse).real).sum(axis=0)
-    return _Linearized(J, g, noise, energy, explained)
+    # B = 2N Σ_f Re[(D' P⊥D) ∘ G⁻ᵀ]
+    excess = (slopes[:, :, N:] * inverse.swapaxes(1, 2)).real.sum(axis=0)
+    return _Linearized(J, g, noise, energy, explained, 2 * step.n_snapshots * excess)
 
 
 def _without_information(step: StepSnapshots, theta: Float) -> DirectionFit:
@@ -137,7 +181,8 @@ def _without_information(step: StepSnapshots, theta: Float) -> DirectionFit:
     n_numbers = step.Y.shape[0] * step.n_snapshots * step.n_sensors
     energy, noise = (0.0, np.nan) if K else (step.energy, step.energy / n_numbers)
     prior = np.eye(K) / PRIOR_INFORMATION
-    return DirectionFit(in_range(theta, step.is_line), prior, noise, energy, np.zeros(K))
+    directions = in_range(theta, step.is_line)
+    return DirectionFit(directions, prior, prior, noise, energy, np.zeros(K))
 
 
 def _checked(doa: ArrayLike) -> Float:
