@@ -94,7 +94,8 @@ HEADER = (
 def row(name: str, scores: list[Score], reference: list[Score] | None) -> str:
     """Return the row of a method; `reference` has the scores of `step` on the same draws."""
     gospa = np.array([each.gospa for each in scores])
-    total, distance, missed, false = gospa.mean(axis=0)
+    digits = 1 if gospa[:, 0].mean() > 5 else 2
+    total, distance, missed, false = (f"{each:.{digits}f}" for each in gospa.mean(axis=0))
     error = standard_error(gospa[:, 0]) if len(scores) > 1 else np.nan
     squares = np.concatenate([each.square for each in scores])
     squares = squares[~np.isnan(squares)]
@@ -104,9 +105,9 @@ def row(name: str, scores: list[Score], reference: list[Score] | None) -> str:
     sure = np.concatenate([each.hit for each in scores])[existence > SURE]
     cells = [
         name,
-        f"{total:.1f} ± {error:.1f} ({distance:.1f}/{missed:.1f}/{false:.1f})",
+        f"{total} ± {error:.{digits}f} ({distance}/{missed}/{false})",
         ratio,
-        f"{np.mean([each.ospa for each in scores]):.1f}",
+        f"{np.mean([each.ospa for each in scores]):.{digits}f}",
         f"{_median(scores, 'error'):.2f} / {_median(scores, 'bound'):.2f}",
         f"{squares.mean() / 2:.2f}" if squares.size else "",
         f"{(squares < CHI_SQUARE_95).mean():.3f}" if squares.size else "",
