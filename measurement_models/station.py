@@ -136,7 +136,7 @@ class Station(FrozenModel):
 
     @property
     def is_line(self) -> bool:
-        """True if the sensors are on a line, which cannot tell its two sides apart."""
+        """True if the sensors are on a line, whose two sides are ambiguous."""
         array = getattr(self.measurement, "array", None)
         return bool(array is not None and array.dim == 1)
 

@@ -112,7 +112,7 @@ def station_trackers(
 
 
 def _made(name: str, station: Station) -> Tracker | None:
-    """Return a tracker by name; the ambiguity of lines is no surprise with several stations."""
+    """Return a tracker by name; the ambiguity of lines is expected with several stations."""
     kind = find(name)
     if not issubclass(kind, DirectionTracker):
         raise TypeError(f"trackers must be of directions; got {name!r}")

@@ -31,7 +31,7 @@ def crossing(
     azimuth : array_like, shape (..., n)
         Bearings on the map, rad, anticlockwise from the x axis.
     variance : array_like, shape (..., n)
-        Their variances, rad²; infinite where a station is no member of the set.
+        Their variances, rad²; infinite where a station does not belong to the set.
     n_steps : int
         Gauss-Newton steps, at least one.
     position_variance : array_like, shape (..., n)

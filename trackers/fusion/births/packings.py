@@ -40,7 +40,7 @@ def packings(
     -------
     list of (tuple of int, float)
         Indices of the sets of each packing, by falling weight, and its total. The empty packing
-        alone if there is no set.
+        alone without sets.
 
     Raises
     ------

@@ -63,7 +63,7 @@ def fit_directions(step: StepSnapshots, doa: ArrayLike, *, n_steps: int = 2) -> 
     Returns
     -------
     DirectionFit
-        With as many sources as sensors or more, there is no information: the directions are the
+        With as many sources as sensors or more, information is missing: the directions are the
         initial ones, each with a variance of 1 rad².
 
     Raises

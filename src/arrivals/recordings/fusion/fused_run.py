@@ -92,7 +92,7 @@ class FusedRun(Run):
         Yields
         ------
         tuple
-            Step (from 0), time, then the columns of the estimate, of which the last one, `heard`,
+            Step (from 0), time, then the columns of the estimate, of which the last one
             has the names of the stations whose bearings updated the track.
         """
         for step, time in enumerate(self.time.tolist()):
