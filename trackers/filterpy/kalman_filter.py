@@ -35,6 +35,7 @@ class KalmanFilter(LinearByDimensions, Kalman):
     """
 
     plain: ClassVar[type[Kalman]] = Kalman
+    linear_steps = True  # `predict` differs in the order of its arguments alone
 
     def predict(
         self,

@@ -39,7 +39,9 @@ from arrivals.trackers.gaussian.linearization import (
     update_belief,
     warn_if_far_from_linear,
 )
-from arrivals.trackers.gaussian.smoothing import batch_filter, rts_smoother, run_batch
+from arrivals.trackers.gaussian.sequences.batches import run_batch
+from arrivals.trackers.gaussian.sequences.filtering import batch_filter
+from arrivals.trackers.gaussian.sequences.smoothing import rts_smoother
 from arrivals.typing import Bool, Float
 from arrivals.validation import real, shaped, time_step
 

@@ -17,12 +17,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from arrivals.trackers.gaussian.gains import kalman_gain, leave_out
 from arrivals.trackers.gaussian.linalg import (
     Inverse,
     apply,
     cholesky,
     half_log_det,
-    identity,
     inner,
     inverse,
     multiplication,
@@ -100,7 +100,7 @@ def update_gaussian(
 
     Returns
     -------
-    Correction
+    GaussianUpdate
 
     Examples
     --------
@@ -111,24 +111,18 @@ def update_gaussian(
     >>> update.x, update.P, float(update.log_likelihood.round(4))
     (array([0.5]), array([[0.5]]), -1.5155)
     """
-    dot, n_valid = multiplication(P), y.shape[-1]
-    # S = H P H' + R   (4.21)
-    PHT = dot(P, transposed(H))
-    S = dot(H, PHT) + R
+    # S = H P H' + R,  K = P H' S^-1   (4.21),  P = (I - K H) P (I - K H)' + K R K'
+    gain = kalman_gain(P, H, R, missing, inv)
     if missing is not None:
-        y, PHT, S = leave_out(missing, y, PHT, S)
-        n_valid = n_valid - missing.sum(axis=-1)
-    S, L, jittered = cholesky(S)
-    SI = inv(S)
-    # K = P H' S^-1   (4.21)
-    K = dot(PHT, SI)
+        y = np.where(missing, 0.0, y)
     # x = x + K y   (4.21)
-    x = x + apply(K, y)
-    P = joseph(P, K, H, R)
+    x = x + apply(gain.K, y)
     # ln N(y; 0, S)
-    square = inner(y, apply(SI, y))
-    log_likelihood = -0.5 * (n_valid * LOG_2PI + square) - half_log_det(L)
-    return GaussianUpdate(x, P, y, K, S, SI, log_likelihood, square, jittered)
+    square = inner(y, apply(gain.SI, y))
+    log_likelihood = -0.5 * (gain.n_valid * LOG_2PI + square) - gain.half_log_det
+    return GaussianUpdate(
+        x, gain.P, y, gain.K, gain.S, gain.SI, log_likelihood, square, gain.jittered
+    )
 
 
 def log_normal_update(y: Float, S: Float, missing: Bool | None = None) -> tuple[Float, Float, int]:
@@ -141,46 +135,11 @@ def log_normal_update(y: Float, S: Float, missing: Bool | None = None) -> tuple[
     """
     n_valid = y.shape[-1]
     if missing is not None:
-        y, _, S = leave_out(missing, y, S, S)
+        y, S = np.where(missing, 0.0, y), leave_out(missing, S, S)[1]
         n_valid = n_valid - missing.sum(axis=-1)
     S, L, jittered = cholesky(S)
     square = inner(y, np.asarray(np.linalg.solve(S, y[..., None])[..., 0], np.float64))
     return -0.5 * (n_valid * LOG_2PI + square) - half_log_det(L), square, jittered
-
-
-def joseph(P: Float, K: Float, H: Float, R: Float) -> Float:
-    """Return covariances after an update by any gain, in Joseph's form.
-
-    Parameters
-    ----------
-    P : ndarray, shape (..., n, n)
-    K : ndarray, shape (..., n, m)
-    H : ndarray, shape (m, n) or (..., m, n)
-    R : ndarray, shape (m, m) or (..., m, m)
-
-    Returns
-    -------
-    ndarray, shape (..., n, n)
-
-    Examples
-    --------
-    >>> joseph(np.eye(1), np.full((1, 1), 0.5), np.eye(1), np.eye(1))
-    array([[0.5]])
-    """
-    dot = multiplication(P)
-    # P = (I - K H) P (I - K H)' + K R K'   (Bar-Shalom 5.2.3-18)
-    I_KH = identity(P.shape[-1]) - dot(K, H)
-    return symmetric(dot(dot(I_KH, P), transposed(I_KH)) + dot(dot(K, R), transposed(K)))
-
-
-def leave_out(missing: Bool, y: Float, PHT: Float, S: Float) -> tuple[Float, Float, Float]:
-    """Return residual, cross-covariance and S without the information of missing entries."""
-    either = missing[..., :, None] | missing[..., None, :]
-    return (
-        np.where(missing, 0.0, y),
-        np.where(missing[..., None, :], 0.0, PHT),
-        np.where(either, np.eye(y.shape[-1]), S),
-    )
 
 
 def update_scalar(x: Float, P: Float, y: Float, h: Float, r: Float) -> tuple[Float, Float]:
@@ -284,7 +243,8 @@ def smooth_gaussian(x: Float, P: Float, G: Float, dx: Float, dP: Float) -> tuple
     # x = x + G (x_next - x_pred)   (8.6)
     x = x + apply(G, dx)
     # P = P + G (P_next - P_pred) G'   (8.6)
-    return x, symmetric(P + G @ dP @ transposed(G))
+    dot = multiplication(P)
+    return x, symmetric(P + dot(dot(G, dP), transposed(G)))
 
 
 def likelihood(log_likelihood: float) -> float:

@@ -80,7 +80,7 @@ class Kalman(FadingMemory, Queries, GaussianFilter):
     array([1.07, 2.1 , 2.93])
     """
 
-    linear_only = True
+    linear_only = linear_steps = True
 
     def __init__(
         self, motion: MotionModel, measurement: MeasurementModel, x: ArrayLike, P: ArrayLike

@@ -30,7 +30,12 @@ def apply(A: Float, x: Float) -> Float:
     array([[3.],
            [7.]])
     """
-    return A.dot(x) if x.ndim == 1 else (A @ x[..., None])[..., 0]
+    product: Float
+    if x.ndim == 1:
+        product = A.dot(x)
+    else:
+        product = x @ A.T if A.ndim == 2 else (A @ x[..., None])[..., 0]
+    return product
 
 
 def inner(a: Float, b: Float) -> Float:

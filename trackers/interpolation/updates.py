@@ -20,7 +20,8 @@ from arrivals.measurement_models.delays.delay_line import SourceAtCentre
 from arrivals.measurement_models.delays.interpolation import InterpolationDelay
 from arrivals.motion_models.base import MotionModel
 from arrivals.parameters import FrozenModel
-from arrivals.trackers.gaussian.equations import joseph, predict_gaussian, update_scalar
+from arrivals.trackers.gaussian.equations import predict_gaussian, update_scalar
+from arrivals.trackers.gaussian.gains import joseph
 from arrivals.trackers.gaussian.linalg import apply, symmetric
 from arrivals.trackers.interpolation.error_covariance import ScoreTable
 from arrivals.trackers.interpolation.gating import is_used

@@ -16,10 +16,10 @@ from arrivals.trackers.gaussian.arguments import (
 )
 from arrivals.trackers.gaussian.equations import (
     GaussianUpdate,
-    leave_out,
     log_normal_update,
     update_gaussian,
 )
+from arrivals.trackers.gaussian.gains import leave_out
 from arrivals.trackers.gaussian.linalg import Inverse, cholesky, symmetric
 from arrivals.typing import Bool, Float
 from arrivals.validation import count, time_step
@@ -175,7 +175,8 @@ def correlated_update(
     HM, PHT = H.dot(M), P.dot(H.T) + M
     S = H.dot(P).dot(H.T) + HM + HM.T + R
     if missing is not None:
-        y, PHT, S = leave_out(missing, y, PHT, S)
+        y = np.where(missing, 0.0, y)
+        PHT, S = leave_out(missing, PHT, S)
     S, _, _ = cholesky(S)
     SI = inv(S)
     # K = (P H' + M) S^-1

@@ -1,0 +1,1 @@
+"""Filtering and smoothing of whole sequences by Gaussian filters."""
