@@ -111,6 +111,10 @@ class MeasurementModel(FrozenModel, ABC):
     def H(self, x: ArrayLike) -> Float:
         """Return the Jacobian of `h` at one state, (dim_z, dim_x)."""
 
+    def h_and_H(self, x: ArrayLike) -> tuple[Float, Float]:
+        """Return `h` and `H` of one state; models in which they share work do it once."""
+        return self.h(x), self.H(x)
+
     def residual(self, z: ArrayLike, z_pred: ArrayLike) -> Float:
         """Return z - z_pred; models whose measurement is an angle wrap it."""
         z, z_pred = paired(z, z_pred)

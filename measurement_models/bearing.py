@@ -139,7 +139,10 @@ class Bearing(MeasurementModel):
 
     def h(self, x: ArrayLike) -> Float:
         """Return the angles of states, (..., n) -> (..., dim_z): atan2(Δy, Δx), atan2(Δz, ρ)."""
-        delta = self._from_sensors(*self._state(x))
+        return self._angles(self._from_sensors(*self._state(x)))
+
+    def _angles(self, delta: Float) -> Float:
+        """Return the angles of vectors from the sensors, (..., n_sensors, n_dims)."""
         azimuth = np.arctan2(delta[..., 1], delta[..., 0])
         if self.n_dims == 2:
             return azimuth
@@ -154,10 +157,21 @@ class Bearing(MeasurementModel):
         x, position = self._state(x)
         if x.ndim != 1:
             raise ValueError(f"x must have shape (n,); got {x.shape}")
+        return self._slopes(self._from_sensors(x, position), x.size, position)
+
+    def h_and_H(self, x: ArrayLike) -> tuple[Float, Float]:
+        """Return `h` and `H` of one state."""
+        if type(self) is not Bearing or np.ndim(x) != 1:
+            return super().h_and_H(x)  # a subclass may replace one of them
+        x, position = self._state(x)
         delta = self._from_sensors(x, position)
+        return self._angles(delta), self._slopes(delta, x.size, position)
+
+    def _slopes(self, delta: Float, n: int, position: tuple[int, ...]) -> Float:
+        """Return the Jacobian for vectors from the sensors, (n_sensors, n_dims)."""
         east, north = delta[:, 0], delta[:, 1]
         square = np.maximum(east * east + north * north, TINY)
-        slope = np.zeros((len(delta), self.n_dims - 1, x.size))
+        slope = np.zeros((len(delta), self.n_dims - 1, n))
         if self.n_dims == 3:
             up, flat = delta[:, 2], np.hypot(east, north)
             range_squared = np.maximum(square + up * up, TINY)
@@ -166,7 +180,7 @@ class Bearing(MeasurementModel):
             slope[:, 1, position[1]] = -north / np.sqrt(square) * up / range_squared
             slope[:, 1, position[2]] = flat / range_squared
         slope[:, 0, position[0]], slope[:, 0, position[1]] = -north / square, east / square
-        return slope.reshape(self.dim_z, x.size)
+        return slope.reshape(self.dim_z, n)
 
     def residual(self, z: ArrayLike, z_pred: ArrayLike) -> Float:
         """Return z - z_pred, wrapped into [-π, π)."""

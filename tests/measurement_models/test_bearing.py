@@ -9,6 +9,7 @@ import pytest
 from filterpy.kalman import ExtendedKalmanFilter, MerweScaledSigmaPoints, UnscentedKalmanFilter
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import ArrayLike
 
 from arrivals.measurement_models import Bearing, LinearMeasurement, MeasurementModel
 from arrivals.measurement_models.arrays.sphere import unit_vectors
@@ -32,6 +33,24 @@ def test_bearing_jacobian_equals_numerical_slope(px: float, py: float) -> None:
     model = Bearing(PLACES, 0.01)
     if np.hypot(*(PLACES - x[[0, 2]]).T).min() > 0.5:
         np.testing.assert_allclose(model.H(x), slope(model, x), atol=1e-6)
+
+
+@given(coordinates, coordinates, coordinates)
+def test_h_and_its_jacobian_together_equal_each_alone(px: float, py: float, pz: float) -> None:
+    flat, spatial = Bearing([[0.0, 0.0]], 0.1), Bearing([[0.0, 0.0, 0.0]], 0.1)
+    for model, x in ((flat, np.array([px, py])), (spatial, np.array([px, py, pz]))):
+        h, H = model.h_and_H(x)
+        np.testing.assert_array_equal(h, model.h(x))
+        np.testing.assert_array_equal(H, model.H(x))
+
+
+def test_h_and_its_jacobian_of_a_subclass_are_those_it_defines() -> None:
+    class Biased(Bearing):
+        def h(self, x: ArrayLike) -> Float:
+            return super().h(x) + 1.0
+
+    h, _ = Biased([[0.0, 0.0]], 0.1).h_and_H(np.array([1.0, 0.0]))
+    np.testing.assert_array_equal(h, [1.0])
 
 
 @given(st.floats(-np.pi, np.pi), coordinates, coordinates)

@@ -16,7 +16,8 @@ from arrivals.trackers.gaussian.filterpy_names.function_updates import (
     update_by_functions,
 )
 from arrivals.trackers.gaussian.filterpy_names.queries import FadingMemory, Queries
-from arrivals.trackers.gaussian.linearization import Linearization, at_each
+from arrivals.trackers.gaussian.linalg import apply
+from arrivals.trackers.gaussian.linearization import Linearization, at_each, first
 from arrivals.trackers.registry import register
 from arrivals.typing import Float
 from arrivals.validation import count
@@ -94,8 +95,15 @@ class EKF(FadingMemory, Queries, GaussianFilter):
 
     def linearize_motion(self, x: Float, P: Float, dt: float) -> Linearization:
         """Return f(x) and its Jacobian."""
-        return Linearization(self.held_motion.f(x, dt), at_each(self.held_motion.F, x, dt))
+        motion = self.held_motion
+        if motion.is_linear and not self.held_angles:
+            F = motion.F(first(x), dt)
+            return Linearization(apply(F, x), F)
+        return Linearization(motion.f(x, dt), at_each(motion.F, x, dt))
 
     def linearize_measurement(self, x: Float, P: Float) -> Linearization:
         """Return h(x) and its Jacobian."""
-        return Linearization(self.held_measurement.h(x), at_each(self.held_measurement.H, x))
+        measurement = self.held_measurement
+        if x.ndim == 1:
+            return Linearization(*measurement.h_and_H(x))
+        return Linearization(measurement.h(x), at_each(measurement.H, x))

@@ -25,7 +25,7 @@ from arrivals.trackers.gaussian.filterpy_names.kalman_updates import (
 )
 from arrivals.trackers.gaussian.filterpy_names.queries import FadingMemory, Queries
 from arrivals.trackers.gaussian.linalg import apply
-from arrivals.trackers.gaussian.linearization import Linearization
+from arrivals.trackers.gaussian.linearization import Linearization, first
 from arrivals.trackers.registry import register
 from arrivals.typing import Float
 from arrivals.validation import time_step
@@ -136,12 +136,12 @@ class Kalman(FadingMemory, Queries, GaussianFilter):
 
     def linearize_motion(self, x: Float, P: Float, dt: float) -> Linearization:
         """Return F x and F."""
-        F = self.held_motion.F(_first(x), dt)
+        F = self.held_motion.F(first(x), dt)
         return Linearization(apply(F, x), F)
 
     def linearize_measurement(self, x: Float, P: Float) -> Linearization:
         """Return H x and H."""
-        H = self.held_measurement.H(_first(x))
+        H = self.held_measurement.H(first(x))
         return Linearization(apply(H, x), H)
 
 
@@ -162,8 +162,3 @@ def _is_linear(function: ArrayFunction, jacobian: ArrayFunction, n: int) -> bool
     """Return True if a function is its Jacobian times the state, at states in general position."""
     states = 10 * np.cos(np.arange(3 * n, dtype=np.float64).reshape(3, n))
     return np.allclose(function(states), states @ jacobian(states[0]).T, rtol=1e-9, atol=1e-9)
-
-
-def _first(x: Float) -> Float:
-    """Return one state of a batch: the matrices are the same at all of them."""
-    return x if x.ndim == 1 else _first(x[0])

@@ -30,12 +30,9 @@ def apply(A: Float, x: Float) -> Float:
     array([[3.],
            [7.]])
     """
-    product: Float
-    if x.ndim == 1:
-        product = A.dot(x)
-    else:
-        product = x @ A.T if A.ndim == 2 else (A @ x[..., None])[..., 0]
-    return product
+    if x.ndim > 1 and A.ndim == 2:
+        return np.asarray(x @ A.T)
+    return A.dot(x) if x.ndim == 1 else (A @ x[..., None])[..., 0]
 
 
 def inner(a: Float, b: Float) -> Float:
@@ -56,7 +53,7 @@ def transposed(A: Float) -> Float:
 
 def symmetric(A: Float) -> Float:
     """Return (A + Aᵀ)/2 of matrices (..., n, n)."""
-    total: Float = A + transposed(A)
+    total: Float = A + (A.T if A.ndim == 2 else A.swapaxes(-1, -2))
     total *= 0.5
     return total
 

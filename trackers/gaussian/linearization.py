@@ -52,6 +52,17 @@ def at_each(jacobian: Callable[..., Float], x: Float, *args: float) -> Float:
     return np.stack([at_each(jacobian, state, *args) for state in x])
 
 
+def first(x: Float) -> Float:
+    """Return one state of a batch, for matrices that are the same at all of them.
+
+    Examples
+    --------
+    >>> first(np.array([[1.0, 2.0], [3.0, 4.0]]))
+    array([1., 2.])
+    """
+    return x if x.ndim == 1 else first(x[0])
+
+
 def linear_step(
     tracker: GaussianFilter,
     x: Float,
