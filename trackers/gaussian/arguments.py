@@ -56,6 +56,24 @@ def overrides(kind: type, base: type, name: str) -> bool:
     return any(name in vars(each) or name in get_annotations(each) for each in between)
 
 
+def has_own_steps(tracker: object, mark: str) -> bool:
+    """Return True if a tracker's class itself has a mark, and `predict` and `update` are its own.
+
+    The mark stands in the body of classes whose steps may be done as one block: a subclass that
+    replaces a step does not have it.
+
+    Examples
+    --------
+    >>> class Block:
+    ...     block_steps = True
+    >>> class Other(Block):
+    ...     def update(self, z): ...
+    >>> [has_own_steps(kind(), "block_steps") for kind in (Block, Other)]
+    [True, False]
+    """
+    return mark in vars(type(tracker)) and vars(tracker).keys().isdisjoint(("predict", "update"))
+
+
 def belief_arrays(x: ArrayLike, P: ArrayLike, n: int) -> tuple[Float, Float]:
     """Return a mean (n,) and a covariance (n, n) of an assigned belief.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,9 +13,11 @@ from arrivals.measurement_models.delays.array_samples import ArraySamples
 from arrivals.measurements import real_numbers, rows
 from arrivals.trackers.base import Tracker
 from arrivals.trackers.estimates import DirectionEstimate
+from arrivals.trackers.gaussian.arguments import has_own_steps
 from arrivals.trackers.interpolation.assembly import ErrorCovariance
+from arrivals.trackers.interpolation.channel_filters import ChannelFilters
 from arrivals.trackers.interpolation.gating import widened
-from arrivals.trackers.interpolation.sample_buffer import receive, to_snapshot
+from arrivals.trackers.interpolation.sample_buffer import SampleBuffer, receive, to_snapshot
 from arrivals.trackers.interpolation.updates import predict, transition
 from arrivals.trackers.run import Run
 from arrivals.typing import Float
@@ -23,6 +25,44 @@ from arrivals.validation import positive
 
 if TYPE_CHECKING:
     from arrivals.trackers.interpolation.interpolation_ekf import InterpolationEKF
+
+
+class FilterState(NamedTuple):
+    """All that a filter carries from one snapshot to the next."""
+
+    x: Float
+    P: Float
+    error: ErrorCovariance
+    channels: ChannelFilters
+    buffer: SampleBuffer
+
+
+def run(self: InterpolationEKF, measurements: Iterable[ArrayLike | None], dt: float = 1.0) -> Run:
+    """Predict and update for each measurement; parameters and result as in `Tracker.run`.
+
+    Of an array of snapshots, only the last steps set the attributes of an update.
+    """
+    is_array = isinstance(measurements, np.ndarray) and measurements.shape[1:] == (self.dim_z,)
+    if not (is_array and has_own_steps(self, "block_steps")):
+        return Tracker.run(self, measurements, dt)
+    positive("dt", dt)
+    started = time.perf_counter()
+    snapshots = real_numbers("measurements", measurements)
+    valid = np.flatnonzero(np.isfinite(snapshots).any(axis=-1))
+    n_before = int(valid[-1]) if len(valid) else 0
+    x, _, variance, end = _filtered(self, snapshots[:n_before], dt)
+    if n_before:
+        self.set_belief(end.x, end.P)
+        self.error, self.channels, self.buffer = end.error, end.channels, end.buffer
+    xs, variances = list(x), variance.tolist()
+    for z in snapshots[n_before:]:
+        self.predict(dt=dt)
+        self.update(z)
+        xs.append(np.ravel(self.x))
+        variances.append(float(self.error.of(self.P).variance))
+    states = np.array(xs).reshape(len(snapshots), self.dim_x)
+    doa, std = directions(self.measurement, states, np.array(variances))
+    return direction_run(doa, std, states, dt, time.perf_counter() - started)
 
 
 def run_batch(
@@ -92,6 +132,13 @@ def beliefs(
         raise ValueError(
             f"measurements must have shape (..., n_steps, {self.dim_z}); got {snapshots.shape}"
         )
+    return _filtered(self, snapshots, dt)[:3]
+
+
+def _filtered(
+    self: InterpolationEKF, snapshots: Float, dt: float
+) -> tuple[Float, Float, Float, FilterState]:
+    """Return those of `beliefs`, and the state after the last snapshot."""
     assembly, lead = self.assembly, snapshots.shape[:-2]
     F, Q = transition(assembly.motion, dt)
     x, P = (np.broadcast_to(a, (*lead, *a.shape)) for a in self.belief())
@@ -111,7 +158,7 @@ def beliefs(
         buffer = buffer.with_misfit(misfit)
         error = assembly.updated_error(error, prior, x, P, buffer.n_snapshots)
         xs[..., k, :], Ps[..., k, :, :], variances[..., k] = x, P, error.variance
-    return xs, Ps, variances
+    return xs, Ps, variances, FilterState(x, P, error, channels, buffer)
 
 
 def directions(measurement: ArraySamples, x: Float, variance: Float) -> tuple[Float, Float]:

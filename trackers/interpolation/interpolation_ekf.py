@@ -17,7 +17,7 @@ from arrivals.trackers.gaussian.base import GaussianFilter
 from arrivals.trackers.gaussian.equations import update_gaussian
 from arrivals.trackers.gaussian.linearization import Linearization
 from arrivals.trackers.interpolation.assembly import FilterAssembly
-from arrivals.trackers.interpolation.batch import directions, run_batch, trajectory
+from arrivals.trackers.interpolation.batch import directions, run, run_batch, trajectory
 from arrivals.trackers.interpolation.channel_filters import ChannelFilters
 from arrivals.trackers.interpolation.gating import widened
 from arrivals.trackers.interpolation.sample_buffer import SampleBuffer, receive, to_snapshot
@@ -143,8 +143,8 @@ class InterpolationEKF(GaussianFilter):
         self._built = SimpleNamespace(key=(None,) * 5)
         self.restart()
 
-    run_batch = run_batch
-    trajectory = trajectory
+    block_steps = True
+    run, run_batch, trajectory = run, run_batch, trajectory
 
     def restart(self) -> None:
         """Discard all samples, and start again from `doa` and `std`."""

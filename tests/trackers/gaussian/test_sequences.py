@@ -12,7 +12,8 @@ from arrivals.measurement_models import LinearMeasurement
 from arrivals.motion_models import ConstantVelocity, LinearMotion
 from arrivals.trackers import Kalman
 from arrivals.trackers.filterpy import KalmanFilter
-from arrivals.trackers.gaussian.sequences.linear_steps import LinearSteps, has_linear_steps
+from arrivals.trackers.gaussian.arguments import has_own_steps
+from arrivals.trackers.gaussian.sequences.linear_steps import LinearSteps
 from arrivals.typing import Float
 
 X, H = np.array([5.0, 0.1, 4.0, -0.1]), np.eye(4)[::2]
@@ -73,9 +74,9 @@ def test_batch_filter_of_an_overridden_update_calls_it() -> None:
     tracker = Counting(ConstantVelocity(q=0.1), LinearMeasurement(H, np.eye(2)), X, np.eye(4))
     tracker.batch_filter(measurements("none", 9))
     assert tracker.n_updates == 9
-    assert not has_linear_steps(tracker)
-    assert has_linear_steps(kalman())
-    assert has_linear_steps(KalmanFilter(2, 1))
+    assert not has_own_steps(tracker, "linear_steps")
+    assert has_own_steps(kalman(), "linear_steps")
+    assert has_own_steps(KalmanFilter(2, 1), "linear_steps")
 
 
 def test_batch_filter_overflow_raises_and_keeps_the_belief() -> None:

@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 from arrivals.measurements import real_numbers, rows
 from arrivals.trackers.base import Tracker
 from arrivals.trackers.estimates import StateEstimate
-from arrivals.trackers.gaussian.arguments import measurement_vector, missing_mask
+from arrivals.trackers.gaussian.arguments import has_own_steps, measurement_vector, missing_mask
 from arrivals.trackers.gaussian.circular import wrapped
-from arrivals.trackers.gaussian.sequences.linear_steps import LinearSteps, has_linear_steps
+from arrivals.trackers.gaussian.sequences.linear_steps import LinearSteps
 from arrivals.trackers.run import Run
 from arrivals.typing import Float
 from arrivals.validation import positive
@@ -46,7 +46,7 @@ def run_batch(
     if isinstance(zs, list):
         return Tracker.run_batch(self, zs, dt)
     started = time.perf_counter()
-    filtered = _filter_linear if has_linear_steps(self) else _filter_block
+    filtered = _filter_linear if has_own_steps(self, "linear_steps") else _filter_block
     xs, Ps = filtered(self, zs, dt)
     elapsed = (time.perf_counter() - started) / xs.shape[1]
     steps = dt * np.arange(len(xs), dtype=np.float64)

@@ -9,8 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurements import real_numbers, rows
-from arrivals.trackers.gaussian.arguments import PerStep, measurement_vector, per_step_values
-from arrivals.trackers.gaussian.sequences.linear_steps import LinearSteps, has_linear_steps
+from arrivals.trackers.gaussian.arguments import (
+    PerStep,
+    has_own_steps,
+    measurement_vector,
+    per_step_values,
+)
+from arrivals.trackers.gaussian.sequences.linear_steps import LinearSteps
 from arrivals.typing import Bool, Float
 from arrivals.validation import LARGEST
 
@@ -74,7 +79,7 @@ def batch_filter(
     post: Beliefs = []
     try:
         constant = saver is None and not update_first and all(each is None for each in replaced)
-        if constant and has_linear_steps(self):
+        if constant and has_own_steps(self, "linear_steps"):
             prior, post = _filter_linear(self, zs)
         for k in range(len(post), n_steps):
             F, Q, H, R, B, u, dt = (values[k] for values in arguments)

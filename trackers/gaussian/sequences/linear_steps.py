@@ -17,12 +17,6 @@ if TYPE_CHECKING:
 MOST_KNOWN = 64  # covariances: constant models come back to one of the last few, bit by bit
 
 
-def has_linear_steps(tracker: GaussianFilter) -> bool:
-    """Return True of a Kalman filter whose class and object leave `predict` and `update` alone."""
-    own = vars(tracker).keys().isdisjoint(("predict", "update"))
-    return own and "linear_steps" in vars(type(tracker))
-
-
 class StepCovariances(NamedTuple):
     """Covariance after the prediction of a step, and the gain of its update."""
 

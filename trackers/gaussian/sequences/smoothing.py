@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.trackers.gaussian.arguments import PerStep, per_step_values
+from arrivals.trackers.gaussian.arguments import PerStep, has_own_steps, per_step_values
 from arrivals.trackers.gaussian.circular import difference, wrapped
 from arrivals.trackers.gaussian.equations import predict_gaussian, smooth_gaussian
 from arrivals.trackers.gaussian.linalg import Inverse, cholesky, transposed
 from arrivals.trackers.gaussian.linearization import linear_step
-from arrivals.trackers.gaussian.sequences.linear_steps import has_linear_steps
 from arrivals.typing import Float
 from arrivals.validation import real, time_step
 
@@ -89,7 +88,7 @@ def _motions(
     Fs, Qs, us, dts = (
         per_step_values(*each, n_steps) for each in zip(names, replaced, strict=True)
     )
-    if constant and has_linear_steps(tracker) and n_steps > 1:
+    if constant and has_own_steps(tracker, "linear_steps") and n_steps > 1:
         motion, Q = linear_step(tracker, x[:-1], P[:-1], 1.0)
         return motion.mean, motion.jacobian, Q
     f, F, noise = np.zeros((n_steps - 1, x.shape[1])), np.zeros_like(P[1:]), np.zeros_like(P[1:])
