@@ -81,6 +81,7 @@ class DelayInterpolator(FrozenModel):
     noise: Float | float = field(init=False, repr=False, compare=False)
     G: Float = field(init=False, repr=False, compare=False)
     shifts: Int = field(init=False, repr=False, compare=False)  # `offsets` as an array
+    delays: Float = field(init=False, repr=False, compare=False)  # the same as floats
 
     def __post_init__(self) -> None:
         instance("correlation", self.correlation, SourceCorrelation)  # type: ignore[type-abstract]  # any
@@ -99,8 +100,8 @@ class DelayInterpolator(FrozenModel):
                 f"loading must be at least 1e-9 for {len(offsets)} taps on this source; got "
                 f"{self.loading}: the correlation matrix is singular"
             )
-        matrices = {"r0": r0, "noise": noise, "G": np.linalg.inv(r), "shifts": np.array(offsets)}
-        for name, matrix in matrices.items():
+        arrays = (r0, noise, np.linalg.inv(r), np.array(offsets), np.array(offsets, np.float64))
+        for name, matrix in zip(("r0", "noise", "G", "shifts", "delays"), arrays, strict=True):
             matrix.setflags(write=False)
             object.__setattr__(self, name, matrix)
 
@@ -131,20 +132,20 @@ class DelayInterpolator(FrozenModel):
         both = np.empty((*lags.shape[:-1], 2, lags.shape[-1]))
         both[..., 0, :] = p = self.correlation.rho(lags)
         both[..., 1, :] = self.correlation.drho(lags)
-        both = both @ self.G
+        both = both.dot(self.G) if lags.ndim == 1 else both @ self.G
         return both, self._error(both[..., 0, :], p, noise_ratio)
 
     def _lags(self, tau: ArrayLike) -> Float:
-        return np.asarray(np.asarray(tau, dtype=np.float64)[..., None] - self.shifts)
+        return np.asarray(np.asarray(tau, dtype=np.float64)[..., None] - self.delays)
 
     def _solved(self, p: Float) -> Float:
-        return np.asarray((p[..., None, :] @ self.G)[..., 0, :])
+        return np.asarray(p @ self.G)
 
     def _error(self, c: Float, p: Float, noise_ratio: float) -> Float:
-        mixed = (c[..., None, :] @ self.r0)[..., 0, :] - 2 * p
-        noise = c if self.noise_filter is None else (c[..., None, :] @ self.noise)[..., 0, :]
+        mixed = c.dot(self.r0) - 2 * p
+        noise = c if self.noise_filter is None else c.dot(self.noise)
         mixed += noise_ratio * noise
-        return np.asarray(1 + (mixed * c).sum(axis=-1))
+        return np.asarray(1 + (mixed.dot(c) if c.ndim == 1 else (mixed * c).sum(axis=-1)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,7 +239,7 @@ class InterpolationDelay(MeasurementModel):
                 f"k must have all taps within the {frames.shape[-2]} snapshots; got {k}"
             )
         n, m = self.dim_z, self.baseline
-        first, source = (m, 0) if m > 0 else (0, -m)
+        first, source = max(m, 0), max(-m, 0)
         taps = frames[..., source : source + n].take(k - self.interpolator.shifts, axis=-2)
         return frames[..., k, first : first + n], np.swapaxes(taps, -1, -2)
 
@@ -246,8 +247,7 @@ class InterpolationDelay(MeasurementModel):
         """Return c(mΔ) with c'(mΔ), (..., 2, n_taps), and R(mΔ), (...), for delays (...)."""
         tau = self.baseline * np.asarray(delay)
         taps, error = self.interpolator.linearise(tau, self.noise_ratio)
-        noise_filter = self.interpolator.noise_filter
-        if noise_filter is not None:
+        if (noise_filter := self.interpolator.noise_filter) is not None:
             # residuals are correlated: those of 1 / share samples count as one
             error = error / noise_filter.noise_share
         return taps, self.inflation * (self.noise_ratio + error)

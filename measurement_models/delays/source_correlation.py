@@ -153,6 +153,7 @@ class Tones(SourceCorrelation):
     powers: Sequence[float] | None = None
     omega: Float = field(init=False, repr=False, compare=False)
     shares: Float = field(init=False, repr=False, compare=False)
+    slopes: Float = field(init=False, repr=False, compare=False)  # -p ω
 
     def __post_init__(self) -> None:
         frequencies = tuple(np.ravel(real("frequencies", self.frequencies)).tolist())
@@ -172,6 +173,7 @@ class Tones(SourceCorrelation):
         shares = np.ones(len(frequencies)) if self.powers is None else np.asarray(self.powers)
         object.__setattr__(self, "omega", 2 * np.pi * np.asarray(frequencies))
         object.__setattr__(self, "shares", shares / shares.sum())
+        object.__setattr__(self, "slopes", -self.shares * self.omega)
 
     @property
     def highest(self) -> float:
@@ -189,7 +191,7 @@ class Tones(SourceCorrelation):
 
     def drho(self, tau: ArrayLike) -> Float:
         """Return -Σ p ω sin ωτ."""
-        return spectral_sum(np.sin, tau, self.omega, -self.shares * self.omega)
+        return spectral_sum(np.sin, tau, self.omega, self.slopes)
 
 
 @dataclass(frozen=True)
@@ -261,5 +263,5 @@ def spectral_sum(wave: np.ufunc, tau: ArrayLike, omega: Float, weights: Float) -
     """
     tau = np.asarray(tau, dtype=np.float64)
     if len(omega) == 1:
-        return np.asarray(weights[0] * wave(omega[0] * tau))
+        return np.asarray(weights.item() * wave(omega.item() * tau))
     return np.asarray((wave(tau[..., None] * omega) * weights).sum(axis=-1))

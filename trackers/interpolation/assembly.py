@@ -9,6 +9,7 @@ import numpy as np
 from arrivals.measurement_models.delays.delay_line import SourceAtCentre
 from arrivals.motion_models.base import MotionModel
 from arrivals.parameters import FrozenModel
+from arrivals.trackers.gaussian.equations import predict_gaussian
 from arrivals.trackers.interpolation.gating import gate_limit, updated_misfit, widened
 from arrivals.trackers.interpolation.updates import (
     DelayObservation,
@@ -141,7 +142,7 @@ class FilterAssembly(FrozenModel):
         if error.M is None:
             return ErrorCovariance(P)
         n = error.M.shape[-1]
-        M = F[:n, :n] @ error.M @ F[:n, :n].T + Q[:n, :n]
+        M = predict_gaussian(error.M, F[:n, :n], Q[:n, :n])
         return ErrorCovariance(P, widened(M, missing, self.largest_variance))
 
     def updated_error(
@@ -159,6 +160,8 @@ class FilterAssembly(FrozenModel):
 
     def limit(self, P: Float, n: int, misfit: Float) -> Float | None:
         """Return the limit of the residuals of snapshot n."""
+        if self.gate is None:
+            return None
         return gate_limit(self.gate, misfit, P[..., 0, 0], self.stage(n).gated_variance)
 
     def _replay(self, x: Float, P: Float, frames: Float) -> tuple[Float, Float]:

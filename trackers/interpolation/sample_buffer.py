@@ -90,8 +90,9 @@ class SampleBuffer:
                 # the first samples were outliers, or silence
                 quiet = np.nanmax(square, axis=-1, initial=0.0) * factor**2 < mean
                 energy = np.where(quiet, energy / 2, energy)
-        n_valid = np.isfinite(frame).sum(axis=-1)
-        complete = n_valid.min() == frame.shape[-1]
+        valid = np.isfinite(frame)
+        complete = bool(valid.all())
+        n_valid = np.full(valid.shape[:-1], valid.shape[-1]) if complete else valid.sum(axis=-1)
         n_samples, misfit = self.n_samples + n_valid, self.misfit
         if not (misfit < np.inf).all():
             enough = n_samples >= ACQUISITION * frame.shape[-1]

@@ -22,12 +22,13 @@ from arrivals.motion_models.base import MotionModel
 from arrivals.parameters import FrozenModel
 from arrivals.trackers.gaussian.equations import predict_gaussian, update_scalar
 from arrivals.trackers.gaussian.gains import joseph
-from arrivals.trackers.gaussian.linalg import apply, symmetric
+from arrivals.trackers.gaussian.linalg import apply, multiplication, symmetric, transposed
 from arrivals.trackers.interpolation.error_covariance import ScoreTable
 from arrivals.trackers.interpolation.gating import is_used
 from arrivals.typing import Bool, Float
 
 Order: TypeAlias = bool | Literal["frozen", "literal"]  # `sequential_update` of `Variant`
+NO_RESIDUAL, ALL_USED = np.empty(0), np.empty(0, dtype=np.bool_)  # nothing is judged by them
 MAX_PHASE_STD = 0.35  # rad: of the phase of a baseline longer than 1, so that no cycle is lost
 
 
@@ -45,7 +46,7 @@ class DelayUpdate(NamedTuple):
     x: Float
     P: Float
     e: Float  # of the first baseline, (..., n); NaN where there is none
-    used: Bool
+    used: Bool  # both empty where there is no limit
 
 
 @lru_cache(maxsize=128)
@@ -144,15 +145,15 @@ class PairwiseUpdate(FrozenModel):
                 e, H, R, used = self._residuals(
                     x, P, model, z[..., sensors], X[..., sensors, :], limit
                 )
-                if model is self.baseline_models[0]:
+                if limit is not None and model is self.baseline_models[0]:
                     first_baseline.append((e, used))
                 if not used.all():
                     e, H = np.where(used, e, 0.0), np.where(used, H, 0.0)
                 # K = P H' (H P H' + R)^-1, x = x + K e, P = P - K H P   (20)-(23)
                 x, P = update_scalar(x, P, e, H, R)
-                x[..., 0] = np.clip(x[..., 0], -self.kappa, self.kappa)
-        if len(first_baseline) == 1:
-            return DelayUpdate(x, P, *first_baseline[0])
+                x[..., 0] = self._clipped(x[..., 0])
+        if limit is None:
+            return DelayUpdate(x, P, NO_RESIDUAL, ALL_USED)
         e, used = (np.concatenate(each, axis=-1) for each in zip(*first_baseline, strict=True))
         return DelayUpdate(x, P, e, used)
 
@@ -170,7 +171,7 @@ class PairwiseUpdate(FrozenModel):
             for j in range(model.dim_z):
                 # K = P H / (H P H + R), Δ = Δ + K e, P = P - K H P   (20)-(23)
                 x, P = update_scalar(x, P, e[..., j : j + 1], H[..., j : j + 1], R)
-                x[..., 0] = np.clip(x[..., 0], -self.kappa, self.kappa)
+                x[..., 0] = self._clipped(x[..., 0])
         assert first_baseline is not None
         return DelayUpdate(x, P, *first_baseline)
 
@@ -214,12 +215,19 @@ class PairwiseUpdate(FrozenModel):
         """Return residuals, slopes and variance of a baseline, and which are used."""
         # c(mΔ), c'(mΔ) (4), R(mΔ)
         taps, R = model.linearise(x[..., 0])
-        predicted = taps @ np.swapaxes(X, -1, -2)  # c'X and c''X, (..., 2, n)
+        predicted = multiplication(taps)(taps, transposed(X))  # c'X and c''X, (..., 2, n)
         e, H = z - predicted[..., 0, :], model.baseline * predicted[..., 1, :]
-        used = is_used(e, H * H * P[..., :1, 0] + R[..., None], limit)
+        if limit is None:
+            used = np.isfinite(e)
+        else:
+            used = is_used(e, H * H * P[..., :1, 0] + R[..., None], limit)
         if abs(model.baseline) > 1:
             used &= self._is_unambiguous(model.baseline, P)[..., None]
         return e, H, R, used
+
+    def _clipped(self, delay: Float) -> Float:
+        """Return delays within ±κ."""
+        return np.maximum(np.minimum(delay, self.kappa), -self.kappa)  # a third of np.clip's time
 
     def _is_unambiguous(self, baseline: int, P: Float) -> Bool:
         """Return True where the phase of a baseline is known to a fraction of a cycle."""

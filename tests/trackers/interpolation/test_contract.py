@@ -312,7 +312,7 @@ def test_run_of_an_array_equals_run_of_its_rows(variant: str, gap: str) -> None:
     rows = {"none": slice(0), "snapshots": slice(9, 14), "at the end": slice(-3, None)}
     z[rows.get(gap, slice(None))] = np.nan
     block, steps = made(variant), made(variant)
-    ours, theirs = block.run(z, dt=0.5), steps.run(list(z), dt=0.5)
+    ours, theirs = block.run(z), steps.run(list(z))
     for name in ("doa", "std", "x", "time", "label", "existence", "converged", "iterations"):
         np.testing.assert_array_equal(getattr(ours, name), getattr(theirs, name), err_msg=name)
     for name in (*NAMES, "x", "P"):
