@@ -194,13 +194,24 @@ def select_sources(
     max_sources : int
         Largest number where it is selected; at most one for three readings.
     """
+    searched = empty.thinned()
     if n_sources is None:
         max_sources = min(max_sources, carried_sources(len(empty.problem.W)))
-        return best_model(forward_selection(empty, new, max_sources, PATIENCE), new)
+        best = best_model(forward_selection(searched, new, max_sources, PATIENCE), new)
+        if searched is empty:
+            return best
+        found = best.at_sensors_of(empty)
+        larger = forward_selection(found, new, max_sources, PATIENCE)
+        best = max(larger, key=lambda candidate: candidate.log_evidence_of_set)
+        return best if best is found else local_search(best, new, same_number=False)
     warn_few_readings(len(empty.problem.W), n_sources)
-    candidates = forward_selection(empty, new, n_sources)
+    candidates = forward_selection(searched, new, n_sources)
+    best = local_search(candidates[n_sources], new, same_number=True)
+    if searched is not empty:
+        candidates = [each.at_sensors_of(empty) for each in candidates]
+        best = best.at_sensors_of(empty)
     warn_unsupported_sources([one.log_evidence_of_set for one in candidates], n_sources)
-    return local_search(candidates[n_sources], new, same_number=True)
+    return best
 
 
 def new_beliefs(

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from arrivals.measurement_models import LogNormalRSS, db_to_neper
+from arrivals.measurement_models.signal_strength.path_loss import PropagationModel
 from arrivals.motion_models import ConstantVelocity, RandomWalk
 from arrivals.scenarios.reproduce.rss.birth_death import (
     gospa_over_time,
@@ -15,6 +16,7 @@ from arrivals.scenarios.reproduce.rss.birth_death import (
 from arrivals.scenarios.simulations.moving_emitters import BirthsAndDeaths
 from arrivals.scenarios.simulations.signal_strength import in_disc
 from arrivals.trackers import RSSML, RSSVB, AmplitudePrior
+from arrivals.trackers.rss.detection import select_sources
 from arrivals.trackers.rss.inference.joint_posterior import JointPosterior, Prior
 from arrivals.trackers.rss.model_order.grid_search import NewSourcePrior, grid_search
 from arrivals.trackers.rss.model_order.model_selection import (
@@ -207,3 +209,33 @@ def test_new_sources_join_known_ones() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert tracker.label[:2].tolist() == [0, 1]
+
+
+def test_search_in_many_sensors_ends_at_the_maximum_of_all_readings() -> None:
+    rng = np.random.default_rng(0)
+    model = PropagationModel(rng.uniform(-100.0, 100.0, (9000, 2)), log_noise=4.6)
+    truth = np.array([[-40.0, 10.0], [30.0, 50.0]])
+    xi = model.levels(np.array([9.0, 9.2]), truth).log_sigma + 0.1 * rng.normal(size=9000)
+    new = NewSourcePrior.among(model.sensors, mu=9.2, v=0.12)
+    empty = no_source(model, xi, np.full(9000, 100.0))
+    few = empty.thinned()
+    assert few is not empty
+    assert len(few.problem.W) == 2250
+    assert few.thinned() is few
+    for n_sources in (2, None):
+        best = select_sources(empty, new, n_sources, 4)
+        assert best.problem.W.shape == (9000,)
+        again = best.refitted()
+        np.testing.assert_allclose(again.theta, best.theta, atol=1e-4)
+        np.testing.assert_allclose(best.theta[best.theta[:, 0].argsort()], truth, atol=0.5)
+
+
+def test_source_that_only_all_readings_show_is_added() -> None:
+    rng = np.random.default_rng(2)
+    model = PropagationModel(rng.uniform(-100.0, 100.0, (20_000, 2)), log_noise=4.6)
+    truth = np.array([[-40.0, 10.0], [30.0, 50.0]])
+    xi = model.levels(np.array([9.0, 6.9]), truth).log_sigma + rng.normal(size=20_000)
+    new = NewSourcePrior.among(model.sensors, mu=8.0, v=4.0)
+    empty = no_source(model, xi, np.full(20_000, 1.0))
+    assert len(best_model(forward_selection(empty.thinned(), new, 3), new).u) == 1
+    assert len(select_sources(empty, new, None, 3).u) == 2

@@ -13,10 +13,11 @@ from arrivals.trackers.rss.settings import GridSearch
 from arrivals.typing import Float, Int
 
 MAX_MINIMA = 3  # minima over the grid that are refined
-MAX_SENSORS = 2000  # in a grid search, taken at equal spacing from all
-CHUNK_SIZE = 2_000_000  # numbers in one array of the grid search
+SEARCHED_SENSORS = 2000  # of a search for sources, taken at equal spacing from all
+CHUNK_SIZE = 300_000  # numbers in one array of the grid search
 AMPLITUDE_STEP = 0.35  # Np, 3 dB: largest step between the amplitudes that the search starts from
 MAX_AMPLITUDES = 201
+MAX_EXPONENT = 340.0  # of powers over those of the readings: 1500 dB
 AMPLITUDE_STEPS = 3  # Gauss-Newton steps from there
 
 
@@ -83,6 +84,27 @@ class NewSourcePrior:
         )  # fmt: skip
 
 
+def thinning(n_sensors: int) -> int:
+    """Return the step between the sensors of a search: between 2000 and 4000 of them, or all.
+
+    Examples
+    --------
+    >>> thinning(3999), thinning(100_000)
+    (1, 50)
+    """
+    return max(1, n_sensors // SEARCHED_SENSORS)
+
+
+def thinned(problem: JointPosterior) -> JointPosterior:
+    """Return a problem without a batch axis at some sensors; itself if there are not too many."""
+    step = thinning(problem.W.shape[-1])
+    if step == 1:
+        return problem
+    rows = slice(None, None, step)
+    propagation = problem.propagation.at_sensors(rows)
+    return problem._replace(propagation=propagation, xi=problem.xi[rows], W=problem.W[rows])
+
+
 def grid_search(
     problem: JointPosterior, log_sigma: Float, new: NewSourcePrior
 ) -> list[tuple[float, Float]]:
@@ -103,13 +125,13 @@ def grid_search(
         The best amplitudes at the lowest local minima over the grid, in ascending order.
     """
     valid = np.flatnonzero(problem.W > 0)
-    valid = valid[:: max(1, len(valid) // MAX_SENSORS)]
+    valid = valid[:: thinning(len(valid))]
     propagation = problem.propagation
     gain = np.zeros(len(problem.W)) + np.atleast_2d(propagation.log_gain)[0]
     readings = problem.xi[valid], problem.W[valid], log_sigma[valid]
     grid = new.grid
     u, cost = np.empty(len(grid)), np.empty(len(grid))
-    size = max(1, CHUNK_SIZE // (len(valid) * len(new.log_amplitudes)))
+    size = max(1, CHUNK_SIZE // len(valid))
     for first in range(0, len(grid), size):
         points = slice(first, first + size)
         geometry = offsets(grid[points], propagation.sensors[valid], propagation.r_min)
@@ -147,37 +169,46 @@ def best_amplitudes(
     >>> u.round(6), cost.round(6)
     (array([2.]), array([2.]))
     """
-
-    def evaluate(u: Float) -> tuple[Float, Float, Float]:
-        level = u[..., None] - loss
-        log_sigma = 0.5 * np.logaddexp(2 * floor, 2 * level)
-        r = xi - log_sigma
-        cost = (r * r) @ W + (u - new.mu) ** 2 / new.v
-        return cost, r, np.exp(2 * (level - log_sigma))
-
     if np.isneginf(floor).all():
         # u = (Σ W (ξ + loss) + μ/v) / (Σ W + 1/v)
         u = ((xi + loss) @ W + new.mu / new.v) / (W.sum() + 1 / new.v)
-        return u, evaluate(u)[0]
-    rows = np.arange(len(loss))
-    starts = np.broadcast_to(new.log_amplitudes[:, None], (len(new.log_amplitudes), len(loss)))
-    costs, residuals, parts = evaluate(starts)
-    best = costs.argmin(axis=0)
-    u, cost, r, lam = (
-        starts[best, rows],
-        costs[best, rows],
-        residuals[best, rows],
-        parts[best, rows],
-    )
+        return u, np.square(xi + loss - u[:, None]) @ W + (u - new.mu) ** 2 / new.v
+    # powers over those of the readings, e^{2ξ}: of the levels without the source, and of a source
+    # of amplitude μ, so that each amplitude takes one logarithm
+    noise, gain = bounded_exp(2 * (floor - xi)), bounded_exp(2 * (new.mu - xi - loss))
+
+    def evaluate(u: Float) -> tuple[Float, Float, Float]:
+        total = bounded_exp(2 * (u - new.mu))[..., None] * gain
+        total += noise
+        r = np.log(total)
+        r *= -0.5
+        return np.square(r) @ W + (u - new.mu) ** 2 / new.v, r, total
+
+    starts = new.log_amplitudes
+    costs = np.stack([evaluate(start)[0] for start in starts[:, None]])
+    u = starts[costs.argmin(axis=0)]
+    cost, r, total = evaluate(u)
     for _ in range(AMPLITUDE_STEPS):
+        lam = bounded_exp(2 * (u - new.mu))[:, None] * gain
+        lam /= total
         # Gauss-Newton: Δu = (Σ W λ r + (μ - u)/v) / (Σ W λ² + 1/v)
-        step = ((lam * r) @ W + (new.mu - u) / new.v) / ((lam * lam) @ W + 1 / new.v)
-        after, r_after, lam_after = evaluate(u + step)
+        step = ((lam * r) @ W + (new.mu - u) / new.v) / (np.square(lam) @ W + 1 / new.v)
+        after, r_after, total_after = evaluate(u + step)
         lower = after < cost
         u, cost = np.where(lower, u + step, u), np.where(lower, after, cost)
-        r = np.where(lower[:, None], r_after, r)
-        lam = np.where(lower[:, None], lam_after, lam)
+        r[lower], total[lower] = r_after[lower], total_after[lower]
     return u, cost
+
+
+def bounded_exp(x: Float) -> Float:
+    """Return the exponentials, of numbers within ±MAX_EXPONENT: two of them have a product.
+
+    Examples
+    --------
+    >>> bounded_exp(np.array([0.0, 1e9])).round(-146)
+    array([0.00000000e+000, 4.00000000e+147])
+    """
+    return np.exp(np.maximum(np.minimum(x, MAX_EXPONENT), -MAX_EXPONENT))
 
 
 def local_minima(cost: Float) -> Int:

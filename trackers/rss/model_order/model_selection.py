@@ -13,7 +13,7 @@ from arrivals.measurement_models.signal_strength.path_loss import Levels, Propag
 from arrivals.trackers.rss.inference.joint_posterior import JointPosterior, Prior, marginals
 from arrivals.trackers.rss.inference.map_search import maximize
 from arrivals.trackers.rss.inference.solution import Marginals, Solution
-from arrivals.trackers.rss.model_order.grid_search import NewSourcePrior, grid_search
+from arrivals.trackers.rss.model_order.grid_search import NewSourcePrior, grid_search, thinned
 from arrivals.typing import Float, Int
 
 MIN_GAIN = 0.1  # of the log evidence by one change of the local search
@@ -109,17 +109,30 @@ class Candidate:
     def enlarged(self, new: NewSourcePrior) -> Candidate:
         """Return the candidate with the source added that lowers Σ W r² most, all refitted.
 
-        The lowest minima over the grid are all tried: near a sensor there are several.
+        The lowest minima over the grid are all tried: near a sensor there are several. Of very
+        many sensors, only the best of them is refitted to all.
         """
         prior = Prior(*(
             np.concatenate(parts) for parts in zip(self.problem.prior, new.prior(1), strict=True)
         ))  # fmt: skip
         problem = self.problem._replace(prior=prior)
+        searched = thinned(problem)
         candidates = [
-            Candidate(problem, np.append(self.u, u), np.vstack([self.theta, theta])).refitted()
+            Candidate(searched, np.append(self.u, u), np.vstack([self.theta, theta])).refitted()
             for u, theta in grid_search(self.problem, self.levels.log_sigma, new)
         ]
-        return max(candidates, key=lambda candidate: candidate.log_evidence)
+        best = max(candidates, key=lambda candidate: candidate.log_evidence)
+        return best if searched is problem else Candidate(problem, best.u, best.theta).refitted()
+
+    def thinned(self) -> Candidate:
+        """Return the same sources at some of the sensors, the same candidate if at all of them."""
+        searched = thinned(self.problem)
+        return self if searched is self.problem else Candidate(searched, self.u, self.theta)
+
+    def at_sensors_of(self, other: Candidate) -> Candidate:
+        """Return the same sources refitted to the readings of another candidate."""
+        problem = other.problem._replace(prior=self.problem.prior)
+        return Candidate(problem, self.u, self.theta).refitted()
 
 
 def no_source(propagation: PropagationModel, xi: Float, W: Float) -> Candidate:
@@ -129,14 +142,14 @@ def no_source(propagation: PropagationModel, xi: Float, W: Float) -> Candidate:
 
 
 def forward_selection(
-    empty: Candidate, new: NewSourcePrior, n: int, patience: int | None = None
+    start: Candidate, new: NewSourcePrior, n: int, patience: int | None = None
 ) -> list[Candidate]:
-    """Return candidates of 0 to n sources, each the previous one with a source added.
+    """Return candidates of up to n sources, each the previous one with a source added.
 
     Parameters
     ----------
-    empty : Candidate
-        The candidate without a source.
+    start : Candidate
+        The first candidate, usually without a source.
     new : NewSourcePrior
     n : int
         Largest number of sources.
@@ -162,8 +175,8 @@ def forward_selection(
     array([[-40.,  10.],
            [ 30.,  50.]])
     """
-    candidates = [empty]
-    while len(candidates) <= n:
+    candidates = [start]
+    while len(candidates[-1].u) < n:
         evidence = [candidate.log_evidence_of_set for candidate in candidates]
         if patience is not None and len(candidates) - 1 - int(np.argmax(evidence)) >= patience:
             break
