@@ -21,7 +21,7 @@ from arrivals.trackers.rss.arguments import (
     initial_sources,
     warn_initial,
 )
-from arrivals.trackers.rss.batch import BatchStart, run_in_chunks
+from arrivals.trackers.rss.batch import BatchStart, run_apart, run_in_chunks
 from arrivals.trackers.rss.belief import SourceBeliefs, keep_finite
 from arrivals.trackers.rss.doppler import Doppler, check_doppler
 from arrivals.trackers.rss.inference.joint_posterior import JointPosterior
@@ -261,9 +261,9 @@ class RSSTracker(Tracker):
     ) -> list[Run]:
         """Run independent sequences, each from the present state.
 
-        A step of all sequences is one array call, except for sequences of unequal lengths and
-        where sources are or have just been detected, or may appear and disappear. The tracker
-        itself does not change.
+        A step of all sequences is one array call. Sequences of unequal lengths, and those where
+        sources are or have just been detected, or may appear and disappear, run one by one in the
+        processes that `joblib.parallel_config(n_jobs=...)` sets. The tracker does not change.
 
         Parameters
         ----------
@@ -283,7 +283,7 @@ class RSSTracker(Tracker):
         equal = len({len(sequence) for sequence in sequences}) == 1 and len(sequences[0]) > 0
         detected = sources.u.size == 0 or self.settling or self.line is not None
         if self.births or not equal or detected:
-            return super().run_batch(sequences, dt)
+            return run_apart(self, sequences, dt)
         z = np.array([[self.vector(one) for one in sequence] for sequence in sequences])
         tracks = self.current_tracks(len(sources.u))
         return run_in_chunks(

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import copy
 import time
-from collections.abc import Callable
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from arrivals.trackers.estimates import PositionEstimate
 from arrivals.trackers.rss.belief import Entries, SourceBeliefs
@@ -14,6 +16,9 @@ from arrivals.trackers.rss.inference.solution import Diagnostics
 from arrivals.trackers.rss.model_order.track_table import TrackTable
 from arrivals.trackers.run import Run
 from arrivals.typing import Float, Int
+
+if TYPE_CHECKING:
+    from arrivals.trackers.rss.base import RSSTracker
 
 READINGS_PER_CHUNK = 20_000  # in one array call: fits into the cache
 
@@ -65,6 +70,24 @@ def run_in_chunks(
     size = max(1, READINGS_PER_CHUNK // xi.shape[-1])
     chunks = (xi[first : first + size] for first in range(0, len(xi), size))
     return [run for chunk in chunks for run in run_chunk(start, chunk, dt, predict, update)]
+
+
+def run_apart(
+    tracker: RSSTracker, sequences: Sequence[Sequence[ArrayLike | None]], dt: float
+) -> list[Run]:
+    """Run sequences one by one, in as many processes as `joblib.parallel_config` sets.
+
+    Without it all run in this process. What births a sequence has decides how its arrays grow, so
+    that sequences do not share array calls.
+    """
+    from joblib import Parallel, delayed
+
+    calls = (delayed(_run_copy)(tracker, sequence, dt) for sequence in sequences)
+    return list(Parallel()(calls))
+
+
+def _run_copy(tracker: RSSTracker, sequence: Sequence[ArrayLike | None], dt: float) -> Run:
+    return copy.deepcopy(tracker).run(sequence, dt)
 
 
 def run_chunk(

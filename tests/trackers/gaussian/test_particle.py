@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.stats import multivariate_normal
 
 from arrivals.measurement_models import ArraySnapshot, LinearMeasurement, SensorArray
 from arrivals.motion_models import ConstantVelocity, RandomWalk, VonMisesWalk
 from arrivals.motion_models.von_mises import log_density
 from arrivals.trackers import Kalman, Particle
 from arrivals.trackers.conformance import difference
-from arrivals.trackers.gaussian.particle import systematic_resample
+from arrivals.trackers.gaussian.particle import log_normal, systematic_resample
 from arrivals.typing import Float
 
 LINE = ArraySnapshot(SensorArray.ula(4, spacing=0.5), wavelength=1.0, noise=2.0)
@@ -224,3 +225,11 @@ def test_particle_runs_with_velocity_states() -> None:
 def test_seed_that_is_no_whole_number_is_refused(rng: Any) -> None:
     with pytest.raises(TypeError, match="rng must be a numpy Generator or a whole number"):
         Particle(WALK, POSITION, [0.0, 0.0], np.eye(2), 30, rng=rng)
+
+
+def test_log_normal_equals_the_density_of_scipy() -> None:
+    rng = np.random.default_rng(0)
+    A, y = rng.normal(size=(3, 3)), rng.normal(size=(5, 3))
+    R = A @ A.T + np.eye(3)
+    expected = multivariate_normal(np.zeros(3), R).logpdf(y)
+    np.testing.assert_allclose(log_normal(y, R), expected, rtol=1e-12)

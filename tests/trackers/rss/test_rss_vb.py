@@ -1,9 +1,11 @@
 """Tests of the trackers of signal strength: golden case, batches, seeded trials, errors."""
 
+import copy
 from typing import Any
 
 import numpy as np
 import pytest
+from joblib import parallel_config
 
 from arrivals.measurement_models import LogNormalRSS, db_to_neper
 from arrivals.motion_models import ConstantVelocity, CoordinatedTurn, RandomWalk
@@ -279,3 +281,13 @@ def test_fewer_readings_than_unknowns_raise_a_warning() -> None:
 def test_a_start_on_a_sensor_raises_a_warning() -> None:
     with pytest.warns(UserWarning, match="source 1 starts on sensor 3"):
         RSSVB(STILL, MODEL, [[10.0, 10.0], [0.0, 60.0]], 64 * np.eye(2))
+
+
+def test_run_batch_with_births_in_several_workers_equals_single_runs() -> None:
+    tracker = RSSVB(STILL, MODEL, *INITIAL, births=True)
+    rng = np.random.default_rng(0)
+    zs = [[MODEL.draw(np.full(2, 9.2), INITIAL[0][:2], rng) for _ in range(3)] for _ in range(3)]
+    with parallel_config(backend="threading", n_jobs=2):
+        runs = tracker.run_batch(zs)
+    for z, run in zip(zs, runs, strict=True):
+        np.testing.assert_array_equal(run.x, copy.deepcopy(tracker).run(z).x)
