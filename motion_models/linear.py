@@ -134,7 +134,7 @@ class ConstantVelocity(LinearMotionModel):
 
     def Q(self, dt: float = 1.0) -> Float:
         """Return the covariance of white acceleration over `dt`."""
-        return self.q * _unit_noise(self.n_dims, time_step(dt))
+        return _white_acceleration(self.q, self.n_dims, time_step(dt)).copy()
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -234,8 +234,8 @@ def _drift(n: int, dt: float) -> Float:
 
 
 @lru_cache(maxsize=64)
-def _unit_noise(n: int, dt: float) -> Float:
-    return _on_diagonal([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]], n)
+def _white_acceleration(q: float, n: int, dt: float) -> Float:
+    return q * _on_diagonal([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]], n)
 
 
 def _on_diagonal(block: ArrayLike, n: int) -> Float:

@@ -88,7 +88,9 @@ class EKF(FadingMemory, Queries, GaussianFilter):
             R and H, as in `GaussianFilter.update`; or filterpy's: HJacobian, Hx, R, args, hx_args,
             residual, which replace the measurement model in this update.
         """
-        if (arguments or named) and has_functions(arguments, named):
+        if not (arguments or named):
+            super().update(z)  # the usual case
+        elif has_functions(arguments, named):
             update_by_functions(self, z, *arguments, **named)
         else:
             super().update(z, *arguments, **named)

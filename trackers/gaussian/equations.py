@@ -27,7 +27,6 @@ from arrivals.trackers.gaussian.linalg import (
     inverse,
     multiplication,
     symmetric,
-    transposed,
 )
 from arrivals.typing import Bool, Float
 
@@ -70,7 +69,7 @@ def predict_gaussian(P: Float, F: Float, Q: Float, fading: float = 1.0) -> Float
     """
     dot = multiplication(P)
     # P = F P F' + Q   (4.20)
-    FPF = dot(dot(F, P), transposed(F))
+    FPF = dot(dot(F, P), F.mT)
     return (FPF if fading == 1 else fading * FPF) + Q
 
 
@@ -206,14 +205,14 @@ def update_leading(P: Float, A: Float, r: Float) -> tuple[Float, Float]:
     (array([[0.5]]), array([[0.5]]))
     """
     m, k = A.shape[-2:]
-    P_k, AT = P[..., :k], transposed(A)
+    P_k, AT = P[..., :k], A.mT
     ATA = AT @ A
     # A' (A P_kk A' + r I)^-1 = (r I + A'A P_kk)^-1 A': only k x k matrices are factored
     solved = np.linalg.solve(ATA @ P_k[..., :k, :] + r * np.eye(k), np.concatenate([AT, ATA], -1))
     # K = P_k (r I + A'A P_kk)^-1 A'
     K = P_k @ solved[..., :m]
     # P = P - P_k (r I + A'A P_kk)^-1 A'A P_k'
-    return K, symmetric(P - P_k @ solved[..., m:] @ transposed(P_k))
+    return K, symmetric(P - P_k @ solved[..., m:] @ P_k.mT)
 
 
 def smooth_gaussian(x: Float, P: Float, G: Float, dx: Float, dP: Float) -> tuple[Float, Float]:
@@ -248,7 +247,7 @@ def smooth_gaussian(x: Float, P: Float, G: Float, dx: Float, dP: Float) -> tuple
     x = x + apply(G, dx)
     # P = P + G (P_next - P_pred) G'   (8.6)
     dot = multiplication(P)
-    return x, symmetric(P + dot(dot(G, dP), transposed(G)))
+    return x, symmetric(P + dot(dot(G, dP), G.mT))
 
 
 def likelihood(log_likelihood: float) -> float:

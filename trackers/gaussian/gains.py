@@ -20,7 +20,6 @@ from arrivals.trackers.gaussian.linalg import (
     inverse,
     multiplication,
     symmetric,
-    transposed,
 )
 from arrivals.typing import Bool, Float, Int
 
@@ -65,7 +64,7 @@ def kalman_gain(
     """
     dot, n_valid = multiplication(P), H.shape[-2]
     # S = H P H' + R   (4.21)
-    PHT = dot(P, transposed(H))
+    PHT = dot(P, H.mT)
     S = dot(H, PHT) + R
     if missing is not None:
         PHT, S = leave_out(missing, PHT, S)
@@ -99,7 +98,7 @@ def joseph(P: Float, K: Float, H: Float, R: Float) -> Float:
     dot = multiplication(P)
     # P = (I - K H) P (I - K H)' + K R K'   (Bar-Shalom 5.2.3-18)
     I_KH = identity(P.shape[-1]) - dot(K, H)
-    return symmetric(dot(dot(I_KH, P), transposed(I_KH)) + dot(dot(K, R), transposed(K)))
+    return symmetric(dot(dot(I_KH, P), I_KH.mT) + dot(dot(K, R), K.mT))
 
 
 def leave_out(missing: Bool, PHT: Float, S: Float) -> tuple[Float, Float]:

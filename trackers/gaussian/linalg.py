@@ -48,12 +48,12 @@ def multiplication(A: Float) -> Product:
 
 def transposed(A: Float) -> Float:
     """Return Aᵀ of matrices (..., m, n)."""
-    return A.T if A.ndim == 2 else A.swapaxes(-1, -2)
+    return A.mT
 
 
 def symmetric(A: Float) -> Float:
     """Return (A + Aᵀ)/2 of matrices (..., n, n)."""
-    total: Float = A + (A.T if A.ndim == 2 else A.swapaxes(-1, -2))
+    total: Float = A + A.mT
     total *= 0.5
     return total
 
