@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from operator import is_
 from types import SimpleNamespace
 from typing import Any, ClassVar, Self, cast
 
@@ -14,11 +15,11 @@ from arrivals.motion_models.delay import DelayWalk
 from arrivals.trackers.estimates import DirectionEstimate
 from arrivals.trackers.gaussian.arguments import covariance_matrix
 from arrivals.trackers.gaussian.base import GaussianFilter
-from arrivals.trackers.gaussian.equations import update_gaussian
 from arrivals.trackers.gaussian.linearization import Linearization
 from arrivals.trackers.interpolation.assembly import FilterAssembly
 from arrivals.trackers.interpolation.batch import directions, run, run_batch, trajectory
 from arrivals.trackers.interpolation.channel_filters import ChannelFilters
+from arrivals.trackers.interpolation.deferred import Deferring, SnapshotObservation
 from arrivals.trackers.interpolation.gating import widened
 from arrivals.trackers.interpolation.sample_buffer import SampleBuffer, receive, to_snapshot
 from arrivals.trackers.interpolation.updates import DelayObservation, predict, transition
@@ -36,7 +37,7 @@ from arrivals.validation import count, instance, number, positive, shaped, time_
 
 
 @register("interpolation_ekf")
-class InterpolationEKF(GaussianFilter):
+class InterpolationEKF(Deferring, GaussianFilter):
     """Direction of one source from the delay at which neighbours interpolate each other.
 
     Parameters
@@ -71,7 +72,7 @@ class InterpolationEKF(GaussianFilter):
         As in every `GaussianFilter`, one row a sensor. `y` combines the residuals of all
         baselines of a sensor into one measurement of the delay; 0 where no baseline was used. With
         one baseline in one direction, and in "E", it is the residual of the snapshot `latency`
-        steps ago. The samples are scaled to a source of power 1.
+        steps ago. The samples are scaled to a source of power 1. They are computed when read.
     latency : int
         Snapshots between a snapshot and its update.
 
@@ -199,23 +200,24 @@ class InterpolationEKF(GaussianFilter):
         snapshot, prior, error = to_snapshot(z, self.dim_z), P, self.error.of(self.P)
         noise = None if R is None else covariance_matrix("R", R, len(snapshot))
         channels, buffer = receive(self, self.channels, self.buffer, snapshot)
-        samples = buffer.scaled(self.measurement)
-        # y = y_j - c'X (11), H = m c''X, R, one residual a sensor
-        y, H, variance = self._observe(x, P, samples, buffer)
-        # K = P H' (H P H' + R)^-1, x = x + K y, P = P - K H P   (20)-(23)
-        noise_matrix = np.diag(variance) if noise is None else noise
-        update = update_gaussian(x, P, y, H, noise_matrix, np.asarray(~H.any(axis=-1)), self.inv)
+        observation = self._observation(x, P, buffer)
         if noise is None:
-            # the same update, baseline after baseline, or sensor after sensor, with Δ in ±κ
-            x, P, misfit = self.assembly.update(x, P, samples, buffer.n_snapshots, buffer.misfit)
-            update, buffer = update._replace(x=x, P=P), buffer.with_misfit(misfit)
-            self.error = self.assembly.updated_error(error, prior, x, P, buffer.n_snapshots)
+            # baseline after baseline, or sensor after sensor, with Δ in ±κ
+            samples, n = observation.samples, buffer.n_snapshots
+            x, P, misfit = self.assembly.update(x, P, samples, n, buffer.misfit)
+            buffer = buffer.with_misfit(misfit)
+            self.error = self.assembly.updated_error(error, prior, x, P, n)
+        else:
+            update = observation.update(self.inv, noise)
+            x, P = update.x, update.P
         self.channels, self.buffer = channels, buffer
-        if np.isfinite(snapshot).any():
-            self.record_update(snapshot, update)
-        else:  # earlier samples may still update the belief
-            self.set_belief(update.x, update.P)
+        if not np.isfinite(snapshot).any():  # earlier samples may still update the belief
+            self.set_belief(x, P)
             self.record_missed()
+        elif noise is None:
+            self.record_deferred(snapshot, x, P, observation)
+        else:
+            self.record_update(snapshot, update)
 
     @property
     def estimate(self) -> DirectionEstimate:  # type: ignore[override]  # not the state
@@ -245,12 +247,12 @@ class InterpolationEKF(GaussianFilter):
     @property  # type: ignore[misc]  # it follows the samples
     def H(self) -> Float:
         """Slopes of `y`, at the present mean and the newest snapshots, (n_sensors, dim_x)."""
-        return self._present_observation().H
+        return self._present().H
 
     @property  # type: ignore[misc]  # it follows the samples
     def R(self) -> Float:
         """Noise of `y` at the present mean, scaled to a source of power 1."""
-        return np.diag(self._present_observation().R)
+        return np.diag(self._present().R)
 
     @property
     def latency(self) -> int:
@@ -261,7 +263,7 @@ class InterpolationEKF(GaussianFilter):
     def assembly(self) -> FilterAssembly:
         """Models and updates of the variant; the same ones as long as no parameter changes."""
         key = (self.measurement, self.motion, self.variant, self.acquisition, self.gate)
-        if any(a is not b for a, b in zip(key, self._built.key, strict=False)):
+        if not all(map(is_, key, self._built.key)):
             self._built = SimpleNamespace(key=key, assembly=assemble_filter(*key))
         return cast(FilterAssembly, self._built.assembly)
 
@@ -287,14 +289,10 @@ class InterpolationEKF(GaussianFilter):
         """Return the expectation of `y`, 0, and its slopes."""
         return Linearization(np.zeros(self.dim_z), self.H)
 
-    def _present_observation(self) -> DelayObservation:
-        samples = self.buffer.scaled(self.measurement)
-        return self._observe(np.ravel(self.x), self.P, samples, self.buffer)
+    def _present(self) -> DelayObservation:
+        """Return the residuals of the latest snapshot near the present belief."""
+        return self._observation(np.ravel(self.x), self.P, self.buffer).linearized()
 
-    def _observe(
-        self, x: Float, P: Float, samples: Float, buffer: SampleBuffer
-    ) -> DelayObservation:
-        """Return the residuals of the latest snapshot near a belief, in the order of sensors."""
-        grid_index, n = self.measurement.grid_index, max(buffer.n_snapshots, 1)
-        y, H, R = self.assembly.linearize(x, P, samples, n, buffer.misfit)
-        return DelayObservation(y[grid_index], H[grid_index], R[grid_index])
+    def _observation(self, x: Float, P: Float, buffer: SampleBuffer) -> SnapshotObservation:
+        measurement, samples = self.measurement, buffer.scaled(self.measurement)
+        return SnapshotObservation(self.assembly, measurement.grid_index, x, P, samples, buffer)

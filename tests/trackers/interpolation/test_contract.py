@@ -303,22 +303,3 @@ def test_run_batch_with_none_equals_single_runs() -> None:
     z = [*samples()[:5], None, *samples()[6:12]]
     run = made().run_batch([z, z])[1]
     np.testing.assert_allclose(run.x, made().run(z).x, atol=1e-12)
-
-
-@pytest.mark.parametrize("gap", ["none", "snapshots", "at the end", "all"])
-@pytest.mark.parametrize("variant", list(VARIANTS))
-def test_run_of_an_array_equals_run_of_its_rows(variant: str, gap: str) -> None:
-    z = samples()
-    rows = {"none": slice(0), "snapshots": slice(9, 14), "at the end": slice(-3, None)}
-    z[rows.get(gap, slice(None))] = np.nan
-    block, steps = made(variant), made(variant)
-    ours, theirs = block.run(z), steps.run(list(z))
-    for name in ("doa", "std", "x", "time", "label", "existence", "converged", "iterations"):
-        np.testing.assert_array_equal(getattr(ours, name), getattr(theirs, name), err_msg=name)
-    for name in (*NAMES, "x", "P"):
-        a, b = (getattr(tracker, name) for tracker in (block, steps))
-        assert (a is None) == (b is None)
-        if a is not None:
-            np.testing.assert_array_equal(a, b, err_msg=name)
-    after = samples(1)  # the buffers are the same too
-    np.testing.assert_array_equal(block.run(after).x, steps.run(list(after)).x)
