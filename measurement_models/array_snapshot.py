@@ -204,7 +204,7 @@ class ArraySnapshot(SnapshotNoise):
         if self.unknowns != "azimuth":
             raise ValueError(f"{method} requires unknowns='azimuth'; got {self.unknowns!r}")
 
-    @property
+    @cached_property
     def waves(self) -> PlaneWaves:
         """Response of the array to plane waves."""
         parts = self.response, self.slowness, self.elevation

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.manifolds.manifold import Manifold
-from arrivals.measurements import SMALLEST, numbers
+from arrivals.measurements import LARGEST, SMALLEST, numbers
 from arrivals.typing import Bool, Complex, Float
 
 MISSING = complex(np.nan, np.nan)
@@ -109,6 +109,10 @@ def complex_snapshot(z: ArrayLike | None, shape: tuple[int, ...]) -> Complex:
     >>> complex_snapshot([1.0, np.inf, 1e-200], (3,))
     array([ 1. +0.j, nan+nanj,  0. +0.j])
     """
+    if type(z) is np.ndarray and z.dtype == np.complex128 and z.shape == shape:
+        size = _size(z)
+        if size.min() >= SMALLEST and size.max() < LARGEST:
+            return z.copy()  # the usual case
     array = numbers("z", np.nan if z is None else z)
     if array.shape != shape:
         if array.size and np.isnan(array).all():
@@ -116,10 +120,15 @@ def complex_snapshot(z: ArrayLike | None, shape: tuple[int, ...]) -> Complex:
         axes = "" if len(shape) == 1 else " in every bin and snapshot"
         raise ValueError(f"z must have shape {shape}, one number a sensor{axes}; got {array.shape}")
     array = array.astype(np.complex128)
-    size = np.abs(array)
+    size = _size(array)
     if not (size >= SMALLEST).all():
         array[size < SMALLEST], array[np.isnan(size)] = 0, MISSING
     return array
+
+
+def _size(z: Complex) -> Float:
+    with np.errstate(over="ignore"):  # at the end of the range
+        return np.abs(z)
 
 
 def merge_noise(noise: Float, bins: Bool, values: Float | None) -> Float:

@@ -177,12 +177,14 @@ class DirectionTracker(Tracker):
             Estimated noise variance of one sensor.
         """
         doa = np.asarray(doa, dtype=np.float64)
-        n, unknown = len(doa), np.full(len(doa), complex(np.nan, np.nan))
+        n, unknown = len(doa), np.full(len(doa), np.nan)
+        if amplitude is None:
+            amplitude = np.full(n, complex(np.nan, np.nan))
         estimate = DirectionEstimate(
             doa=doa,
-            std=np.asarray(unknown.real if std is None else std, np.float64),
-            existence=np.asarray(unknown.real if existence is None else existence, np.float64),
-            amplitude=np.asarray(unknown if amplitude is None else amplitude, np.complex128),
+            std=np.asarray(unknown if std is None else std, np.float64),
+            existence=np.asarray(unknown if existence is None else existence, np.float64),
+            amplitude=np.asarray(amplitude, np.complex128),
             label=np.full(n, -1) if label is None else np.asarray(label, np.int64),
             converged=converged,
             iterations=iterations,
@@ -204,7 +206,7 @@ class DirectionTracker(Tracker):
         self.x = padded(values.ravel(), n * d, np.nan)
         blocks = np.zeros((n, d, n, d))
         index = np.arange(len(values[:n]))
-        blocks[index, :, index] = np.nan_to_num(covariance[:n], posinf=np.inf)
+        blocks[index, :, index] = np.where(np.isnan(covariance[:n]), 0.0, covariance[:n])
         self.P = blocks.reshape(n * d, n * d)
 
     def report_directions(

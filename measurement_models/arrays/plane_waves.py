@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -73,10 +74,15 @@ class PlaneWaves(FrozenModel):
         """Centroid of the sensors, m."""
         return np.asarray(self.array.positions.mean(axis=0))
 
-    @property
+    @cached_property
     def wavenumber(self) -> Float:
         """2π/λ of the bins, rad/m."""
         return 2 * np.pi / np.asarray(self.wavelengths)
+
+    @cached_property
+    def _propagation(self) -> Complex:
+        """j 2π/λ of the bins, (n_bins, 1, 1)."""
+        return 1j * self.wavenumber[:, None, None]
 
     @property
     def n_nuisance(self) -> int:
@@ -94,16 +100,17 @@ class PlaneWaves(FrozenModel):
             axes = [flat * np.cos(angle), flat * np.sin(angle)]
             axes += [np.sin(height)[:, None] + 0 * angle] * (self.array.dim - 2)
             u = np.stack(axes, axis=-1)
-        factors = np.ones(1) if self.slowness is None else np.asarray(self.slowness)
-        return np.asarray(factors[:, None, None] * u)
+        if self.slowness is None:
+            return u[None] if self.is_line else u
+        return np.asarray(np.asarray(self.slowness)[:, None, None] * u)
 
     def steering(self, angle: ArrayLike, origin: Float | float = 0.0) -> Complex:
         """Return responses to angles (n,), phases counted at `origin`: (n_nuisance, F, M, n).
 
         The angle of a line runs over the circle: beyond endfire come its mirror images.
         """
-        path = (self.array.positions - origin) @ np.swapaxes(self.directions(angle), 1, 2)
-        a = np.exp(1j * self.wavenumber[:, None, None] * path[:, None])
+        path = (self.array.positions - origin) @ self.directions(angle).swapaxes(1, 2)
+        a = np.exp(self._propagation * path[:, None])
         if self.response is not None:
             a = a * np.swapaxes(self.response(angle), 1, 2)
         return np.asarray(a)

@@ -81,8 +81,11 @@ class SnapshotGate:
 
     def snapshots(self, z: ArrayLike | None) -> Complex:
         """Return a measurement with the axes of a `Manifold`: (n_bins, n_sensors, n_snapshots)."""
-        rows = self.snapshot(z).reshape(self.n_bins, self.n_snapshots, self.shape[-1])
-        return np.swapaxes(rows, 1, 2)
+        return self.with_all_axes(self.snapshot(z))
+
+    def with_all_axes(self, z: Complex) -> Complex:
+        """Return the result of `snapshot` as (n_bins, n_sensors, n_snapshots)."""
+        return z.reshape(self.n_bins, self.n_snapshots, self.shape[-1]).swapaxes(1, 2)
 
     def observe(
         self, z: ArrayLike | None, reference: Reference = "middle"

@@ -54,9 +54,9 @@ def plane_wave_responses(model: ArraySnapshot, directions: Float) -> Complex:
     >>> plane_wave_responses(model, np.zeros(3)).shape
     (1, 2, 5, 3)
     """
-    doa, *others = np.atleast_2d(directions)
-    if not others:
-        return model.waves.steering(doa)
+    if directions.ndim == 1 or len(directions) == 1:
+        return model.waves.steering(directions.ravel())
+    doa, *others = directions
     a = model.steering_vector(doa, *others).reshape(len(doa), model.n_bins, model.array.n_sensors)
     return np.moveaxis(a, 0, -1)[None]
 
@@ -224,18 +224,17 @@ def root_mean_amplitudes(model: ArraySnapshot, directions: Float, Y: Complex) ->
     """
     if directions.size == 0:
         return np.zeros(0, dtype=np.complex128)
-    valid = ~np.isnan(Y)
-    y = np.where(valid, Y, 0)
     A = plane_wave_responses(model, directions)
     A = A[0] if len(A) == 1 else strongest(A, [mean_beam_power(a[None], Y) for a in A])
-    AH = np.swapaxes(A.conj(), 1, 2)
-    if valid.all():  # normal equations of a bin, (n_bins, K, K)
-        w = np.linalg.solve(_loaded(AH @ A), AH @ y)
+    AH, missing = A.conj().swapaxes(1, 2), np.isnan(Y)
+    if not missing.any():  # normal equations of a bin, (n_bins, K, K)
+        w, n_valid = np.linalg.solve(_loaded(AH @ A), AH @ Y), len(Y) * Y.shape[2]
     else:  # of each snapshot, (n_bins, n_snapshots, K, K)
+        valid, y = ~missing, np.where(missing, 0, Y)
         products = np.einsum("fkm,fmn,fml->fnkl", AH, valid, A, optimize=True)
         right = np.swapaxes(AH @ y, 1, 2)[..., None]
         w = np.swapaxes(np.linalg.solve(_loaded(products), right)[..., 0], 1, 2)
-    n_valid = max(int(valid.any(axis=1).sum()), 1)
+        n_valid = max(int(valid.any(axis=1).sum()), 1)
     return np.asarray(np.sqrt((w.real**2 + w.imag**2).sum(axis=(0, 2)) / n_valid) + 0j)
 
 
@@ -266,5 +265,7 @@ def strongest(A: Complex, power: ArrayLike) -> Complex:
 def _loaded(G: Complex) -> Complex:
     """Return Gram matrices with 1e-12 of their mean diagonal added: equal waves share."""
     K = G.shape[-1]
-    mean = np.trace(G, axis1=-2, axis2=-1).real / K
-    return np.asarray(G + np.maximum(1e-12 * mean, TINY)[..., None, None] * np.eye(K))
+    loaded = G.reshape(*G.shape[:-2], -1).copy()
+    diagonal = loaded[..., :: K + 1]
+    diagonal += np.maximum(1e-12 / K * diagonal.real.sum(axis=-1, keepdims=True), TINY)
+    return loaded.reshape(G.shape)

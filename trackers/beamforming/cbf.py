@@ -155,7 +155,7 @@ class CBF(DirectionTracker):
         """Return the spectrum of a step at directions (n_unknowns, n); on the grid if None."""
         model = self.measurement
         if not model.is_plain:
-            return self.block_spectrum(model.snapshots(z), directions)
+            return self.block_spectrum(model.with_all_axes(z), directions)
         if directions is None:
             return self.spectrum(scan_rows(model, self.grid), z)
         return self.spectrum(model.steering_vector(*directions), z)
@@ -165,7 +165,7 @@ class CBF(DirectionTracker):
         model = self.measurement
         if model.is_plain:
             return self.amplitudes(model.steering_vector(*directions), z)
-        return self.block_amplitudes(directions, model.snapshots(z))
+        return self.block_amplitudes(directions, model.with_all_axes(z))
 
     def block_spectrum(self, Y: Complex, directions: Float | None = None) -> Float:
         """Return the mean power of several bins and snapshots.

@@ -170,7 +170,7 @@ def has_enough_data(weights: Float) -> Bool:
     array([ True, False,  True, False])
     """
     largest = weights.max()
-    return np.asarray(weights >= (MIN_RELATIVE_WEIGHT * largest if largest > 0 else np.inf))
+    return weights >= (MIN_RELATIVE_WEIGHT * largest if largest > 0 else np.inf)
 
 
 def used_data(weights: Float) -> tuple[Bool, Bool | None]:

@@ -61,6 +61,8 @@ class PatternSums:
     @property
     def sensor_weights(self) -> Float:
         """Sum of the weights of the data of each sensor, ([n_bins,] n_sensors)."""
+        if len(self.valid) == 1:  # the usual case
+            return np.asarray(self.weights[0, ..., None] * self.valid[0])
         return np.asarray(self.weights.T @ self.valid)
 
     @property
@@ -109,6 +111,13 @@ class PatternSums:
         """Return the sums with the snapshots of a step: one product for each set and bin."""
         bins, M = self.weights.shape[1:], z.shape[-1]
         Y = z.reshape(*bins, -1, M)
+        if len(self.valid) == 1 and self.valid.all():
+            products = Y.swapaxes(-1, -2) @ Y.conj()
+            if not np.isnan(products).any():  # the usual case
+                n = Y.shape[-2]
+                return PatternSums(
+                    self.valid, self.products + products, self.weights + n, self.squared_weight + n
+                )
         is_valid = ~np.isnan(Y)
         has_data = is_valid.any(axis=-1)
         squared_weight = self.squared_weight + has_data.sum(axis=-1)
@@ -187,6 +196,8 @@ class PatternSums:
         sums = self.select(sensors, bins)
         if not sums.valid.all():
             return expected_covariance(sums)
+        if len(sums.weights) == 1:
+            return np.asarray(sums.products[0] / sums.weights[0, ..., None, None])
         weight = sums.weights.sum(axis=0)
         return np.asarray(sums.products.sum(axis=0) / weight[..., None, None])
 

@@ -176,7 +176,7 @@ class MVDR(RunningCovariance, CBF):
         if model.is_plain:
             self.add_snapshot(z)
         else:
-            self.add_block(model.snapshots(z))
+            self.add_block(model.with_all_axes(z))
 
     def spectrum(self, A: Complex, z: Complex) -> Float:
         """Return Capon's spectrum of the covariance."""

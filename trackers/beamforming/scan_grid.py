@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from arrivals.trackers.beamforming.spectrum import find_peaks, parabolic_peak
+from arrivals.trackers.beamforming.spectrum import highest_first, parabolic_peak
 from arrivals.typing import Float
 
 TINY = np.finfo(np.float64).tiny
@@ -117,5 +117,5 @@ class AngleGrid(ScanGrid):
         joined: bool = False,
     ) -> tuple[Float, Float]:
         """Return the vertices of parabolas through the peaks and their neighbours."""
-        index = find_peaks(power, circular=self.circular, joined=joined)[:n]
+        index = highest_first(power, circular=self.circular, joined=joined)[:n]
         return parabolic_peak(self.directions[0], level(power), index)[None], power[index]

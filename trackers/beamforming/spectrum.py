@@ -12,6 +12,8 @@ from arrivals.messages import shown
 from arrivals.typing import Bool, Complex, Float, Int
 from arrivals.validation import one_of, real, shaped
 
+AROUND = np.array([[-1], [0], [1]])  # a peak and its neighbours
+
 
 def scan_directions(array: SensorArray, n: int) -> Float:
     """Return n equally spaced directions: -π/2 to π/2 for a line, the full circle otherwise.
@@ -158,9 +160,20 @@ def find_peaks(power: Float, *, circular: bool, joined: bool = False) -> Int:
     """
     power = _spectrum("power", power)
     one_of("circular", circular, (False, True))
+    return highest_first(power, circular=circular, joined=joined)
+
+
+def highest_first(power: Float, *, circular: bool, joined: bool) -> Int:
+    """Return what `find_peaks` does, of arguments that need no check.
+
+    Examples
+    --------
+    >>> highest_first(np.array([9.0, 1.0, 3.0, 2.0]), circular=False, joined=False)
+    array([0, 2])
+    """
     rise = 1e-9 * power.max()  # the ripple of a flat spectrum is rounding
     peaks = local_maxima(power, circular=circular, joined=joined, rise=rise).nonzero()[0]
-    return np.asarray(peaks[np.argsort(-power[peaks], kind="stable")])
+    return peaks[(-power[peaks]).argsort(kind="stable")]
 
 
 def local_maxima(power: Float, *, circular: bool, joined: bool, rise: float = 0.0) -> Bool:
@@ -179,16 +192,19 @@ def local_maxima(power: Float, *, circular: bool, joined: bool, rise: float = 0.
     -------
     ndarray of bool, shape (..., n_directions)
     """
-    around = np.concatenate([power[..., -1:], power, power[..., :1]], axis=-1)
-    if not circular:  # a line's spectrum is even about its ends
-        around[..., 0], around[..., -1] = power[..., 1], power[..., -2]
-    is_peak = (power > around[..., :-2] + rise) & (power >= around[..., 2:])
-    if joined and not circular and is_peak[..., [0, -1]].any():
-        first, last = power[..., 0], power[..., -1]
-        inner = np.maximum(power[..., 1], power[..., -2]) + rise
+    left, right = power[..., :-1], power[..., 1:]
+    first, last = power[..., 0], power[..., -1]
+    before, after = (last, first) if circular else (right[..., 0], left[..., -1])  # even about ends
+    is_peak = np.empty(power.shape, dtype=np.bool_)
+    np.greater(right, left + rise, out=is_peak[..., 1:])
+    is_peak[..., 0] = first > before + rise
+    is_peak[..., :-1] &= left >= right
+    is_peak[..., -1] &= last >= after
+    if joined and not circular and (is_peak[..., 0] | is_peak[..., -1]).any():
+        inner = np.maximum(before, after) + rise
         at_last = last > first + rise
         is_peak[..., 0], is_peak[..., -1] = ~at_last & (first > inner), at_last & (last > inner)
-    return np.asarray(is_peak)
+    return is_peak
 
 
 def refine_peaks(doa_grid: Float, power: Float, peaks: Int) -> Float:
@@ -256,11 +272,12 @@ def parabolic_peak(doa_grid: Float, level: Float, peaks: Int) -> Float:
     """
     n, step = len(level), float(doa_grid[1] - doa_grid[0])
     is_circle = float(doa_grid[-1] - doa_grid[0]) + step > 2 * np.pi * (1 - 1e-9)
+    around = peaks + AROUND
     if is_circle:
-        before, after = peaks - 1, (peaks + 1) % n
+        around %= n
     else:  # even about the ends
-        before, after = np.abs(peaks - 1), n - 1 - np.abs(n - 2 - peaks)
-    left, middle, right = level[before], level[peaks], level[after]
+        around = n - 1 - np.abs(n - 1 - np.abs(around))
+    left, middle, right = level[around]
     bend = 2 * middle - left - right
     shift = (right - left) / (2 * np.where(bend > 0, bend, np.inf))
     doa = doa_grid[peaks] + step * np.maximum(np.minimum(shift, 0.5), -0.5)

@@ -180,7 +180,7 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
         if missing.all():
             return
         self.update_subspace(z)
-        n_new = 1 if z.ndim == 1 else self._count(~missing)
+        n_new = self._count(~missing) if missing.any() else self.measurement.n_snapshots
         self.total_weight = self.total_weight + n_new
         self.total_squared_weight = self.total_squared_weight + n_new
         is_due = (self.n_snapshots + n_new) // self.interval > self.n_snapshots // self.interval
@@ -206,7 +206,7 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
         model = self.measurement
         if model.is_single:
             return least_squares_amplitudes(model.steering_vector(*directions), z)
-        return root_mean_amplitudes(model, directions, model.snapshots(z))
+        return root_mean_amplitudes(model, directions, model.with_all_axes(z))
 
     @abstractmethod
     def update_subspace(self, z: Complex) -> None:
@@ -257,8 +257,9 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
             weights = weights[bins].mean(axis=0)
             if model.n_bins == 1:  # one of several is left
                 values, vectors = values[0], vectors[0]
-        share = float((weights[valid_sensors] / self.total_weight).mean())  # of complete data
-        n_sources = self._number_of_sources(values, share) if values[..., :1].any() else 0
+        n_sources = 0
+        if values[..., 0].any():
+            n_sources = self._number_of_sources(values, weights[valid_sensors])
         K = min(n_sources, finder.max_sources)
         return (finder, Subspaces(vectors[..., :K], vectors[..., K:])) if K > 0 else None
 
@@ -268,13 +269,15 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
         if current is None:
             return np.zeros((self.estimate_kind.n_unknowns, 0))
         finder, subspaces = current
-        directions = np.atleast_2d(finder.directions(subspaces))
-        return np.asarray(directions[:, np.argsort(directions[0], kind="stable")])
+        directions = finder.directions(subspaces)
+        directions = directions[None] if directions.ndim == 1 else directions
+        return directions[:, directions[0].argsort(kind="stable")]
 
-    def _number_of_sources(self, eigenvalues: Float, share: float) -> int:
-        """Return the number of sources, given or estimated, from a share of complete data."""
+    def _number_of_sources(self, eigenvalues: Float, weights: Float) -> int:
+        """Return the number of sources, given or estimated; weights are those of the sensors."""
         if isinstance(self.n_sources, int):
             return self.n_sources
+        share = float((weights / self.total_weight).mean())  # of complete data
         # the number of snapshots of equal weight with the same variance of the mean
         n_effective = self.total_weight**2 / self.total_squared_weight
         estimate = number_of_sources(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -79,7 +80,7 @@ class ShiftInvariance:
 
     line: UniformLineManifold
 
-    @property
+    @cached_property
     def shift(self) -> int:
         """Shift between the subarrays, in grid points."""
         half_wave = int(min(np.pi / self.line.step * (1 + 1e-9), 1e9))
@@ -87,16 +88,20 @@ class ShiftInvariance:
         pairs = [len(shifted_pairs(self.line.grid_index, s)[0]) for s in range(1, widest + 1)]
         return max(range(1, widest + 1), key=lambda s: (pairs[s - 1], s))
 
+    @cached_property
+    def pairs(self) -> tuple[Int, Int]:
+        """Sensors of the two subarrays."""
+        return shifted_pairs(self.line.grid_index, self.shift)
+
     @property
     def max_sources(self) -> int:
         """Number of pairs of sensors."""
-        return len(shifted_pairs(self.line.grid_index, self.shift)[0])
+        return len(self.pairs[0])
 
     def directions(self, subspaces: Subspaces) -> Float:
         """Return directions, rad."""
-        shift = self.shift
-        phase = esprit_angles(subspaces.signal, *shifted_pairs(self.line.grid_index, shift))
-        doa = self.line.to_doa(phase / shift, ENDFIRE_TOLERANCE * self.line.step)
+        phase = esprit_angles(subspaces.signal, *self.pairs)
+        doa = self.line.to_doa(phase / self.shift, ENDFIRE_TOLERANCE * self.line.step)
         return doa[~np.isnan(doa)]
 
 
@@ -109,15 +114,20 @@ class ShiftInvarianceOfBins:
     @property
     def max_sources(self) -> int:
         """Number of pairs of sensors."""
-        return ShiftInvariance(self.line.shortest).max_sources
+        return self.shortest.max_sources
+
+    @cached_property
+    def shortest(self) -> ShiftInvariance:
+        """ESPRIT at the shortest wavelength within the alias limit."""
+        return ShiftInvariance(self.line.shortest)
 
     def directions(self, subspaces: Subspaces) -> Float:
         """Return directions, rad."""
-        shift = ShiftInvariance(self.line.shortest).shift
-        phase = esprit_angles(subspaces.signal, *shifted_pairs(self.line.grid_index, shift))
-        return self.line.directions(phase, shift, subspaces)
+        phase = esprit_angles(subspaces.signal, *self.shortest.pairs)
+        return self.line.directions(phase, self.shortest.shift, subspaces)
 
 
+@lru_cache(maxsize=16)  # models are immutable
 def shift_invariance(model: ArraySnapshot) -> ShiftInvariance | ShiftInvarianceOfBins:
     """Return ESPRIT on the line of a model, for one bin or several."""
     if model.n_bins > 1:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -177,6 +178,7 @@ class RootingOfBins:
         return line.directions(theta, 1, subspaces)
 
 
+@lru_cache(maxsize=16)  # models are immutable
 def polynomial_rooting(model: ArraySnapshot) -> PolynomialRooting | RootingOfBins:
     """Return root-MUSIC on the line of a model, for one bin or several."""
     if model.n_bins > 1:
