@@ -24,7 +24,8 @@ NumberOfSources: TypeAlias = int | Literal["aic", "mdl"] | None
 class Subspaces(NamedTuple):
     """Orthonormal bases of the signal subspace, (..., n, K), and the noise, (..., n, n - K).
 
-    The leading axis of a step of several bins is that of the bins.
+    The leading axis of a step of several bins is that of the bins. The noise is (n, 0) for a
+    method that does not need it.
     """
 
     signal: Complex
@@ -37,6 +38,9 @@ class DirectionFinder(Protocol):
     @property
     def max_sources(self) -> int:
         """Maximum number of directions."""
+
+    def needs_noise(self, n_sources: int) -> bool:
+        """Return True if the directions of so many sources depend on the noise's basis."""
 
     def directions(self, subspaces: Subspaces) -> Float:
         """Return directions, rad, (n,) or (n_unknowns, n); at most one a signal dimension."""
@@ -218,11 +222,12 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
 
     @abstractmethod
     def eigendecomposition(
-        self, valid_sensors: Bool, bins: Bool | None = None
+        self, valid_sensors: Bool, bins: Bool | None = None, n_largest: int | None = None
     ) -> tuple[Float, Complex]:
         """Return eigenvalues, falling, and eigenvectors of the covariance of valid sensors.
 
-        Those of some of the bins, with a leading axis, if the model has several.
+        Those of some of the bins, with a leading axis, if the model has several. The n_largest
+        are sufficient, all if None.
         """
 
     @abstractmethod
@@ -252,7 +257,8 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
             finder = self.direction_finder(self.subarray_model(model))
         except ValueError:  # too few sensors are left for the method
             return None
-        values, vectors = self.eigendecomposition(valid_sensors, bins)
+        n_largest = self._sufficient_dimensions(finder)
+        values, vectors = self.eigendecomposition(valid_sensors, bins, n_largest)
         if bins is not None:
             weights = weights[bins].mean(axis=0)
             if model.n_bins == 1:  # one of several is left
@@ -262,6 +268,14 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
             n_sources = self._number_of_sources(values, weights[valid_sensors])
         K = min(n_sources, finder.max_sources)
         return (finder, Subspaces(vectors[..., :K], vectors[..., K:])) if K > 0 else None
+
+    def _sufficient_dimensions(self, finder: F) -> int | None:
+        """Return the number of eigenvectors of a known number of sources; None for all."""
+        if not isinstance(self.n_sources, int):
+            return None
+        n = min(self.n_sources, finder.max_sources)
+        has_full_rank = self.n_snapshots >= n
+        return n if has_full_rank and not finder.needs_noise(n) else None
 
     def _directions(self) -> Float:
         """Return the directions, rad, (n_unknowns, n), in rising order of the first unknown."""

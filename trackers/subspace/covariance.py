@@ -9,9 +9,26 @@ from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.arrays.sensor_array import SensorArray
 from arrivals.trackers.beamforming.block_scan import part_in_use, whitened_covariance
 from arrivals.trackers.beamforming.covariance import RunningCovariance, spatial_smoothing
+from arrivals.trackers.gaussian.linalg import lapack
 from arrivals.trackers.subspace.base import F, NumberOfSources, SubspaceTracker
 from arrivals.typing import Bool, Complex, Float
 from arrivals.validation import count, instance
+
+
+def largest_eigenvectors(R: Complex, n: int) -> tuple[Float, Complex]:
+    """Return the n largest eigenvalues of a covariance, in ascending order, and eigenvectors.
+
+    Examples
+    --------
+    >>> values, vectors = largest_eigenvectors(np.diag([1.0, 3.0, 2.0]), 1)
+    >>> values, np.abs(vectors).ravel()
+    (array([3.]), array([0., 1., 0.]))
+    """
+    size = len(R)
+    values, vectors, *_, failed = lapack().zheevr(R, range="I", il=size - n + 1, iu=size)
+    if failed:
+        raise np.linalg.LinAlgError("eigenvalues of the covariance did not converge")
+    return values[:n], vectors[:, :n]
 
 
 class CovarianceSubspace(RunningCovariance, SubspaceTracker[F]):
@@ -75,7 +92,7 @@ class CovarianceSubspace(RunningCovariance, SubspaceTracker[F]):
         return n_sensors if self.smoothing is None else self.smoothing
 
     def eigendecomposition(
-        self, valid_sensors: Bool, bins: Bool | None = None
+        self, valid_sensors: Bool, bins: Bool | None = None, n_largest: int | None = None
     ) -> tuple[Float, Complex]:
         """Return eigenvalues, falling, and eigenvectors of the (smoothed) mean covariance."""
         R = self.mean_covariance(valid_sensors, bins)
@@ -85,7 +102,10 @@ class CovarianceSubspace(RunningCovariance, SubspaceTracker[F]):
             order = np.argsort(self.measurement.array.positions[valid_sensors, 0])
             length = self._subarray_length(len(order))
             R = spatial_smoothing(R[..., order, :][..., order], length, backward=self.backward)
-        values, vectors = np.linalg.eigh(R)
+        if n_largest is not None and R.ndim == 2:  # half of the time of all
+            values, vectors = largest_eigenvectors(R, n_largest)
+        else:
+            values, vectors = np.linalg.eigh(R)
         return values[..., ::-1], vectors[..., ::-1]
 
     def subarray_model(self, model: ArraySnapshot) -> ArraySnapshot:

@@ -9,12 +9,14 @@ import numpy as np
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.manifolds.uniform_line import UniformLineManifold
+from arrivals.trackers.gaussian.linalg import lapack
 from arrivals.trackers.registry import register
 from arrivals.trackers.subspace.base import DirectionFinder, Subspaces
 from arrivals.trackers.subspace.covariance import CovarianceSubspace
 from arrivals.trackers.subspace.line_bins import ENDFIRE_TOLERANCE, LineOfBins, uniform_line
 from arrivals.typing import Complex, Float, Int
 
+MIN_RELATIVE_RANK = 1e-10  # of the diagonal of a triangular factor: below, by singular values
 
 def esprit_angles(signal_subspace: Complex, first: Int, second: Int) -> Float:
     """Return the phase steps, rad, of plane waves from subarray `first` to `second`.
@@ -43,8 +45,24 @@ def esprit_angles(signal_subspace: Complex, first: Int, second: Int) -> Float:
     array([-1. ,  0.5])
     """
     # Ψ = U₁⁺U₂   (36)
-    rotation = np.linalg.pinv(signal_subspace[..., first, :]) @ signal_subspace[..., second, :]
+    rotation = least_squares(signal_subspace[..., first, :], signal_subspace[..., second, :])
     return np.asarray(np.angle(np.linalg.eigvals(rotation)))
+
+
+def least_squares(A: Complex, B: Complex) -> Complex:
+    """Return A⁺B of matrices A (..., m, n) with m >= n.
+
+    Examples
+    --------
+    >>> least_squares(np.array([[1.0], [1.0]]), np.array([[1.0], [3.0]])).real
+    array([[2.]])
+    """
+    if A.ndim == 2:  # a third of the time
+        factor, solution, failed = lapack().zgels(A, B)
+        diagonal = np.abs(factor.diagonal())
+        if not failed and diagonal.min() > MIN_RELATIVE_RANK * diagonal.max():
+            return np.asarray(solution[: A.shape[1]])
+    return np.asarray(np.linalg.pinv(A) @ B)
 
 
 def shifted_pairs(grid_index: Int, shift: int) -> tuple[Int, Int]:
@@ -98,6 +116,10 @@ class ShiftInvariance:
         """Number of pairs of sensors."""
         return len(self.pairs[0])
 
+    def needs_noise(self, n_sources: int) -> bool:
+        """Return False: the signal subspace is sufficient."""
+        return False
+
     def directions(self, subspaces: Subspaces) -> Float:
         """Return directions, rad."""
         phase = esprit_angles(subspaces.signal, *self.pairs)
@@ -115,6 +137,10 @@ class ShiftInvarianceOfBins:
     def max_sources(self) -> int:
         """Number of pairs of sensors."""
         return self.shortest.max_sources
+
+    def needs_noise(self, n_sources: int) -> bool:
+        """Return True: the bins are weighted by MUSIC's spectrum."""
+        return True
 
     @cached_property
     def shortest(self) -> ShiftInvariance:

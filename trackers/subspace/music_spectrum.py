@@ -92,6 +92,10 @@ class SpectrumSearch:
         """Number of sensors minus one."""
         return self.array.n_sensors - 1
 
+    def needs_noise(self, n_sources: int) -> bool:
+        """Return True if the basis of the noise is the smaller one."""
+        return self.array.n_sensors < 2 * n_sources
+
     def spectrum(self, subspaces: Subspaces) -> tuple[Float, Float]:
         """Return scan directions and `music_spectrum` there, by the smaller of the subspaces."""
         doa_grid, A = scan_steering_matrix(self.array, self.wavelength, self.n_directions)
@@ -124,6 +128,10 @@ class NormalizedSearch:
     def max_sources(self) -> int:
         """Number of sensors minus one."""
         return self.model.array.n_sensors - 1
+
+    def needs_noise(self, n_sources: int) -> bool:
+        """Return True if the basis of the noise is the smaller one."""
+        return self.model.array.n_sensors < 2 * n_sources
 
     def spectrum(self, subspaces: Subspaces) -> tuple[Float, Float]:
         """Return scan directions, of the sphere the azimuths, and the mean spectrum there."""

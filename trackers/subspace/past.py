@@ -255,9 +255,9 @@ class PAST(SubspaceTracker[DirectionFinder]):
         return self.weight
 
     def eigendecomposition(
-        self, valid_sensors: Bool, bins: Bool | None = None
+        self, valid_sensors: Bool, bins: Bool | None = None, n_largest: int | None = None
     ) -> tuple[Float, Complex]:
-        """Return eigenvalues, falling, and eigenvectors of W P⁻¹Wᴴ plus white noise."""
+        """Return eigenvalues, falling, and all eigenvectors of W P⁻¹Wᴴ plus white noise."""
         n = int(valid_sensors.sum())
         L = min(n, self.n_tracked)
         W, inverse, energy, prior = (

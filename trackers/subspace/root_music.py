@@ -150,6 +150,10 @@ class PolynomialRooting:
         """Number of sensors minus one."""
         return self.line.n_sensors - 1
 
+    def needs_noise(self, n_sources: int) -> bool:
+        """Return True: the null spectrum is that of the noise."""
+        return True
+
     def directions(self, subspaces: Subspaces) -> Float:
         """Return directions, rad."""
         tolerance = ENDFIRE_TOLERANCE * self.line.step
@@ -169,6 +173,10 @@ class RootingOfBins:
     def max_sources(self) -> int:
         """Number of sensors minus one."""
         return len(self.line.grid_index) - 1
+
+    def needs_noise(self, n_sources: int) -> bool:
+        """Return True: the null spectrum is that of the noise."""
+        return True
 
     def directions(self, subspaces: Subspaces) -> Float:
         """Return directions, rad."""
