@@ -16,6 +16,8 @@ Distance: TypeAlias = Literal["euclidean", "great_circle"]
 
 def points(name: str, value: ArrayLike) -> Float:
     """Return the rows without NaN of points (n, dim), of angles (n,) as (n, 1)."""
+    if _are_plain(value):
+        return value  # type: ignore[return-value]
     given = real(name, value)
     if given.ndim not in (1, 2):
         raise ValueError(f"{name} must have shape (n,) or (n, dim); got {given.shape}")
@@ -23,6 +25,14 @@ def points(name: str, value: ArrayLike) -> Float:
         raise ValueError(f"{name} must be finite, or NaN for absent points; got an infinite value")
     given = given[:, None] if given.ndim == 1 else given
     return np.asarray(given[~np.any(np.isnan(given), axis=1)])
+
+
+def _are_plain(given: ArrayLike) -> bool:
+    """Return True for an array of finite points, the usual case."""
+    if type(given) is not np.ndarray or given.ndim != 2 or given.dtype != np.float64:
+        return False
+    flat = given.ravel()
+    return bool(np.dot(flat, flat) < LARGEST)  # of the squares; false for NaN
 
 
 def distances(
@@ -56,18 +66,21 @@ def distances(
     if on_sphere:
         error = tangent_errors(t[:, None], f, period)
         return np.asarray(np.linalg.norm(error, axis=-1))
-    difference = np.abs(t[:, None] - f)
+    # (dim, n_true, n_estimates), in this order in memory
+    difference = np.subtract(t.T[:, :, None], f.T[:, None], order="C")
     if period is not None:
-        difference = difference % positive("period", period)
+        difference = np.abs(difference) % positive("period", period)
         difference = np.minimum(difference, period - difference)
-    return np.asarray(np.linalg.norm(difference, axis=-1))
+    difference *= difference
+    return np.asarray(np.sqrt(difference.sum(axis=0)))
 
 
 def assigned(d: Float, c: float, p: float) -> Float:
     """Return distances of the pairs with the smallest sum of min(d, c)^p."""
     from scipy.optimize import linear_sum_assignment
 
-    return np.asarray(d[linear_sum_assignment(np.minimum(d, c) ** p)])
+    cost = np.minimum(d, c)
+    return np.asarray(d[linear_sum_assignment(cost if p == 1 else cost**p)])
 
 
 def full_turn(period: float | None) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass
 
@@ -102,8 +103,9 @@ def gospa(
         raise ValueError(f"alpha must lie in (0, 2]; got {alpha}")
     d = distances(truth, estimate, period, distance)
     pairs = assigned(d, c, p)
-    n_cut, surplus = np.sum(pairs >= c), d.shape[0] - d.shape[1]
-    detected = float(np.sum(pairs[pairs < c] ** p))
+    near = pairs[pairs < c]
+    n_cut, surplus = len(pairs) - len(near), d.shape[0] - d.shape[1]
+    detected = float((near**p).sum())
     missed = float(c**p * (n_cut / 2 + max(surplus, 0) / alpha))
     false = float(c**p * (n_cut / 2 + max(-surplus, 0) / alpha))
     return Gospa((detected + missed + false) ** (1 / p), detected, missed, false)
@@ -283,7 +285,7 @@ def mean_rmse(
 
 def _exponent(p: float, c: float) -> float:
     """Return an exponent for which c^p is finite and not zero."""
-    if not (1 <= number("p", p) < np.inf and abs(p * np.log10(c)) < 150):
+    if not (1 <= number("p", p) < np.inf and abs(p * math.log10(c)) < 150):
         cure = "c^p must be from 1e-150 to 1e150"
         raise ValueError(f"p must be finite and at least 1; got {p}: {cure}")
     return float(p)
