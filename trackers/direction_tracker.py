@@ -23,6 +23,7 @@ from arrivals.trackers.run import Run, RunRecorder
 from arrivals.typing import Bool, Complex, Float, Int
 from arrivals.validation import positive
 
+MISSING = complex(np.nan, np.nan)
 ENDED: Any = object()  # in place of a measurement after the end of a shorter sequence
 
 
@@ -178,8 +179,7 @@ class DirectionTracker(Tracker):
         """
         doa = np.asarray(doa, dtype=np.float64)
         n, unknown = len(doa), np.full(len(doa), np.nan)
-        if amplitude is None:
-            amplitude = np.full(n, complex(np.nan, np.nan))
+        amplitude = np.full(n, MISSING) if amplitude is None else amplitude
         estimate = DirectionEstimate(
             doa=doa,
             std=np.asarray(unknown if std is None else std, np.float64),
@@ -204,9 +204,10 @@ class DirectionTracker(Tracker):
         values, covariance = estimate.unknowns()
         n, d = self.n_slots, values.shape[1]
         self.x = padded(values.ravel(), n * d, np.nan)
-        blocks = np.zeros((n, d, n, d))
-        index = np.arange(len(values[:n]))
-        blocks[index, :, index] = np.where(np.isnan(covariance[:n]), 0.0, covariance[:n])
+        blocks, known = np.zeros((n, d, n, d)), ~np.isnan(covariance[:n])
+        if known.any():
+            index = np.arange(len(known))
+            blocks[index, :, index] = np.where(known, covariance[:n], 0.0)
         self.P = blocks.reshape(n * d, n * d)
 
     def report_directions(

@@ -81,8 +81,8 @@ class PlaneWaves(FrozenModel):
 
     @cached_property
     def _propagation(self) -> Complex:
-        """j 2π/λ of the bins, (n_bins, 1, 1)."""
-        return 1j * self.wavenumber[:, None, None]
+        """The wavenumbers times j, (n_bins, 1, 1)."""
+        return np.asarray(1j * self.wavenumber[:, None, None], np.complex128)
 
     @property
     def n_nuisance(self) -> int:
@@ -101,15 +101,16 @@ class PlaneWaves(FrozenModel):
             axes += [np.sin(height)[:, None] + 0 * angle] * (self.array.dim - 2)
             u = np.stack(axes, axis=-1)
         if self.slowness is None:
-            return u[None] if self.is_line else u
+            return np.asarray(u[None] if self.is_line else u)
         return np.asarray(np.asarray(self.slowness)[:, None, None] * u)
 
-    def steering(self, angle: ArrayLike, origin: Float | float = 0.0) -> Complex:
+    def steering(self, angle: ArrayLike, origin: Float | None = None) -> Complex:
         """Return responses to angles (n,), phases counted at `origin`: (n_nuisance, F, M, n).
 
         The angle of a line runs over the circle: beyond endfire come its mirror images.
         """
-        path = (self.array.positions - origin) @ self.directions(angle).swapaxes(1, 2)
+        positions = self.array.positions if origin is None else self.array.positions - origin
+        path = positions @ self.directions(angle).swapaxes(1, 2)
         a = np.exp(self._propagation * path[:, None])
         if self.response is not None:
             a = a * np.swapaxes(self.response(angle), 1, 2)

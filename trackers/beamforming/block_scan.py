@@ -229,7 +229,7 @@ def root_mean_amplitudes(model: ArraySnapshot, directions: Float, Y: Complex) ->
     A = A[0] if len(A) == 1 else strongest(A, [mean_beam_power(a[None], Y) for a in A])
     AH, missing = A.conj().swapaxes(1, 2), np.isnan(Y)
     if not missing.any():  # normal equations of a bin, (n_bins, K, K)
-        w, n_valid = _normal_solution(_loaded(AH @ A), AH @ Y), len(Y) * Y.shape[2]
+        w, n_valid = _normal_solution(AH @ A, AH @ Y), len(Y) * Y.shape[2]
     else:  # of each snapshot, (n_bins, n_snapshots, K, K)
         valid, y = ~missing, np.where(missing, 0, Y)
         products = np.einsum("fkm,fmn,fml->fnkl", AH, valid, A, optimize=True)
@@ -264,12 +264,13 @@ def strongest(A: Complex, power: ArrayLike) -> Complex:
 
 
 def _normal_solution(G: Complex, b: Complex) -> Complex:
-    """Return G⁻¹b of Hermitian positive definite matrices (n_bins, K, K)."""
-    if len(G) == 1:  # a third of the time
-        _, w, failed = lapack().zposv(G[0], b[0])
-        if not failed:
-            return np.asarray(w[None])
-    return np.asarray(np.linalg.solve(G, b))
+    """Return G⁻¹b of Gram matrices (n_bins, K, K), loaded as by `_loaded`."""
+    if len(G) > 1:
+        return np.asarray(np.linalg.solve(_loaded(G), b))
+    _, w, failed = lapack().zposv(_loaded(G[0]), b[0])  # a third of the time
+    if failed:
+        raise np.linalg.LinAlgError("steering vectors must be finite")
+    return np.asarray(w[None])
 
 
 def _loaded(G: Complex) -> Complex:

@@ -197,7 +197,7 @@ class PatternSums:
         if not sums.valid.all():
             return expected_covariance(sums)
         if len(sums.weights) == 1:
-            return np.asarray(sums.products[0] / sums.weights[0, ..., None, None])
+            return sums.products[0] / sums.weights[0, ..., None, None]  # type: ignore[no-any-return]
         weight = sums.weights.sum(axis=0)
         return np.asarray(sums.products.sum(axis=0) / weight[..., None, None])
 

@@ -181,10 +181,11 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
         """Add the snapshots of a step; compute directions at every `interval`-th snapshot."""
         z = self.measurement.snapshot(z)
         missing = np.isnan(z)
-        if missing.all():
+        is_complete = not missing.any()
+        if not is_complete and missing.all():
             return
         self.update_subspace(z)
-        n_new = self._count(~missing) if missing.any() else self.measurement.n_snapshots
+        n_new = self.measurement.n_snapshots if is_complete else self._count(~missing)
         self.total_weight = self.total_weight + n_new
         self.total_squared_weight = self.total_squared_weight + n_new
         is_due = (self.n_snapshots + n_new) // self.interval > self.n_snapshots // self.interval
@@ -226,8 +227,7 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
     ) -> tuple[Float, Complex]:
         """Return eigenvalues, falling, and eigenvectors of the covariance of valid sensors.
 
-        Those of some of the bins, with a leading axis, if the model has several. The n_largest
-        are sufficient, all if None.
+        Those of some of the bins, if the model has several. n_largest are sufficient; all if None.
         """
 
     @abstractmethod
@@ -274,7 +274,7 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
         if not isinstance(self.n_sources, int):
             return None
         n = min(self.n_sources, finder.max_sources)
-        has_full_rank = self.n_snapshots >= n
+        has_full_rank = self.n_snapshots >= n > 0
         return n if has_full_rank and not finder.needs_noise(n) else None
 
     def _directions(self) -> Float:

@@ -9,26 +9,10 @@ from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.arrays.sensor_array import SensorArray
 from arrivals.trackers.beamforming.block_scan import part_in_use, whitened_covariance
 from arrivals.trackers.beamforming.covariance import RunningCovariance, spatial_smoothing
-from arrivals.trackers.gaussian.linalg import lapack
 from arrivals.trackers.subspace.base import F, NumberOfSources, SubspaceTracker
+from arrivals.trackers.subspace.decompositions import largest_eigenvectors
 from arrivals.typing import Bool, Complex, Float
 from arrivals.validation import count, instance
-
-
-def largest_eigenvectors(R: Complex, n: int) -> tuple[Float, Complex]:
-    """Return the n largest eigenvalues of a covariance, in ascending order, and eigenvectors.
-
-    Examples
-    --------
-    >>> values, vectors = largest_eigenvectors(np.diag([1.0, 3.0, 2.0]), 1)
-    >>> values, np.abs(vectors).ravel()
-    (array([3.]), array([0., 1., 0.]))
-    """
-    size = len(R)
-    values, vectors, *_, failed = lapack().zheevr(R, range="I", il=size - n + 1, iu=size)
-    if failed:
-        raise np.linalg.LinAlgError("eigenvalues of the covariance did not converge")
-    return values[:n], vectors[:, :n]
 
 
 class CovarianceSubspace(RunningCovariance, SubspaceTracker[F]):
@@ -102,11 +86,7 @@ class CovarianceSubspace(RunningCovariance, SubspaceTracker[F]):
             order = np.argsort(self.measurement.array.positions[valid_sensors, 0])
             length = self._subarray_length(len(order))
             R = spatial_smoothing(R[..., order, :][..., order], length, backward=self.backward)
-        if n_largest is not None and R.ndim == 2:  # half of the time of all
-            values, vectors = largest_eigenvectors(R, n_largest)
-        else:
-            values, vectors = np.linalg.eigh(R)
-        return values[..., ::-1], vectors[..., ::-1]
+        return largest_eigenvectors(R, n_largest)
 
     def subarray_model(self, model: ArraySnapshot) -> ArraySnapshot:
         """Return the model of the first subarray, or of all sensors without smoothing."""

@@ -9,14 +9,13 @@ import numpy as np
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.manifolds.uniform_line import UniformLineManifold
-from arrivals.trackers.gaussian.linalg import lapack
 from arrivals.trackers.registry import register
 from arrivals.trackers.subspace.base import DirectionFinder, Subspaces
 from arrivals.trackers.subspace.covariance import CovarianceSubspace
+from arrivals.trackers.subspace.decompositions import eigenvalues, least_squares
 from arrivals.trackers.subspace.line_bins import ENDFIRE_TOLERANCE, LineOfBins, uniform_line
 from arrivals.typing import Complex, Float, Int
 
-MIN_RELATIVE_RANK = 1e-10  # of the diagonal of a triangular factor: below, by singular values
 
 def esprit_angles(signal_subspace: Complex, first: Int, second: Int) -> Float:
     """Return the phase steps, rad, of plane waves from subarray `first` to `second`.
@@ -46,23 +45,7 @@ def esprit_angles(signal_subspace: Complex, first: Int, second: Int) -> Float:
     """
     # Ψ = U₁⁺U₂   (36)
     rotation = least_squares(signal_subspace[..., first, :], signal_subspace[..., second, :])
-    return np.asarray(np.angle(np.linalg.eigvals(rotation)))
-
-
-def least_squares(A: Complex, B: Complex) -> Complex:
-    """Return A⁺B of matrices A (..., m, n) with m >= n.
-
-    Examples
-    --------
-    >>> least_squares(np.array([[1.0], [1.0]]), np.array([[1.0], [3.0]])).real
-    array([[2.]])
-    """
-    if A.ndim == 2:  # a third of the time
-        factor, solution, failed = lapack().zgels(A, B)
-        diagonal = np.abs(factor.diagonal())
-        if not failed and diagonal.min() > MIN_RELATIVE_RANK * diagonal.max():
-            return np.asarray(solution[: A.shape[1]])
-    return np.asarray(np.linalg.pinv(A) @ B)
+    return np.asarray(np.angle(eigenvalues(rotation)))
 
 
 def shifted_pairs(grid_index: Int, shift: int) -> tuple[Int, Int]:

@@ -20,16 +20,19 @@ from arrivals.trackers.subspace.bin_values import column, is_zero, larger, power
 from arrivals.trackers.subspace.esprit import shift_invariance
 from arrivals.trackers.subspace.music_spectrum import spectrum_search
 from arrivals.trackers.subspace.past_steps import (
+    TINY,
     SensorInverses,
     incomplete_step,
     limited_trace,
     past_step,
+    past_steps,
+    subspace_eigenvectors,
+    with_dimensions,
 )
 from arrivals.trackers.subspace.root_music import polynomial_rooting
 from arrivals.typing import Bool, Complex, Float
 from arrivals.validation import count, one_of
 
-TINY = 1e-290  # an energy above zero
 MIN_FORGETTING = 1e-6  # bounds P after a long gap: the weight of older data is at least this
 MAX_RELATIVE_TRACE = 1e12  # of P relative to the power: bounds wind-up along unexcited directions
 
@@ -170,7 +173,11 @@ class PAST(SubspaceTracker[DirectionFinder]):
         if self.W.shape != (*bins, model.array.n_sensors, self.n_slots):  # a parameter was changed
             self._reset_subspace()
         if not bins:
-            for y in z[None] if z.ndim == 1 else z:
+            rows = z[None] if z.ndim == 1 else z
+            if self.rows is None and self.weight.all() and not np.isnan(rows).any():
+                self._add_complete(rows)
+                return
+            for y in rows:
                 valid = ~np.isnan(y)
                 if valid.any():
                     self._add(np.where(valid, y, 0), valid, None)
@@ -182,6 +189,14 @@ class PAST(SubspaceTracker[DirectionFinder]):
             if has_data is not None and has_data.any():
                 y = np.where(valid & has_data[:, None], y, 0)
                 self._add(y, valid, None if has_data.all() else has_data)
+
+    def _add_complete(self, Y: Complex) -> None:
+        """Add snapshots without gaps, (n_snapshots, n_sensors), once all sensors had data."""
+        beta = max(self.forgetting**self.age, MIN_FORGETTING)
+        self.W, self.inverse, self.energy = past_steps(
+            self.W, self.inverse, Y, beta, self.energy, MAX_RELATIVE_TRACE
+        )
+        self.weight, self.prior, self.age = self.weight + len(Y), beta * self.prior, 0.0
 
     def _add(self, y: Complex, valid: Bool, has_data: Bool | None) -> None:
         """Add a snapshot, ([n_bins,] n_sensors), to the bins with data, all if None."""
@@ -214,11 +229,8 @@ class PAST(SubspaceTracker[DirectionFinder]):
         self.energy = where_bins(has_data, energy, self.energy)
         self.prior = where_bins(has_data, beta * self.prior, self.prior)
         self.age = where_bins(has_data, 0.0 * beta, self.age)
-        if self.n_slots > L:  # some sensors have had no data
-            rest = self.n_slots - L
-            axes = [(0, 0)] * (y.ndim - 1)
-            W, P = np.pad(W, [*axes, (0, 0), (0, rest)]), np.pad(P, [*axes, *[(0, rest)] * 2])
-        self.W, self.inverse = W, P
+        # some sensors may have had no data
+        self.W, self.inverse = with_dimensions(W, P, self.n_slots)
 
     def _known_sensors(self) -> Bool:
         known: Bool = self.weight > 0
@@ -260,12 +272,8 @@ class PAST(SubspaceTracker[DirectionFinder]):
         """Return eigenvalues, falling, and all eigenvectors of W P⁻¹Wᴴ plus white noise."""
         n = int(valid_sensors.sum())
         L = min(n, self.n_tracked)
-        W, inverse, energy, prior = (
-            self.W[..., valid_sensors, :],
-            self.inverse,
-            self.energy,
-            self.prior,
-        )
+        W, inverse = self.W[..., valid_sensors, :], self.inverse
+        energy, prior = self.energy, self.prior
         if bins is not None and not bins.all():
             W, inverse, energy, prior = W[bins], inverse[bins], energy[bins], prior[bins]
         if is_zero(energy):
@@ -273,21 +281,13 @@ class PAST(SubspaceTracker[DirectionFinder]):
             return values, np.broadcast_to(np.eye(n, dtype=np.complex128), (*values.shape, n))
         if self.n_tracked < self.n_slots:
             W, inverse = W[..., : self.n_tracked], inverse[..., : self.n_tracked, : self.n_tracked]
-        Q, R = np.linalg.qr(W, mode="complete")
-        R = R[..., :L, :]
-        RH = R.conj().swapaxes(-1, -2)
-        try:
-            S = R @ np.linalg.solve(inverse, RH)
-        except np.linalg.LinAlgError:  # a leap of the level by many orders: P has lost its rank
-            S = R @ np.linalg.pinv(inverse, hermitian=True) @ RH
-        values, rotation = np.linalg.eigh((S + S.conj().swapaxes(-1, -2)) / 2)
+        is_signal_only = n_largest is not None and n_largest <= L
+        values, vectors = subspace_eigenvectors(W, inverse, complete=not is_signal_only)
         # the power outside, spread evenly
         noise = (energy - values.sum(axis=-1)) / max(n - L, 1)
         outside = np.full((*values.shape[:-1], n - L), column(noise))
-        values = np.concatenate([values[..., ::-1], outside], axis=-1)
-        values = np.maximum(values, column(larger(prior, noise)))  # no dimension has less
-        vectors = np.concatenate([Q[..., :L] @ rotation[..., ::-1], Q[..., L:]], axis=-1)
-        return values, vectors
+        values = np.concatenate([values, outside], axis=-1)
+        return np.maximum(values, column(larger(prior, noise))), vectors  # no dimension has less
 
     def direction_finder(self, model: ArraySnapshot) -> DirectionFinder:
         """Return the direction finder of `method`."""

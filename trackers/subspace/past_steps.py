@@ -9,12 +9,14 @@ Process. 61(23), 2013.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.typing import Bool, Complex
+from arrivals.typing import Bool, Complex, Float
 
+TINY = 1e-290  # an energy above zero
 MAX_TRACE_RATIO = 1e12  # of the matrix of a sensor without data, relative to the common one
 
 
@@ -51,20 +53,54 @@ def past_step(W: Complex, P: Complex, y: Complex, beta: ArrayLike) -> tuple[Comp
     >>> W.round(3).ravel()
     array([0.6, 0.8])
     """
-    beta = np.asarray(beta)[..., None, None]
+    if not isinstance(beta, float):
+        beta = np.asarray(beta)[..., None, None]
+    product: Any = np.dot if W.ndim == 2 else np.matmul  # a third of the time on a small matrix
     y = y[..., None]
-    # z = Wᴴ y
-    z = W.conj().swapaxes(-1, -2) @ y
-    # h = P z
-    h = P @ z
-    hH = h.conj().swapaxes(-1, -2)
+    # zᴴ = yᴴ W
+    zH = product(y.conj().swapaxes(-1, -2), W)
+    z = zH.conj().swapaxes(-1, -2)
+    # hᴴ = zᴴ P
+    hH = product(zH, P)
     # g = h / (β + zᴴh)
-    gH = hH / (beta + (hH @ z).real)
-    # P = Tri{P - g hᴴ} / β; the Hermitian part, since rounding would grow as β⁻ⁿ
-    P = (P - h * gH) / (2 * beta)
+    gH = hH / (beta + product(hH, z).real)
+    # P = Tri{P - h gᴴ} / β; the Hermitian part, since rounding would grow as β⁻ⁿ
+    P = (P - hH.conj().swapaxes(-1, -2) * gH) * (0.5 / beta)
     P = P + P.conj().swapaxes(-1, -2)
     # W = W + (y - W z) gᴴ
-    return W + (y - W @ z) * gH, P
+    return W + (y - product(W, z)) * gH, P
+
+
+def past_steps(
+    W: Complex, P: Complex, Y: Complex, beta: float, energy: float, max_trace: float
+) -> tuple[Complex, Complex, float]:
+    """Return W, P and the energy after successive snapshots of equal weight.
+
+    Parameters
+    ----------
+    W, P : ndarray
+        As in `past_step`, of one bin.
+    Y : ndarray, shape (n_snapshots, n_sensors)
+        Snapshots without gaps.
+    beta : float
+        Weight of the data before the first.
+    energy : float
+        Weighted sum of ‖y‖² before.
+    max_trace : float
+        Largest trace of P, relative to the energy.
+
+    Examples
+    --------
+    >>> W, P = np.array([[1.0], [0.0]]), np.eye(1)
+    >>> past_steps(W, P, np.array([[3.0, 4.0]] * 200), 1.0, 0.0, 1e12)[0].round(2).ravel()
+    array([0.6, 0.8])
+    """
+    for y, power in zip(Y, (Y.real**2 + Y.imag**2).sum(axis=1).tolist(), strict=True):
+        W, P = past_step(W, P, y, beta)
+        energy = beta * energy + power
+        P = limited_trace(P, max_trace / max(energy, TINY))
+        beta = 1.0
+    return W, P, energy
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +197,58 @@ def limited_trace(P: Complex, limit: ArrayLike) -> Complex:
     array([[1.5, 0. ],
            [0. , 0.5]])
     """
-    trace = np.trace(P, axis1=-2, axis2=-1).real
-    if (trace < limit).all():
+    trace = P.trace(axis1=-2, axis2=-1).real
+    if np.all(trace < limit) if P.ndim > 2 else trace < limit:
         return P
     return np.asarray(P * np.minimum(1.0, limit / trace)[..., None, None])
+
+
+def with_dimensions(W: Complex, P: Complex, n: int) -> tuple[Complex, Complex]:
+    """Return W and P of n dimensions, zero in those added.
+
+    Examples
+    --------
+    >>> [each.shape for each in with_dimensions(np.ones((5, 1)), np.ones((1, 1)), 2)]
+    [(5, 2), (2, 2)]
+    """
+    if W.shape[-1] == n:
+        return W, P
+    axes, added = [(0, 0)] * (W.ndim - 2), (0, n - W.shape[-1])
+    return np.pad(W, [*axes, (0, 0), added]), np.pad(P, [*axes, added, added])
+
+
+def subspace_eigenvectors(W: Complex, P: Complex, *, complete: bool) -> tuple[Float, Complex]:
+    """Return eigenvalues, falling, and eigenvectors of W P⁻¹Wᴴ.
+
+    Parameters
+    ----------
+    W, P : ndarray
+        As in `past_step`.
+    complete : bool
+        True to append a basis of the complement to the eigenvectors.
+
+    Returns
+    -------
+    values : ndarray, shape (..., L)
+        Those of the subspace, L the smaller of its dimension and the number of sensors.
+    vectors : ndarray, shape (..., n_sensors, L or n_sensors)
+
+    Examples
+    --------
+    >>> W = np.array([[0.6], [0.8]])
+    >>> values, vectors = subspace_eigenvectors(W, np.array([[0.25]]), complete=True)
+    >>> values.round(6), vectors.shape
+    (array([4.]), (2, 2))
+    """
+    L = min(W.shape[-2:])
+    Q, R = np.linalg.qr(W, mode="complete" if complete else "reduced")
+    R = R[..., :L, :]
+    RH = R.conj().swapaxes(-1, -2)
+    try:
+        S = R @ np.linalg.solve(P, RH)
+    except np.linalg.LinAlgError:  # a leap of the level by many orders: P has lost its rank
+        S = R @ np.linalg.pinv(P, hermitian=True) @ RH
+    values, rotation = np.linalg.eigh((S + S.conj().swapaxes(-1, -2)) / 2)
+    inside = Q[..., :L] @ rotation[..., ::-1]
+    vectors = np.concatenate([inside, Q[..., L:]], axis=-1) if complete else inside
+    return values[..., ::-1], vectors

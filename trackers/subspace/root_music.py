@@ -13,8 +13,11 @@ from arrivals.measurement_models.manifolds.uniform_line import UniformLineManifo
 from arrivals.trackers.registry import register
 from arrivals.trackers.subspace.base import DirectionFinder, Subspaces
 from arrivals.trackers.subspace.covariance import CovarianceSubspace
+from arrivals.trackers.subspace.decompositions import eigenvalues
 from arrivals.trackers.subspace.line_bins import ENDFIRE_TOLERANCE, LineOfBins, uniform_line
 from arrivals.typing import Complex, Float
+
+TINY, EPS = np.finfo(float).tiny, np.finfo(float).eps
 
 
 def null_polynomial(noise_subspace: Complex, grid_index: ArrayLike) -> Complex:
@@ -43,14 +46,20 @@ def null_polynomial(noise_subspace: Complex, grid_index: ArrayLike) -> Complex:
     >>> null_polynomial(np.array([[1.0], [-1.0]]) / np.sqrt(2), [0, 1]).real.round(3)
     array([-0.5,  1. , -0.5])
     """
-    grid_index = np.asarray(grid_index)
     C = noise_subspace @ np.swapaxes(noise_subspace.conj(), -1, -2)
-    lag = grid_index[None, :] - grid_index[:, None]
-    span = int(lag.max())
-    # indicator of the pairs of sensors of each lag, from S down to -S
-    pairs = lag.ravel()[:, None] == np.arange(span, -span - 1, -1)
+    pairs = _pairs_of_lags(tuple(np.asarray(grid_index).tolist()))
     # coefficient of z^l: the sum of C over the pairs of lag l   (8)
-    return np.asarray(C.reshape(*C.shape[:-2], -1) @ pairs.astype(np.complex128))
+    return np.asarray(C.reshape(*C.shape[:-2], -1) @ pairs)
+
+
+@lru_cache(maxsize=16)
+def _pairs_of_lags(grid_index: tuple[int, ...]) -> Complex:
+    """Return the indicator of the pairs of sensors of each lag, from S down to -S, read-only."""
+    lag = np.subtract.outer(grid_index, grid_index).T
+    span = int(lag.max())
+    pairs = np.asarray(lag.ravel()[:, None] == np.arange(span, -span - 1, -1), np.complex128)
+    pairs.setflags(write=False)
+    return pairs
 
 
 def root_music_angles(
@@ -90,23 +99,23 @@ def root_music_angles(
     array([-1. ,  0.5])
     """
     z = polynomial_roots(null_polynomial(noise_subspace, grid_index))
-    theta = np.full((*z.shape[:-1], n_sources), np.nan)
-    distance = np.abs(np.log(np.maximum(np.abs(z), np.finfo(float).tiny)))
-    is_wave = np.abs(np.angle(z)) <= np.asarray(max_angle)[..., None]
-    distance = np.where(is_wave, distance, np.inf)
+    batch, z = z.shape[:-1], z.reshape(-1, z.shape[-1])
+    rows, theta = np.arange(len(z)), np.full((len(z), n_sources), np.nan)
+    distance = np.abs(np.log(np.maximum(np.abs(z), TINY)))
+    is_wave = np.abs(np.angle(z)) <= np.broadcast_to(max_angle, batch).reshape(-1, 1)
+    distance[~is_wave] = np.inf
     for k in range(n_sources):
-        best = distance.argmin(axis=-1, keepdims=True)
-        one = np.take_along_axis(z, best, axis=-1)
-        from_partner = np.abs(z * one.conj() - 1)
-        np.put_along_axis(from_partner, best, np.inf, axis=-1)
-        partner = from_partner.argmin(axis=-1, keepdims=True)
-        other = np.take_along_axis(z, partner, axis=-1)
-        is_zero = np.isfinite(np.take_along_axis(distance, best, axis=-1))
-        middle = one / np.abs(one) + other / np.maximum(np.abs(other), np.finfo(float).tiny)
-        theta[..., k] = np.where(is_zero, np.angle(middle), np.nan)[..., 0]
-        for taken in (best, partner):
-            np.put_along_axis(distance, taken, np.inf, axis=-1)
-    return theta
+        best = distance.argmin(axis=1)
+        one = z[rows, best]
+        from_partner = np.abs(z * one.conj()[:, None] - 1)
+        from_partner[rows, best] = np.inf
+        partner = from_partner.argmin(axis=1)
+        other = z[rows, partner]
+        is_zero = np.isfinite(distance[rows, best])
+        middle = one / np.abs(one) + other / np.maximum(np.abs(other), TINY)
+        theta[is_zero, k] = np.angle(middle)[is_zero]
+        distance[rows, best] = distance[rows, partner] = np.inf
+    return theta.reshape(*batch, n_sources)
 
 
 def polynomial_roots(c: Complex) -> Complex:
@@ -129,14 +138,14 @@ def polynomial_roots(c: Complex) -> Complex:
     """
     size = np.abs(c).max(axis=-1, keepdims=True)
     lead = c[..., :1]
-    tiny = np.finfo(float).eps * np.where(size > 0, size, 1.0)
+    tiny = EPS * np.where(size > 0, size, 1.0)
     # a vanishing leading coefficient gives a root at a large radius, not a lower degree
     lead = np.where(np.abs(lead) < tiny, tiny, lead)
     n = c.shape[-1] - 1
     companion = np.zeros((*c.shape[:-1], n, n), dtype=np.complex128)
     companion[..., np.arange(1, n), np.arange(n - 1)] = 1.0
     companion[..., 0, :] = -c[..., 1:] / lead
-    return np.asarray(np.sort(np.linalg.eigvals(companion), axis=-1))
+    return np.asarray(np.sort(eigenvalues(companion), axis=-1))
 
 
 @dataclass(frozen=True, eq=False)
