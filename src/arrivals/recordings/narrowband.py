@@ -17,6 +17,9 @@ from arrivals.validation import count, positive
 
 MAX_WINDOW = 2**30  # samples
 MAX_BLOCK = 2**21  # numbers of the windows, or of the tones, that are processed together: 16 MB
+CACHED_BLOCK = 2**17  # numbers of windows that remain in the processor's cache: 1 MB
+MIN_BINS = 8  # of one FFT; fewer take less time by products
+MIN_SPAN = 8  # windows without overlap in a block: the samples of one are read twice
 
 
 def default_window(rate: float, frequency: float) -> int:
@@ -108,8 +111,8 @@ def narrowband(
 class WindowedSpectrum:
     """Amplitudes at several frequencies in Hann windows of one length, as `narrowband` has them.
 
-    Bins of the window come from one real FFT a window, other frequencies from one product of
-    windows and tones. Windows are processed in blocks of bounded memory.
+    Bins of the window, if several, come from one real FFT a window, other frequencies from one
+    product of windows and tones. Windows are processed in blocks of bounded memory.
 
     Parameters
     ----------
@@ -162,7 +165,7 @@ class WindowedSpectrum:
         hop, first_sample = count("hop", hop), count("first_sample", first_sample, 0)
         n_windows = max(0, (len(samples) - self.window) // hop + 1)
         y = np.empty((n_windows, len(self.frequencies), samples.shape[1]), complex)
-        n_block = max(1, MAX_BLOCK // (max(self.window, hop) * max(1, samples.shape[1])))
+        n_block = self._windows_of_block(hop, max(1, samples.shape[1]))
         for i in range(0, n_windows, n_block):
             n = min(n_block, n_windows - i)
             block = _finite(samples[i * hop : (i + n - 1) * hop + self.window])
@@ -174,6 +177,12 @@ class WindowedSpectrum:
         cycles = start * self._f / self.rate
         y *= np.exp(-2j * np.pi * (cycles % 1))[:, :, None]
         return y
+
+    def _windows_of_block(self, hop: int, n_channels: int) -> int:
+        """Return the number of windows that are processed together."""
+        size = max(self.window, hop) * n_channels
+        wanted = max(CACHED_BLOCK // size, MIN_SPAN * self.window // hop)
+        return max(1, min(wanted, MAX_BLOCK // size))
 
     def _transform(self, frames: Float, out: Complex) -> None:
         """Write Σ x(k) exp(-j 2π f k / rate) of windows (..., window) to `out` (..., F)."""
@@ -195,9 +204,10 @@ class WindowedSpectrum:
 
     @cached_property
     def _is_bin(self) -> Bool:
-        """Where f window / rate is whole, but for rounding."""
+        """Where f window / rate is whole, but for rounding; nowhere if these are few."""
         k = self._f * self.window / self.rate
-        return np.asarray(np.abs(k - np.round(k)) <= 2 * np.finfo(float).eps * k)
+        is_bin = np.asarray(np.abs(k - np.round(k)) <= 2 * np.finfo(float).eps * k)
+        return is_bin & (np.count_nonzero(is_bin) >= MIN_BINS)
 
     @cached_property
     def _bins(self) -> Int:
