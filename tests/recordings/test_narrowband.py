@@ -69,14 +69,26 @@ def test_snapshots_from_a_later_start_keep_phases_and_times() -> None:
     assert_allclose(late.time, whole.time[3:])
 
 
-@pytest.mark.parametrize("hop", [64, 100, 1000])
+@pytest.mark.parametrize("hop", [16, 64, 100, 1000])
+@pytest.mark.parametrize("limit", ["MAX_BLOCK", "CACHED_BLOCK"])
 def test_narrowband_does_not_depend_on_the_block_size(
-    hop: int, monkeypatch: pytest.MonkeyPatch
+    limit: str, hop: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     samples = np.random.default_rng(1).standard_normal((20_000, 3))
     at_once = narrowband(samples, RATE, 440.0, 100, hop)
-    monkeypatch.setattr(narrowband_module, "MAX_BLOCK", 1500)
+    monkeypatch.setattr(narrowband_module, limit, 1500)
     assert_allclose(narrowband(samples, RATE, 440.0, 100, hop), at_once, atol=1e-12)
+
+
+def test_few_bins_equal_the_first_of_many() -> None:
+    samples = np.random.default_rng(3).standard_normal((2000, 2))
+    samples[700, 1] = np.nan
+    bins = [k * RATE / 128 for k in range(1, 13)]
+    few, many = (
+        narrowband_module.WindowedSpectrum(RATE, each, 128).amplitudes(samples, 64)
+        for each in (bins[:3], bins)
+    )
+    assert_allclose(few, many[:, :3], atol=1e-12)
 
 
 def test_long_recordings_are_read_in_several_blocks() -> None:

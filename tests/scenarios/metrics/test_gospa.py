@@ -248,3 +248,17 @@ def test_best_assignment_rmse_requires_finite_angles_of_fixed_number() -> None:
         best_assignment_rmse([[1.0, 2.0]], [[1.0, np.nan]])
     with pytest.raises(ValueError, match="period must be finite and positive"):
         best_assignment_rmse([[1.0]], [[1.0]], period=0)
+
+
+@LAW
+@given(POINTS, POINTS, CUTS, EXPONENTS)
+def test_gospa_of_arrays_equals_that_of_lists(
+    truth: list[tuple[float, float]],
+    estimate: list[tuple[float, float]],
+    c: float,
+    p: float,
+) -> None:
+    arrays = [np.array(each).reshape(-1, 2) for each in (truth, estimate)]
+    padded = [np.vstack([each, np.full((1, 2), np.nan)]) for each in arrays]
+    assert gospa(*arrays, c, p) == gospa(*padded, c, p)
+    np.testing.assert_array_equal(arrays[0], np.array(truth).reshape(-1, 2))  # not written into
