@@ -24,6 +24,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 from peer_jobs import Job
+from peer_jobs.figures import figures
 
 SHORTEST = 0.05  # s of CPU in which a job is repeated, in each round
 PEERS = ("filterpy", "simdkalman", "stonesoup", "pyroomacoustics", "acoular", "doa-py",
@@ -74,7 +75,7 @@ def rows(names: list[str], rounds: int) -> Iterator[str]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of peers
             for job in importlib.import_module(f"peer_jobs.{name}").jobs():
-                t = timed(job, rounds if t_is_short(job) else min(rounds, 3))
+                t = timed(job, rounds if _is_short(job) else min(rounds, 3))
                 met = "yes" if t.ratio <= job.limit else "**no**"
                 yield (
                     f"| {job.name} | {1e3 * t.ours:.4g} | {1e3 * t.peer:.4g} | {t.ratio:.2f} | "
@@ -82,7 +83,7 @@ def rows(names: list[str], rounds: int) -> Iterator[str]:
                 )
 
 
-def t_is_short(job: Job) -> bool:
+def _is_short(job: Job) -> bool:
     """Return True if a job takes less than a second."""
     return _cpu(job.ours, 1) < 1.0
 
@@ -104,9 +105,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--only", nargs="+", choices=modules(), default=modules())
     parser.add_argument("--rounds", type=int, default=9)
+    parser.add_argument("--no-figures", action="store_true", help="without those of no peer")
     options = parser.parse_args()
     for line in rows(options.only, options.rounds):
         print(line, flush=True)
+    if not options.no_figures:
+        print("\n| figure | value | wanted | met |\n| --- | --- | --- | --- |")
+        for figure in figures():
+            met = "yes" if figure.value <= figure.limit else "**no**"
+            value = f"{figure.value:.3g} {figure.unit}"
+            print(f"| {figure.name} | {value} | {figure.limit:g} | {met} |", flush=True)
     print(f"\n{versions()}")
 
 

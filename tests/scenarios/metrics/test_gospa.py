@@ -260,5 +260,6 @@ def test_gospa_of_arrays_equals_that_of_lists(
 ) -> None:
     arrays = [np.array(each).reshape(-1, 2) for each in (truth, estimate)]
     padded = [np.vstack([each, np.full((1, 2), np.nan)]) for each in arrays]
-    assert gospa(*arrays, c, p) == gospa(*padded, c, p)
+    plain = gospa(arrays[0], arrays[1], c, p)
+    assert plain == gospa(padded[0], padded[1], c, p)
     np.testing.assert_array_equal(arrays[0], np.array(truth).reshape(-1, 2))  # not written into

@@ -33,7 +33,7 @@ def test_past_of_blocks_equals_that_of_single_snapshots() -> None:
             single.update(snapshot)
     for name in ("W", "inverse", "energy", "prior", "weight", "age"):
         np.testing.assert_allclose(getattr(blocks, name), getattr(single, name), atol=1e-10)
-    np.testing.assert_allclose(blocks.estimate.doa, single.estimate.doa, atol=1e-10)  # type: ignore[attr-defined]
+    np.testing.assert_allclose(blocks.estimate.doa, single.estimate.doa, atol=1e-10)
 
 
 @pytest.mark.parametrize("name", ["music", "esprit", "root_music"])
