@@ -11,7 +11,17 @@ import numpy as np
 from arrivals.trackers import CBF, MUSIC, MVDR, DirectionTracker
 from arrivals.typing import Complex
 from peer_jobs import Job
-from peer_jobs.blocks import FREQUENCY, SPEED, block_model, step, two_sources
+from peer_jobs.blocks import (
+    BIN_WIDTH,
+    FREQUENCY,
+    N_SNAPSHOTS,
+    SPEED,
+    block_model,
+    circle_model,
+    step,
+    two_sources,
+    two_wideband_sources,
+)
 
 N_FFT, RATE, N_DIRECTIONS = 16, 8000.0, 361
 BIN = round(FREQUENCY * N_FFT / RATE)
@@ -31,6 +41,7 @@ def jobs() -> list[Job]:
         peer = "pyroomacoustics"
         made.append(_job("MUSIC", music, block, _room(block, "MUSIC"), peer, 0.35))
         made.append(_job("CBF", cbf, block, _room(block, "SRP"), f"{peer}, SRP", 0.5))
+        made += _wideband()
     if find_spec("acoular"):
         made += [
             _job(name, tracker, block, peer, "acoular", 0.5)
@@ -67,6 +78,36 @@ def _room(block: Complex, method: str) -> Callable[[], object]:
         return np.sort(np.pi / 2 - finder.azimuth_recon)
 
     return locate
+
+
+def _wideband() -> list[Job]:
+    """Return MUSIC and CBF of 20 bins at once, on a circle, beside pyroomacoustics."""
+    import pyroomacoustics
+
+    model, block = circle_model(), two_wideband_sources()
+    trackers: list[tuple[DirectionTracker, str, float]] = [
+        (MUSIC(model, n_sources=2, forgetting=0.0, n_directions=360), "NormMUSIC", 0.35),
+        (CBF(model, n_directions=360, max_sources=2), "SRP", 0.5),
+    ]
+    rate, n_fft, bins = 512 * BIN_WIDTH, 512, np.arange(20, 60, 2)
+    spectra = np.zeros((6, n_fft // 2 + 1, N_SNAPSHOTS), dtype=complex)
+    spectra[:, bins] = block.transpose(2, 0, 1)
+    made = []
+    for tracker, method, limit in trackers:
+        finder = getattr(pyroomacoustics.doa, method)(
+            model.array.positions.T, rate, n_fft, c=SPEED, num_src=2,
+            azimuth=np.linspace(-np.pi, np.pi, 360, endpoint=False),
+        )  # fmt: skip
+        made.append(
+            Job(
+                f"{type(tracker).__name__}, 20 bins, 6 sensors on a circle, 50 snapshots",
+                lambda tracker=tracker: step(tracker, block),  # type: ignore[misc]
+                lambda finder=finder: finder.locate_sources(spectra, freq_bins=bins),  # type: ignore[misc]
+                f"pyroomacoustics, {method}",
+                limit,
+            )
+        )
+    return made
 
 
 def _acoular(

@@ -106,7 +106,7 @@ def mean_beam_power(A: Complex, Y: Complex, *, isotropic: bool = False) -> Float
     Parameters
     ----------
     A : ndarray, shape (n_nuisance, n_bins, n_sensors, n_directions)
-        Steering vectors for each value of the nuisance parameter: slowness or elevation.
+        Steering vectors for each slowness or elevation.
     Y : ndarray, shape (..., n_bins, n_sensors, n_snapshots)
         Snapshots without valid data are left out, and sensors that are NaN are left out of theirs.
     isotropic : bool
@@ -122,7 +122,10 @@ def mean_beam_power(A: Complex, Y: Complex, *, isotropic: bool = False) -> Float
     >>> mean_beam_power(np.ones((1, 1, 3, 1)), np.array([[[1.0], [np.nan], [1.0]]]))
     array([2.])
     """
-    valid = ~np.isnan(Y)
+    missing = np.isnan(Y)
+    if not missing.any():
+        return _complete_beam_power(A, Y)
+    valid = ~missing
     # axes: ..., nuisance, bins, directions, snapshots; |aᴴy| = |aᵀy*|
     beam = np.swapaxes(A, 2, 3) @ np.where(valid, Y, 0).conj()[..., None, :, :, :]
     if isotropic:
@@ -132,6 +135,19 @@ def mean_beam_power(A: Complex, Y: Complex, *, isotropic: bool = False) -> Float
     power = (beam.real**2 + beam.imag**2) / np.maximum(norm, 1e-12)
     n_valid = np.maximum(valid.any(axis=-2).sum(axis=(-2, -1)), 1)
     return np.asarray(power.sum(axis=(-3, -1)).max(axis=-2) / n_valid[..., None])
+
+
+def _complete_beam_power(A: Complex, Y: Complex) -> Float:  # snapshots without gaps
+    n_bins, n_sensors, n_snapshots = Y.shape[-3:]
+    norm = (A.real**2 + A.imag**2).sum(axis=2)  # (n_nuisance, n_bins, n_directions)
+    if n_snapshots > n_sensors:  # aᴴ R a, fewer products than with the snapshots
+        RA = (Y @ Y.conj().swapaxes(-1, -2))[..., None, :, :, :] @ A
+        beam = np.maximum((A.real * RA.real + A.imag * RA.imag).sum(axis=-2), 0.0)
+    else:  # |aᴴy| = |aᵀy*|
+        product = Y.conj().swapaxes(-1, -2)[..., None, :, :, :] @ A
+        beam = (product.real**2 + product.imag**2).sum(axis=-2)
+    power = (beam / np.maximum(norm, 1e-12)).sum(axis=-2).max(axis=-2)
+    return np.asarray(power / (n_bins * n_snapshots))
 
 
 def find_peaks(power: Float, *, circular: bool, joined: bool = False) -> Int:

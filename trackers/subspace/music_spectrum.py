@@ -75,8 +75,8 @@ def projected_power(A: ArrayLike, basis: Complex) -> Float:
     >>> projected_power([[1.0, 1.0], [1.0, 0.0]], np.array([[0.0], [1.0]]))
     array([1., 0.])
     """
-    projection = np.asarray(A) @ basis.conj()
-    return np.asarray((projection.real**2 + projection.imag**2).sum(axis=-1))
+    projection = basis.conj().swapaxes(-1, -2) @ np.asarray(A).swapaxes(-1, -2)
+    return np.asarray((projection.real**2 + projection.imag**2).sum(axis=-2))
 
 
 @dataclass(frozen=True, eq=False)
