@@ -286,8 +286,7 @@ def mean_rmse(
 def _exponent(p: float, c: float) -> float:
     """Return an exponent for which c^p is finite and not zero."""
     if not (1 <= number("p", p) < np.inf and abs(p * math.log10(c)) < 150):
-        cure = "c^p must be from 1e-150 to 1e150"
-        raise ValueError(f"p must be finite and at least 1; got {p}: {cure}")
+        raise ValueError(f"p must be finite and at least 1; got {p}: c^p must be from 1e-150 to 1e150")
     return float(p)
 
 
