@@ -97,7 +97,8 @@ def versions() -> str:
         except PackageNotFoundError:
             missing.append(name)
     left_out = f"\n\nNot installed, left out: {', '.join(missing)}." if missing else ""
-    return f"Versions: {', '.join(known)}.{left_out}"
+    half = len(known) // 2
+    return f"Versions: {', '.join(known[:half])},\n{', '.join(known[half:])}.{left_out}"
 
 
 def main() -> None:

@@ -152,7 +152,9 @@ def draw(group: str, measured: list[tuple[Curve, Float]], out: Path) -> None:
     ax.set_xlabel(" or ".join(dict.fromkeys(curve.axis for curve, _ in measured)))
     ax.set_ylabel("CPU of an iteration, ms" if group == "rss" else "CPU of a step, ms")
     ax.grid(visible=True, which="both", alpha=0.3)
-    ax.legend(fontsize="small")
+    low, high = ax.get_ylim()
+    ax.set_ylim(low / 2, 4 * high)  # space for the legend
+    ax.legend(fontsize="small", loc="upper left")
     figure.savefig(out / f"{group}.png", dpi=110)
 
 

@@ -104,8 +104,7 @@ def gospa(
     d = distances(truth, estimate, period, distance)
     pairs = assigned(d, c, p)
     near = pairs[pairs < c]
-    n_cut, surplus = len(pairs) - len(near), d.shape[0] - d.shape[1]
-    detected = float((near**p).sum())
+    n_cut, surplus, detected = len(pairs) - len(near), len(d) - d.shape[1], float((near**p).sum())
     missed = float(c**p * (n_cut / 2 + max(surplus, 0) / alpha))
     false = float(c**p * (n_cut / 2 + max(-surplus, 0) / alpha))
     return Gospa((detected + missed + false) ** (1 / p), detected, missed, false)
@@ -286,7 +285,8 @@ def mean_rmse(
 def _exponent(p: float, c: float) -> float:
     """Return an exponent for which c^p is finite and not zero."""
     if not (1 <= number("p", p) < np.inf and abs(p * math.log10(c)) < 150):
-        raise ValueError(f"p must be finite and at least 1; got {p}: c^p must be from 1e-150 to 1e150")
+        cure = "c^p must be from 1e-150 to 1e150"
+        raise ValueError(f"p must be finite and at least 1; got {p}: {cure}")
     return float(p)
 
 
