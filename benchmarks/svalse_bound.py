@@ -22,8 +22,8 @@ from arrivals.trackers import SVALSE
 from arrivals.trackers.svalse.components import ComponentPosterior, ComponentPrior
 from arrivals.trackers.svalse.coordinate.single_snapshot import SingleSnapshotAscent
 from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver
-from arrivals.trackers.svalse.newton.angle_chart import LOG_2PI
 from arrivals.trackers.svalse.newton.batch import Components
+from arrivals.trackers.svalse.newton.charts.angle_chart import LOG_2PI
 from arrivals.trackers.svalse.newton.elbo import evaluate
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
 from arrivals.trackers.svalse.newton.solver import NewtonSolver

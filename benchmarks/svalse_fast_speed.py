@@ -22,8 +22,8 @@ from svalse_fast import ELECTRICAL, FIGURES, PAPER, row
 from arrivals.measurement_models import ArraySnapshot
 from arrivals.scenarios import create
 from arrivals.trackers import SVALSE, Tracker
-from arrivals.trackers.svalse.newton.angle_chart import LOG_2PI
 from arrivals.trackers.svalse.newton.batch import Components
+from arrivals.trackers.svalse.newton.charts.angle_chart import LOG_2PI
 from arrivals.trackers.svalse.newton.elbo import evaluate
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
 from arrivals.trackers.svalse.newton.step import newton_step

@@ -9,7 +9,7 @@ from arrivals.trackers.svalse.components import ComponentPosterior, ComponentPri
 from arrivals.trackers.svalse.newton.batch import Components
 from arrivals.trackers.svalse.newton.elbo import Evaluation, evaluate
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
-from arrivals.trackers.svalse.newton.state import log_odds
+from arrivals.trackers.svalse.newton.problems import log_odds
 from arrivals.trackers.svalse.svalse import SVALSE
 from arrivals.typing import Complex
 

@@ -25,8 +25,8 @@ from arrivals.trackers.svalse.newton.candidates import (
 )
 from arrivals.trackers.svalse.newton.elbo import Evaluation, evaluate
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
+from arrivals.trackers.svalse.newton.problems import StepInput
 from arrivals.trackers.svalse.newton.solver import NewtonSolver, support_search
-from arrivals.trackers.svalse.newton.state import StepInput
 from arrivals.trackers.svalse.newton.step import (
     negative_hessian,
     newton_step,

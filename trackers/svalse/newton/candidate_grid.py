@@ -7,11 +7,11 @@ from abc import ABC, abstractmethod
 import numpy as np
 
 from arrivals.symmetric import clamped_inverse, log_det
-from arrivals.trackers.svalse.newton.angle_chart import LOG_2PI, AngleChart
 from arrivals.trackers.svalse.newton.batch import Components
+from arrivals.trackers.svalse.newton.charts.angle_chart import LOG_2PI, AngleChart
+from arrivals.trackers.svalse.newton.charts.point_chart import PointChart
 from arrivals.trackers.svalse.newton.elbo import Evaluation
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
-from arrivals.trackers.svalse.newton.point_chart import PointChart
 from arrivals.typing import Bool, Complex, Float, Int
 
 GRID_POINTS_PER_SENSOR = 4  # angles at which components may be added

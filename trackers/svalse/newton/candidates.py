@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from arrivals.symmetric import clamped_inverse, log_det, trace_of_product
-from arrivals.trackers.svalse.newton.angle_chart import LOG_2PI
 from arrivals.trackers.svalse.newton.batch import BatchRecord, Components, any_set
 from arrivals.trackers.svalse.newton.candidate_grid import CandidateGrid
+from arrivals.trackers.svalse.newton.charts.angle_chart import LOG_2PI
 from arrivals.trackers.svalse.newton.elbo import Evaluation
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse, over_snapshots
 from arrivals.typing import Bool, Complex, Float, Int

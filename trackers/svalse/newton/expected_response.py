@@ -11,8 +11,8 @@ from arrivals.measurement_models.manifolds.manifold import (
     angle_manifold,
     is_point_manifold,
 )
-from arrivals.trackers.svalse.newton.angle_chart import AngleChart
-from arrivals.trackers.svalse.newton.point_chart import PointChart
+from arrivals.trackers.svalse.newton.charts.angle_chart import AngleChart
+from arrivals.trackers.svalse.newton.charts.point_chart import PointChart
 from arrivals.trackers.svalse.noise_initialization import NOISE_FLOOR
 from arrivals.typing import Bool, Complex, Float
 

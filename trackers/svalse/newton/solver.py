@@ -26,14 +26,17 @@ from arrivals.trackers.svalse.components import (
 from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver
 from arrivals.trackers.svalse.newton.batch import all_set, any_set
 from arrivals.trackers.svalse.newton.candidate_grid import candidate_grid
+from arrivals.trackers.svalse.newton.compiled.inputs import solve_compiled
+from arrivals.trackers.svalse.newton.compiled.selection import CompiledChoice, is_compiled
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
-from arrivals.trackers.svalse.newton.marginals import marginals
+from arrivals.trackers.svalse.newton.problems import StepInput, initial_values
 from arrivals.trackers.svalse.newton.state import (
+    SolverResult,
     SolverState,
-    StepInput,
     inactive_posterior,
     initial_state,
-    solved_posterior,
+    solved_posteriors,
+    unsolved,
 )
 from arrivals.trackers.svalse.newton.step import newton_step
 from arrivals.trackers.svalse.newton.support_search import (
@@ -43,7 +46,7 @@ from arrivals.trackers.svalse.newton.support_search import (
 )
 from arrivals.trackers.svalse.noise_initialization import noise_floor, power_floor
 from arrivals.typing import Complex
-from arrivals.validation import instance, probability
+from arrivals.validation import instance, one_of, probability
 
 FILL_SHARE = 0.5  # components added before the noise is estimated, per sensor of a filled line
 
@@ -88,6 +91,9 @@ class NewtonSolver(SolverSettings):
         Prior probability that a wave is curved, where sources have a range.
     limits : IterationLimits
         Numbers of Newton steps and of changes of the support.
+    compiled : {"auto", True, False}
+        Solve one problem at a time by functions that numba compiles, `arrivals[fast]`. "auto" does
+        so where there are such functions, for every array with one angle a source.
 
     Notes
     -----
@@ -104,6 +110,7 @@ class NewtonSolver(SolverSettings):
     merge_correlation: float | None = None
     curved_probability: float = 0.2
     limits: IterationLimits = DEFAULT_LIMITS
+    compiled: CompiledChoice = "auto"
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -117,6 +124,13 @@ class NewtonSolver(SolverSettings):
             got = self.curved_probability
             raise ValueError(f"curved_probability must lie between 0 and 1; got {got}")
         instance("limits", self.limits, IterationLimits)
+        if self.compiled is not True and self.compiled is not False:
+            one_of("compiled", self.compiled, ("auto", True, False))
+
+    def check(self, manifold: Manifold, n_snapshots: int, n_moments: int) -> None:
+        """Raise ValueError if compiled functions are required and there are none."""
+        if self.compiled is True:
+            is_compiled(True, manifold, n_moments)
 
     def merging(self, manifold: Manifold, with_prior: bool) -> tuple[float, float | None]:
         """Return the distance, rad, and the correlation by which components are merged."""
@@ -192,9 +206,11 @@ class NewtonSolver(SolverSettings):
         The support search fills, estimates ν and τ, merges, removes, adds and finishes, in that
         order.
         """
-        state = initial_state(
-            steps, search.response, self, search.grid.n_points, search.n_components
-        )
+        values = initial_values(steps, search.response, self, search.n_components)
+        if is_compiled(self.compiled, search.response.manifold):
+            solution = solve_compiled(search, values)
+            return solved_posteriors(solution, steps, search.response, self.kl_weight)
+        state = initial_state(values, search.response, search.grid.n_points)
         state.steps_remaining[:] = np.where(state.estimate_rho, 0, self.limits.inner)
         state.tolerance[:] = self.limits.inner_tolerance
         posteriors: dict[int, ComponentPosterior] = {}
@@ -204,7 +220,7 @@ class NewtonSolver(SolverSettings):
                 part = state.select(due)
                 search.next_change(part)
                 state = state.replace_rows(due, part)
-                posteriors |= solved_posteriors(state, steps, search)
+                posteriors |= done_posteriors(state, steps, search)
                 if all_set(state.done):
                     return [posteriors[n] for n in range(len(steps))]
                 state = unsolved(state)
@@ -224,25 +240,18 @@ class NewtonSolver(SolverSettings):
         state.steps_remaining = np.minimum(steps, self.max_iterations - state.iterations)
 
 
-def solved_posteriors(
+def done_posteriors(
     state: SolverState, steps: Sequence[StepInput], search: SupportSearch
 ) -> dict[int, ComponentPosterior]:
     """Return the posteriors of the problems that are done, by their numbers."""
     if not any_set(state.done):
         return {}
-    result = marginals(search.response, state.evaluation, search.kl_weight)
-    chart, numbers = search.response.chart, state.problem.tolist()
-    return {
-        numbers[i]: solved_posterior(state, i, steps[numbers[i]], chart, result)
-        for i in map(int, np.flatnonzero(state.done))
-    }
-
-
-def unsolved(state: SolverState) -> SolverState:
-    """Return the problems that are not done, without slots that none of them uses."""
-    state = state.select(~state.done)
-    state.evaluation, state.saved = state.evaluation.trimmed(), state.saved.trimmed()
-    return state
+    numbers = state.problem[state.done].tolist()
+    solution = SolverResult.of(state.select(state.done))
+    solved = solved_posteriors(
+        solution, [steps[n] for n in numbers], search.response, search.kl_weight
+    )
+    return dict(zip(numbers, solved, strict=True))
 
 
 @lru_cache(maxsize=16)  # arrays, and some sets of their sensors: each holds a grid of responses

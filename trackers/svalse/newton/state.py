@@ -1,4 +1,4 @@
-"""Initial state and result of the Newton solver."""
+"""State of the Newton solver between changes of the support, and its result."""
 
 from __future__ import annotations
 
@@ -7,83 +7,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from arrivals.measurement_models.manifolds.manifold import Manifold, is_angle_manifold
-from arrivals.trackers.svalse.components import (
-    ComponentPosterior,
-    ComponentPrior,
-    SolverSettings,
-)
+from arrivals.trackers.svalse.components import ComponentPosterior
 from arrivals.trackers.svalse.newton.batch import BatchRecord, Components
 from arrivals.trackers.svalse.newton.candidates import RemovedComponents
 from arrivals.trackers.svalse.newton.elbo import Evaluation, evaluate
 from arrivals.trackers.svalse.newton.expected_response import Chart, ExpectedResponse
-from arrivals.trackers.svalse.newton.marginals import ComponentMarginals
-from arrivals.trackers.svalse.noise_initialization import (
-    NOISE_FLOOR,
-    initial_noise,
-    noise_from_eigenvalues,
-)
+from arrivals.trackers.svalse.newton.marginals import ComponentMarginals, marginals
+from arrivals.trackers.svalse.newton.problems import InitialValues, StepInput
 from arrivals.typing import Bool, Complex, Float, Int
 
-MAX_LOG_ODDS = 500.0  # bound of the log odds of certain events
 MAX_AGE = 3  # steps that a component is tracked without being active
 SNR_WEIGHT = 0.3  # of the newest signal-to-noise ratio in the start of the next step
 DB = 10 / np.log(10)
 MIN_SNR_DB, MAX_SNR_DB = 0.7 * DB, 12 * DB  # at which the noise of the next step may start
-NEW_IN_FILL, MIN_FILL = 4, 8  # components that the fill stage may add to the active ones
-NO_PRIOR = ComponentPrior(np.zeros(0), np.zeros(0), np.zeros(0), 0.5)
-
-
-class StepInput:
-    """Snapshots of a step, each bin scaled to unit power, and the prior of its components.
-
-    Parameters
-    ----------
-    Y : ndarray, shape (n_bins, n_sensors, n_snapshots)
-    prior : ComponentPrior or None
-    max_components : int
-        Components that may be used at once.
-
-    Attributes
-    ----------
-    Y : ndarray, shape (n_bins, n_sensors, n_snapshots)
-        Of unit power in every bin that has power.
-    power : ndarray, shape (n_bins,)
-        Mean power of a sensor, before.
-    no_power : bool
-        True if all data are zero.
-    n_tracked : int
-        Tracked components.
-    age : ndarray of int, shape (n_tracked,)
-        Steps since each was last active.
-    """
-
-    def __init__(self, Y: Complex, prior: ComponentPrior | None, max_components: int) -> None:
-        self.prior = NO_PRIOR if prior is None else prior
-        self.power = (Y.real**2 + Y.imag**2).sum(axis=(1, 2)) / (Y.shape[1] * Y.shape[2])
-        self.no_power = not self.power.any()
-        scale = np.sqrt(np.where(self.power > 0, self.power, 1.0))
-        self.Y = Y / scale[:, None, None]
-        self.n_tracked = n = min(len(self.prior.mu), max_components)
-        age = self.prior.age
-        self.age = np.zeros(n, dtype=np.int64) if age is None else age[:n]
-
-    def snr_db(self, manifold: Manifold, settings: SolverSettings) -> float:
-        """Return the signal-to-noise ratio at which the noise starts.
-
-        That of the steps before, else that of the settings; if that is None, by the covariance of
-        many snapshots or the lags of one snapshot of a line, else 20.
-        """
-        if self.prior.snr_db is not None:
-            return self.prior.snr_db
-        if settings.snr_db is not None:
-            return settings.snr_db
-        M, N = self.Y.shape[1:]
-        if M * settings.tempering <= N:  # snapshots enough for a covariance
-            return -10 * float(np.log10(noise_from_eigenvalues(self.Y)).mean())
-        if N > 1 or not is_angle_manifold(manifold) or manifold.coefficients is not None:
-            return 20.0
-        return -10 * float(np.log10(initial_noise(self.Y[0, :, 0], manifold.harmonics, None)))
 
 
 @dataclass(eq=False)
@@ -149,33 +85,11 @@ class SolverState(BatchRecord):
         return len(self.problem)
 
 
-def initial_state(
-    steps: Sequence[StepInput],
-    response: ExpectedResponse,
-    settings: SolverSettings,
-    n_points: int,
-    n_components: int,
-) -> SolverState:
+def initial_state(values: InitialValues, response: ExpectedResponse, n_points: int) -> SolverState:
     """Return the state in which all tracked components are active, with the initial noise."""
-    B, half = len(steps), max(n_components // 2, 1)
-    components = tracked_components(steps, response.chart)
-    K = np.array([step.n_tracked for step in steps])
-    estimate_rho = K == 0
-    snr = np.array([step.snr_db(response.manifold, settings) for step in steps])
-    nu = np.maximum(10 ** (-snr / 10), response.noise_floor)
-    n_active = np.array([np.count_nonzero(step.age == 0) for step in steps])
-    tau = np.maximum(1 - nu, NOISE_FLOOR) / np.where(estimate_rho, half, np.maximum(n_active, 1))
-    rho = np.array([step.prior.birth for step in steps])
-    rho[estimate_rho] = half / max(n_components, 2)
-    all_inactive = n_components * np.log1p(-np.minimum(rho, 0.999))
+    B, components, K = len(values), values.components, values.K
     evaluation = evaluate(
-        response,
-        np.stack([step.Y for step in steps]),
-        components,
-        K,
-        nu=np.outer(nu, np.ones(response.n_bins)),
-        tau=np.outer(tau, response.n_sensors / response.norm2),
-        log_prior_inactive=np.where(estimate_rho, all_inactive, 0.0),
+        response, values.Y, components, K, values.nu, values.tau, values.log_prior_inactive
     )
     off, zero, nan = np.zeros(B, dtype=np.bool_), np.zeros(B, dtype=np.int64), np.full(B, np.nan)
     removed = RemovedComponents(
@@ -185,55 +99,78 @@ def initial_state(
     )
     return SolverState(
         problem=np.arange(B), evaluation=evaluation, saved=evaluation, removed=removed, n_known=K,
-        log_odds_new=log_odds(rho), estimate_rho=estimate_rho, filling=~off, finished=off.copy(),
-        done=off.copy(), on_trial=off.copy(), estimate_nu=off.copy(),
+        log_odds_new=values.log_odds_new, estimate_rho=values.estimate_rho, filling=~off,
+        finished=off.copy(), done=off.copy(), on_trial=off.copy(), estimate_nu=off.copy(),
         may_switch=np.full(B, response.chart.has_curvature), had_final=off.copy(),
-        fill_target=np.maximum(n_active + NEW_IN_FILL, MIN_FILL), steps_remaining=zero.copy(),
+        fill_target=values.fill_target, steps_remaining=zero.copy(),
         tolerance=np.zeros(B), record=np.full(B, -np.inf), before=nan.copy(), rejected=nan.copy(),
-        snr_db=snr, iterations=zero.copy(), n_changes=zero.copy(),
+        snr_db=values.snr_db, iterations=zero.copy(), n_changes=zero.copy(),
     )  # fmt: skip
 
 
-def tracked_components(steps: Sequence[StepInput], chart: Chart) -> Components:
-    """Return the tracked components as they start."""
-    L = max(1, *(step.n_tracked for step in steps))
-    components = Components.zeros(len(steps), L, chart.layout).with_slots(np.arange(L))
-    rho = np.full((len(steps), L), 0.5)
-    for i, step in enumerate(steps):
-        n = step.n_tracked
-        components.point[i, :, :n] = step.prior.mu[:n].T
-        components.prior_precision[i, :, :n] = step.prior.kappa[:n].T
-        components.kl_constant[i, :n] = chart.prior_constant(
-            components.prior_precision[i : i + 1, :, :n]
-        )[0]
-        if step.prior.curved is not None and chart.has_curvature:
-            components.curved[i, :n] = step.prior.curved[:n]
-        rho[i, :n] = step.prior.existence[:n]
-    components.prior_mean[...] = components.point
-    components.covariance[...] = chart.start_covariance(components.prior_precision)
-    components.log_odds[...] = log_odds(rho)
-    return components
+def unsolved(state: SolverState) -> SolverState:
+    """Return the problems that are not done, without slots that none of them uses."""
+    state = state.select(~state.done)
+    state.evaluation, state.saved = state.evaluation.trimmed(), state.saved.trimmed()
+    return state
 
 
-def log_odds(rho: Float) -> Float:
-    """Return ln ρ/(1-ρ), within ± `MAX_LOG_ODDS`.
+@dataclass(eq=False)
+class SolverResult(BatchRecord):
+    """Result of the solver, one problem a row.
 
-    Examples
-    --------
-    >>> log_odds(np.array([0.0, 0.5, 1.0]))
-    array([-500.,    0.,  500.])
+    Attributes
+    ----------
+    evaluation : Evaluation
+    memory : Components
+        All components of the step, as they were when they were removed.
+    n_known : ndarray of int, shape (B,)
+        Components in the memory.
+    snr_db : ndarray, shape (B,)
+        Signal-to-noise ratio at which the noise started.
+    iterations : ndarray of int, shape (B,)
+        Newton steps.
+    finished : ndarray of bool, shape (B,)
+        True if the final steps were taken.
     """
-    with np.errstate(divide="ignore"):
-        return np.asarray(np.clip(np.log(rho) - np.log1p(-rho), -MAX_LOG_ODDS, MAX_LOG_ODDS))
+
+    evaluation: Evaluation
+    memory: Components
+    n_known: Int
+    snr_db: Float
+    iterations: Int
+    finished: Bool
+
+    def __len__(self) -> int:
+        return len(self.n_known)
+
+    @classmethod
+    def of(cls, state: SolverState) -> SolverResult:
+        """Return the present result of problems that are being solved."""
+        return cls(
+            state.evaluation, state.removed.memory, state.n_known, state.snr_db,
+            state.iterations, state.finished,
+        )  # fmt: skip
+
+
+def solved_posteriors(
+    solution: SolverResult, steps: Sequence[StepInput], response: ExpectedResponse, kl_weight: float
+) -> list[ComponentPosterior]:
+    """Return the posteriors of the steps that were solved."""
+    result = marginals(response, solution.evaluation, kl_weight)
+    return [
+        solved_posterior(solution, i, step, response.chart, result) for i, step in enumerate(steps)
+    ]
 
 
 def solved_posterior(
-    state: SolverState, i: int, step: StepInput, chart: Chart, result: ComponentMarginals
+    solution: SolverResult, i: int, step: StepInput, chart: Chart, result: ComponentMarginals
 ) -> ComponentPosterior:
     """Return the posterior of the i-th row, whose active components have these marginals."""
-    evaluation, K, n = state.evaluation, int(state.evaluation.K[i]), int(state.n_known[i])
+    evaluation, K = solution.evaluation, int(solution.evaluation.K[i])
+    n = int(solution.n_known[i])
     slot = evaluation.components.slot[i, :K]
-    memory = state.removed.memory.like(state.removed.memory.packed[i : i + 1, :, :n].copy())
+    memory = solution.memory.like(solution.memory.packed[i : i + 1, :, :n].copy())
     memory.packed[0][:, slot] = evaluation.components.packed[i, :, :K]
     marginal, stated = memory.covariance[0].copy(), memory.covariance[0].copy()
     marginal[:, slot] = result.covariance[i, :, :K]
@@ -247,7 +184,7 @@ def solved_posterior(
     age[slot] = 0
     newest = -10 * mean(np.log10(evaluation.nu[i]))
     noise, power = evaluation.nu[i] * step.power, evaluation.tau[i] * step.power
-    snr_db = (1 - SNR_WEIGHT) * state.snr_db[i] + SNR_WEIGHT * newest
+    snr_db = (1 - SNR_WEIGHT) * solution.snr_db[i] + SNR_WEIGHT * newest
     return ComponentPosterior(
         **chart.densities(memory, marginal, stated),
         active=age == 0,
@@ -256,8 +193,8 @@ def solved_posterior(
         evidence=evidence,
         noise=mean(noise),
         power=mean(power),
-        iterations=int(state.iterations[i]),
-        converged=bool(state.finished[i]),
+        iterations=int(solution.iterations[i]),
+        converged=bool(solution.finished[i]),
         snr_db=min(max(float(snr_db), MIN_SNR_DB), MAX_SNR_DB),
         bin_noise=noise,
     )

@@ -16,7 +16,8 @@ from arrivals.trackers.svalse.newton.candidates import (
 )
 from arrivals.trackers.svalse.newton.elbo import evaluate
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
-from arrivals.trackers.svalse.newton.state import SolverState, log_odds
+from arrivals.trackers.svalse.newton.problems import log_odds
+from arrivals.trackers.svalse.newton.state import SolverState
 from arrivals.trackers.svalse.newton.wave_switch import switch_waves
 from arrivals.typing import Bool, Float, Int
 from arrivals.validation import count, not_negative

@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from arrivals.trackers.svalse.newton.batch import any_set
+from arrivals.trackers.svalse.newton.charts.point_chart import PointChart
 from arrivals.trackers.svalse.newton.elbo import Evaluation, evaluate
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
-from arrivals.trackers.svalse.newton.point_chart import PointChart
 from arrivals.trackers.svalse.newton.step import newton_step, slopes, weights
 from arrivals.typing import Bool, Float, Int
 

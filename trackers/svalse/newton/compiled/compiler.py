@@ -1,0 +1,48 @@
+"""Compile functions by numba if it is installed; else leave them as they are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any, TypeVar
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+MIN_NUMBA = (0, 61)  # the first for numpy 2.1 and later
+# Sums may be reordered, products contracted; NaN and infinities stay what they are.
+FAST_MATH = {"reassoc", "contract", "nsz", "arcp"}
+
+
+def compiled(function: Function) -> Function:
+    """Return a function that is compiled at its first call, and kept on disk; or as it is."""
+    return _with_options(function)
+
+
+def compiled_part(function: Function) -> Function:
+    """Return the same for a function that only compiled functions call: it compiles faster."""
+    return _with_options(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+
+
+def _with_options(function: Function, **options: bool) -> Function:
+    if compiler_error() is not None:
+        return function
+    import numba
+
+    jit: Any = numba.njit
+    result: Function = jit(function, cache=True, fastmath=FAST_MATH, error_model="numpy", **options)
+    return result
+
+
+@cache
+def compiler_error() -> str | None:
+    """Return why numba cannot be used: "" if it is not installed, None if it can."""
+    try:
+        import numba
+    except ModuleNotFoundError as error:
+        return "" if error.name == "numba" else str(error)
+    except Exception as error:  # a broken installation raises any of them
+        return str(error)
+    version = tuple(int(part) for part in numba.__version__.split(".")[:2])
+    if version < MIN_NUMBA:
+        oldest = ".".join(map(str, MIN_NUMBA))
+        return f"numba must be at least {oldest}; got {numba.__version__}"
+    return None

@@ -1,0 +1,181 @@
+"""Records that the compiled functions read and write, of one problem; fields as elsewhere."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from arrivals.typing import Bool, Complex, Float, Int
+
+# Rows of components, in the order of `ONE_ANGLE`.
+MU, VARIANCE, PRIOR_MU, PRIOR_KAPPA, LOG_ODDS, KL_CONSTANT, SLOT = range(7)
+
+
+class ChartNumbers(NamedTuple):
+    """Numbers of an `ExpectedResponse` of angles.
+
+    Attributes
+    ----------
+    harmonics : ndarray, shape (n_k,)
+    G : ndarray, shape (F, n_k, M)
+        Coefficients of the harmonics; empty if the harmonics are the sensors.
+    norm2 : ndarray, shape (F,)
+    series : ndarray, shape (F, n_i)
+        Series of ‖a‖²; empty if it is constant.
+    tempering, power_floor, noise_floor, longest_step, max_variance : float
+    step : float
+        Electrical angle at endfire; 0 if the angle is the direction.
+    front_back_ambiguous : bool
+    """
+
+    harmonics: Float
+    G: Complex
+    norm2: Float
+    series: Complex
+    tempering: float
+    power_floor: float
+    noise_floor: float
+    longest_step: float
+    max_variance: float
+    step: float
+    front_back_ambiguous: bool
+
+
+class GridNumbers(NamedTuple):
+    """Numbers of an `AngleCandidates`.
+
+    Attributes
+    ----------
+    theta, doa : ndarray, shape (n_points,)
+    A : ndarray, shape (F, n_points, M)
+    gram, norm2 : ndarray, shape (F, n_points)
+    log_range, cos_apart, cos_merge, cos_near, merge : float
+    merge_correlation : float
+        0 if a distance decides.
+    """
+
+    theta: Float
+    doa: Float
+    A: Complex
+    gram: Float
+    norm2: Float
+    log_range: float
+    cos_apart: float
+    cos_merge: float
+    cos_near: float
+    merge: float
+    merge_correlation: float
+
+
+class SearchNumbers(NamedTuple):
+    """Numbers of a `SupportSearch` and its `IterationLimits`."""
+
+    inner: int
+    removal: int
+    fill: int
+    final: int
+    max_changes: int
+    max_iterations: int
+    n_components: int
+    max_active: int
+    inner_tolerance: float
+    large_gain: float
+    tolerance: float
+    kl_weight: float
+    reestimate: bool
+
+
+class Terms(NamedTuple):
+    """The fields of an `Evaluation`, with space for L components, and numbers as arrays (1,).
+
+    Attributes
+    ----------
+    responses : ndarray, shape (F, 3, L, M)
+        â, ∂â and ∂²â.
+    X : ndarray, shape (F, 3, L, L) or (F, 4, L, L)
+    """
+
+    Y: Complex
+    packed: Float
+    K: Int
+    nu: Float
+    tau: Float
+    log_prior_inactive: Float
+    responses: Complex
+    X: Complex
+    h: Complex
+    uncertainty_loss: Float
+    prior_gradient: Float
+    prior_curvature: Float
+    D: Float
+    log_prior: Float
+    W: Complex
+    G: Complex
+    explained: Float
+    F: Float
+
+
+class Removed(NamedTuple):
+    """The fields of `RemovedComponents`, and the number of components in the memory, (1,)."""
+
+    memory: Float
+    can_reactivate: Bool
+    excluded: Bool
+    n_known: Int
+
+
+class Progress(NamedTuple):
+    """The fields of a `SolverState` that change: flags and counts, and the criteria.
+
+    Attributes
+    ----------
+    filling, finished, on_trial, estimate_nu, done : ndarray of bool, shape (1,)
+    steps_remaining, iterations, n_changes : ndarray of int, shape (1,)
+    tolerance, record, before, rejected : ndarray, shape (1,)
+    """
+
+    filling: Bool
+    finished: Bool
+    on_trial: Bool
+    estimate_nu: Bool
+    done: Bool
+    steps_remaining: Int
+    iterations: Int
+    n_changes: Int
+    tolerance: Float
+    record: Float
+    before: Float
+    rejected: Float
+
+
+class Start(NamedTuple):
+    """What a problem starts with, beside its components: arrays (1,), or (B,) of all problems."""
+
+    estimate_rho: Bool
+    log_odds_new: Float
+    fill_target: Int
+
+
+class Task(NamedTuple):
+    """What does not change while a problem is solved."""
+
+    chart: ChartNumbers
+    grid: GridNumbers
+    search: SearchNumbers
+    start: Start
+
+
+class Work(NamedTuple):
+    """What changes: the present terms, those of a step on trial and of before an addition."""
+
+    now: Terms
+    trial: Terms
+    saved: Terms
+    removed: Removed
+    state: Progress
+
+
+class Outcome(NamedTuple):
+    """How each problem ended, (B,): Newton steps, and whether the final ones were taken."""
+
+    iterations: Int
+    finished: Bool
