@@ -93,13 +93,13 @@ def student_factor(freedom: Float) -> Float:
     >>> student_factor(np.array([4.0, 8.0, 24.0])).round(3)
     array([1.616, 1.254, 1.075])
     """
-    inverse, factor = _student_table()
+    inverse, factor = student_table()
     return np.interp(1 / np.maximum(freedom, MIN_FREEDOM), inverse, factor)
 
 
 @cache
-def _student_table() -> tuple[Float, Float]:
-    """Return 1/d and c(d) at 256 points."""
+def student_table() -> tuple[Float, Float]:
+    """Return 1/d and c(d) of `student_factor` at 256 points."""
     from scipy.special import stdtrit
 
     inverse = np.linspace(0.0, 1 / MIN_FREEDOM, 256)

@@ -19,7 +19,7 @@ LINE, CIRCLE = SensorArray.ula(10, 0.5), SensorArray.uca(7, 0.5)
 UNEVEN = SensorArray(np.array([0.0, 0.5, 1.3, 2.2, 3.0, 4.4]))
 KERNELS = [
     f"arrivals.trackers.svalse.newton.compiled.{name}"
-    for name in ("elbo", "step", "candidates", "search", "solve")
+    for name in ("elbo", "step", "candidates", "search", "marginals", "solve")
 ]
 HAS_NUMBA = compiler.compiler_error() is None
 CASES: dict[str, tuple[ArraySnapshot, dict[str, Any]]] = {

@@ -35,7 +35,7 @@ from arrivals.trackers.svalse.newton.state import (
     SolverState,
     inactive_posterior,
     initial_state,
-    solved_posteriors,
+    solved_posterior,
     unsolved,
 )
 from arrivals.trackers.svalse.newton.step import newton_step
@@ -208,8 +208,8 @@ class NewtonSolver(SolverSettings):
         """
         values = initial_values(steps, search.response, self, search.n_components)
         if is_compiled(self.compiled, search.response.manifold):
-            solution = solve_compiled(search, values)
-            return solved_posteriors(solution, steps, search.response, self.kl_weight)
+            solved, chart = solve_compiled(search, values), search.response.chart
+            return [solved_posterior(solved, i, step, chart) for i, step in enumerate(steps)]
         state = initial_state(values, search.response, search.grid.n_points)
         state.steps_remaining[:] = np.where(state.estimate_rho, 0, self.limits.inner)
         state.tolerance[:] = self.limits.inner_tolerance
@@ -246,12 +246,11 @@ def done_posteriors(
     """Return the posteriors of the problems that are done, by their numbers."""
     if not any_set(state.done):
         return {}
-    numbers = state.problem[state.done].tolist()
-    solution = SolverResult.of(state.select(state.done))
-    solved = solved_posteriors(
-        solution, [steps[n] for n in numbers], search.response, search.kl_weight
-    )
-    return dict(zip(numbers, solved, strict=True))
+    done = state.select(state.done)
+    solved, chart = SolverResult.of(done, search.response, search.kl_weight), search.response.chart
+    return {
+        n: solved_posterior(solved, i, steps[n], chart) for i, n in enumerate(done.problem.tolist())
+    }
 
 
 @lru_cache(maxsize=16)  # arrays, and some sets of their sensors: each holds a grid of responses

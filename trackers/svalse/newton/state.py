@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -116,12 +115,18 @@ def unsolved(state: SolverState) -> SolverState:
 
 
 @dataclass(eq=False)
-class SolverResult(BatchRecord):
+class SolverResult:
     """Result of the solver, one problem a row.
 
     Attributes
     ----------
-    evaluation : Evaluation
+    components : Components
+    K : ndarray of int, shape (B,)
+        Components in use.
+    W : ndarray, shape (B, F, L, N)
+    nu, tau : ndarray, shape (B, F)
+        As in `Evaluation`.
+    marginals : ComponentMarginals
     memory : Components
         All components of the step, as they were when they were removed.
     n_known : ndarray of int, shape (B,)
@@ -134,57 +139,49 @@ class SolverResult(BatchRecord):
         True if the final steps were taken.
     """
 
-    evaluation: Evaluation
+    components: Components
+    K: Int
+    W: Complex
+    nu: Float
+    tau: Float
+    marginals: ComponentMarginals
     memory: Components
     n_known: Int
     snr_db: Float
     iterations: Int
     finished: Bool
 
-    def __len__(self) -> int:
-        return len(self.n_known)
-
     @classmethod
-    def of(cls, state: SolverState) -> SolverResult:
-        """Return the present result of problems that are being solved."""
+    def of(cls, state: SolverState, response: ExpectedResponse, kl_weight: float) -> SolverResult:
+        """Return the result of problems that are done."""
+        now = state.evaluation
         return cls(
-            state.evaluation, state.removed.memory, state.n_known, state.snr_db,
-            state.iterations, state.finished,
+            now.components, now.K, now.W, now.nu, now.tau, marginals(response, now, kl_weight),
+            state.removed.memory, state.n_known, state.snr_db, state.iterations, state.finished,
         )  # fmt: skip
 
 
-def solved_posteriors(
-    solution: SolverResult, steps: Sequence[StepInput], response: ExpectedResponse, kl_weight: float
-) -> list[ComponentPosterior]:
-    """Return the posteriors of the steps that were solved."""
-    result = marginals(response, solution.evaluation, kl_weight)
-    return [
-        solved_posterior(solution, i, step, response.chart, result) for i, step in enumerate(steps)
-    ]
-
-
 def solved_posterior(
-    solution: SolverResult, i: int, step: StepInput, chart: Chart, result: ComponentMarginals
+    solved: SolverResult, i: int, step: StepInput, chart: Chart
 ) -> ComponentPosterior:
-    """Return the posterior of the i-th row, whose active components have these marginals."""
-    evaluation, K = solution.evaluation, int(solution.evaluation.K[i])
-    n = int(solution.n_known[i])
-    slot = evaluation.components.slot[i, :K]
-    memory = solution.memory.like(solution.memory.packed[i : i + 1, :, :n].copy())
-    memory.packed[0][:, slot] = evaluation.components.packed[i, :, :K]
+    """Return the posterior of the i-th row."""
+    K, n = int(solved.K[i]), int(solved.n_known[i])
+    slot, result = solved.components.slot[i, :K], solved.marginals
+    memory = solved.memory.like(solved.memory.packed[i : i + 1, :, :n].copy())
+    memory.packed[0][:, slot] = solved.components.packed[i, :, :K]
     marginal, stated = memory.covariance[0].copy(), memory.covariance[0].copy()
     marginal[:, slot] = result.covariance[i, :, :K]
     stated[:, slot] = result.stated_covariance[i, :, :K]
     amplitude, evidence = np.zeros(n, dtype=np.complex128), np.full(n, -np.inf)
-    amplitude[slot] = mean_amplitudes(evaluation.W[i, :, :K], step.power)
+    amplitude[slot] = mean_amplitudes(solved.W[i, :, :K], step.power)
     evidence[slot] = result.log_odds[i, :K]
     age = np.ones(n, dtype=np.int64)
     age[: step.n_tracked] = step.age + 1
     age[age > MAX_AGE] = -1
     age[slot] = 0
-    newest = -10 * mean(np.log10(evaluation.nu[i]))
-    noise, power = evaluation.nu[i] * step.power, evaluation.tau[i] * step.power
-    snr_db = (1 - SNR_WEIGHT) * solution.snr_db[i] + SNR_WEIGHT * newest
+    newest = -10 * mean(np.log10(solved.nu[i]))
+    noise, power = solved.nu[i] * step.power, solved.tau[i] * step.power
+    snr_db = (1 - SNR_WEIGHT) * solved.snr_db[i] + SNR_WEIGHT * newest
     return ComponentPosterior(
         **chart.densities(memory, marginal, stated),
         active=age == 0,
@@ -193,8 +190,8 @@ def solved_posterior(
         evidence=evidence,
         noise=mean(noise),
         power=mean(power),
-        iterations=int(solution.iterations[i]),
-        converged=bool(solution.finished[i]),
+        iterations=int(solved.iterations[i]),
+        converged=bool(solved.finished[i]),
         snr_db=min(max(float(snr_db), MIN_SNR_DB), MAX_SNR_DB),
         bin_noise=noise,
     )

@@ -18,7 +18,10 @@ def compiled(function: Function) -> Function:
 
 
 def compiled_part(function: Function) -> Function:
-    """Return the same for a function that only compiled functions call: it compiles faster."""
+    """Return the same for a function that only compiled functions call: it compiles faster.
+
+    It has no form that Python could call.
+    """
     return _with_options(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
 

@@ -7,6 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from arrivals.measurement_models.manifolds.uniform_line import UniformLineManifold
+from arrivals.trackers.marginal_variances import student_table
 from arrivals.trackers.svalse.newton.candidate_grid import AngleCandidates
 from arrivals.trackers.svalse.newton.charts.angle_chart import AngleChart
 from arrivals.trackers.svalse.newton.compiled.records import (
@@ -17,9 +18,8 @@ from arrivals.trackers.svalse.newton.compiled.records import (
     SearchNumbers,
     Start,
     Task,
-    Terms,
 )
-from arrivals.trackers.svalse.newton.elbo import Evaluation
+from arrivals.trackers.svalse.newton.marginals import ComponentMarginals
 from arrivals.trackers.svalse.newton.problems import InitialValues
 from arrivals.trackers.svalse.newton.state import SolverResult
 from arrivals.trackers.svalse.newton.support_search import SupportSearch
@@ -57,7 +57,7 @@ def numbers_of(search: SupportSearch) -> tuple[ChartNumbers, GridNumbers, Search
             limits.inner, limits.removal, limits.fill, limits.final, limits.max_changes,
             search.max_iterations, search.n_components, search.max_active,
             float(limits.inner_tolerance), float(limits.large_gain), float(search.tolerance),
-            float(search.kl_weight), bool(search.reestimate),
+            float(search.kl_weight), bool(search.reestimate), *student_table(),
         ),
     )  # fmt: skip
 
@@ -75,6 +75,7 @@ def solve_compiled(search: SupportSearch, values: InitialValues) -> SolverResult
     search : SupportSearch
         Of an array of which there is a compiled form.
     values : InitialValues
+        Its variances are replaced by those of the solution.
 
     Returns
     -------
@@ -84,65 +85,41 @@ def solve_compiled(search: SupportSearch, values: InitialValues) -> SolverResult
     from arrivals.trackers.svalse.newton.compiled.solve import solve_all
 
     chart, grid, numbers = numbers_of(search)
-    old = values.components.packed
-    B, n_rows, n_tracked = old.shape
-    L = max(int(values.K.max()), search.max_active) + 1
+    old, (B, F, _, N) = values.components.packed, values.Y.shape
+    n_rows, n_tracked = old.shape[1:]
+    L = max(n_tracked, search.max_active) + 1
     n_slots = n_tracked + search.limits.max_changes + 3 * L  # each change removes one at most
-    terms = empty_terms(values, L, linear=search.response.chart.is_linear)
-    memory = np.zeros((B, n_rows, n_slots))
-    terms.packed[:, :, :n_tracked] = memory[:, :, :n_tracked] = old
+    packed, memory = np.zeros((B, n_rows, L)), np.zeros((B, n_rows, n_slots))
+    packed[:, :, :n_tracked] = memory[:, :, :n_tracked] = old
+    start = Start(
+        np.ascontiguousarray(values.Y), packed, values.K.copy(), values.nu, values.tau,
+        values.log_prior_inactive, values.estimate_rho, values.log_odds_new,
+        np.minimum(search.fill_target, values.fill_target),
+    )  # fmt: skip
     removed = Removed(
         memory,
         np.zeros((B, n_tracked), dtype=np.bool_),
         np.zeros((B, grid.theta.size), dtype=np.bool_),
         values.K[:, None].copy(),
     )
-    outcome = Outcome(np.zeros(B, dtype=np.int64), np.zeros(B, dtype=np.bool_))
-    target = np.minimum(search.fill_target, values.fill_target)
-    start = Start(values.estimate_rho, values.log_odds_new, target)
-    solve_all(Task(chart, grid, numbers, start), terms, removed, outcome)
-    n_known = removed.n_known[:, 0]
+    of_each = np.zeros((3, B, L))
+    outcome = Outcome(
+        np.zeros(B, dtype=np.int64), np.zeros(B, dtype=np.bool_),
+        np.zeros((B, F, L, N), dtype=np.complex128), of_each[0], of_each[1], of_each[2],
+    )  # fmt: skip
+    solve_all(Task(chart, grid, numbers, start), removed, outcome)
     return SolverResult(
-        evaluation=evaluation_of(terms, values),
-        memory=values.components.like(memory[:, :, : max(int(n_known.max()), 1)]),
-        n_known=n_known,
+        components=values.components.like(packed),
+        K=start.K,
+        W=outcome.W,
+        nu=start.nu,
+        tau=start.tau,
+        marginals=ComponentMarginals(
+            outcome.covariance[:, None], outcome.stated_covariance[:, None], outcome.log_odds
+        ),
+        memory=values.components.like(memory),
+        n_known=removed.n_known[:, 0],
         snr_db=values.snr_db,
         iterations=outcome.iterations,
         finished=outcome.finished,
     )
-
-
-def empty_terms(values: InitialValues, L: int, linear: bool) -> Terms:
-    """Return the terms of all problems with their snapshots, numbers and variances."""
-    B, F, M, N = values.Y.shape
-    n_rows = values.components.packed.shape[1]
-
-    def real(*shape: int) -> Float:
-        return np.zeros((B, *shape))
-
-    def zeros(*shape: int) -> np.ndarray[tuple[int, ...], np.dtype[np.complex128]]:
-        return np.zeros((B, F, *shape), dtype=np.complex128)
-
-    return Terms(
-        Y=np.ascontiguousarray(values.Y), packed=real(n_rows, L), K=values.K[:, None].copy(),
-        nu=values.nu.copy(), tau=values.tau.copy(),
-        log_prior_inactive=values.log_prior_inactive[:, None].copy(),
-        responses=zeros(3, L, M), X=zeros(3 if linear else 4, L, L), h=zeros(3, L, N),
-        uncertainty_loss=real(F, L), prior_gradient=real(L), prior_curvature=real(L), D=real(L),
-        log_prior=real(1), W=zeros(L, N), G=zeros(L, L), explained=real(F), F=real(1),
-    )  # fmt: skip
-
-
-def evaluation_of(terms: Terms, values: InitialValues) -> Evaluation:
-    """Return the terms as an evaluation, without slots that no problem uses."""
-    K, L = terms.K[:, 0], terms.packed.shape[2]
-    return Evaluation(
-        Y=terms.Y, components=values.components.like(terms.packed), K=K,
-        used=np.arange(L) < K[:, None], nu=terms.nu, tau=terms.tau,
-        log_prior_inactive=terms.log_prior_inactive[:, 0], A=terms.responses[:, :, 0],
-        X=terms.X, h=terms.h, uncertainty_loss=terms.uncertainty_loss,
-        prior_gradient=terms.prior_gradient[:, None],
-        prior_curvature=terms.prior_curvature[:, None], D=terms.D,
-        log_prior=terms.log_prior[:, 0], W=terms.W, G=terms.G, explained=terms.explained,
-        F=terms.F[:, 0],
-    ).trimmed()  # fmt: skip

@@ -67,7 +67,7 @@ class GridNumbers(NamedTuple):
 
 
 class SearchNumbers(NamedTuple):
-    """Numbers of a `SupportSearch` and its `IterationLimits`."""
+    """Numbers of a `SupportSearch` and its `IterationLimits`; the table of `student_factor`."""
 
     inner: int
     removal: int
@@ -82,6 +82,8 @@ class SearchNumbers(NamedTuple):
     tolerance: float
     kl_weight: float
     reestimate: bool
+    inverse_freedom: Float
+    student_factor: Float
 
 
 class Terms(NamedTuple):
@@ -148,8 +150,18 @@ class Progress(NamedTuple):
 
 
 class Start(NamedTuple):
-    """What a problem starts with, beside its components: arrays (1,), or (B,) of all problems."""
+    """What problems start with, (B, ...), or one, (1,): fields of `InitialValues`.
 
+    The components, their number and the variances become those of the solution. `packed` has
+    space for those that are added.
+    """
+
+    Y: Complex
+    packed: Float
+    K: Int
+    nu: Float
+    tau: Float
+    log_prior_inactive: Float
     estimate_rho: Bool
     log_odds_new: Float
     fill_target: Int
@@ -164,18 +176,22 @@ class Task(NamedTuple):
     start: Start
 
 
-class Work(NamedTuple):
-    """What changes: the present terms, those of a step on trial and of before an addition."""
-
-    now: Terms
-    trial: Terms
-    saved: Terms
-    removed: Removed
-    state: Progress
-
-
 class Outcome(NamedTuple):
-    """How each problem ended, (B,): Newton steps, and whether the final ones were taken."""
+    """Result of each problem beside its components: (B,), (B, L), or of W (B, F, L, N).
+
+    Attributes
+    ----------
+    iterations, finished : ndarray
+        Newton steps, and whether the final ones were taken.
+    W : ndarray
+        Means of the amplitudes.
+    covariance, stated_covariance, log_odds : ndarray
+        As in `ComponentMarginals`.
+    """
 
     iterations: Int
     finished: Bool
+    W: Complex
+    covariance: Float
+    stated_covariance: Float
+    log_odds: Float

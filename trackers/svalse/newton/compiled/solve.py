@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from arrivals.trackers.svalse.newton.compiled.compiler import compiled, compiled_part
+from arrivals.trackers.svalse.newton.compiled.marginals import set_marginals
 from arrivals.trackers.svalse.newton.compiled.records import (
     Outcome,
     Progress,
@@ -27,34 +28,33 @@ from arrivals.trackers.svalse.newton.compiled.step import newton_step, update_va
 
 
 @compiled
-def solve_all(task: Task, terms: Terms, removed: Removed, outcome: Outcome) -> None:
-    """Solve all problems in place: the fields of the records, and of the start, have an axis more.
+def solve_all(task: Task, removed: Removed, outcome: Outcome) -> None:
+    """Solve all problems in place: the fields of the start and of the records have an axis more.
 
     Parameters
     ----------
     task : Task
-    terms : Terms
-        Snapshots, components and variances at the start; at the end all terms.
+        With the snapshots, components and variances at the start; at the end of the solution.
     removed : Removed
     outcome : Outcome
-        Newton steps, and whether the final ones were taken, of each problem.
     """
-    now, trial, saved = like(terms), like(terms), like(terms)
-    for b in range(len(terms.K)):
-        start = Start(
-            task.start.estimate_rho[b : b + 1],
-            task.start.log_odds_new[b : b + 1],
-            task.start.fill_target[b : b + 1],
-        )
-        one = Task(task.chart, task.grid, task.search, start)
+    starts = task.start
+    F, M, N = starts.Y.shape[1:]
+    L, n_products = starts.packed.shape[2], 3 if task.chart.G.shape[0] == 0 else 4
+    now, trial, saved = (
+        space(F, M, N, L, n_products), space(F, M, N, L, n_products), space(F, M, N, L, n_products)
+    )  # fmt: skip
+    for b in range(len(starts.K)):
+        one = Task(task.chart, task.grid, task.search, problem(starts, b))
         memory = Removed(
             removed.memory[b], removed.can_reactivate[b], removed.excluded[b], removed.n_known[b]
         )
         state = initial_progress()
         for record in (now, trial, saved):
-            load(terms, b, record)
+            load(one.start, record)
         result = solve(one, now, trial, saved, memory, state)
-        store(result, terms, b)
+        store(result, one.start)
+        set_marginals(task, result, outcome, b)
         outcome.iterations[b], outcome.finished[b] = state.iterations[0], state.finished[0]
 
 
@@ -127,60 +127,50 @@ def initial_progress() -> Progress:
 
 
 @compiled_part
-def like(terms: Terms) -> Terms:
-    """Return a record with space for one of several problems."""
-    return Terms(
-        np.empty_like(terms.Y[0]), np.empty_like(terms.packed[0]), np.empty_like(terms.K[0]),
-        np.empty_like(terms.nu[0]), np.empty_like(terms.tau[0]),
-        np.empty_like(terms.log_prior_inactive[0]), np.empty_like(terms.responses[0]),
-        np.empty_like(terms.X[0]), np.empty_like(terms.h[0]),
-        np.empty_like(terms.uncertainty_loss[0]), np.empty_like(terms.prior_gradient[0]),
-        np.empty_like(terms.prior_curvature[0]), np.empty_like(terms.D[0]),
-        np.empty_like(terms.log_prior[0]), np.empty_like(terms.W[0]), np.empty_like(terms.G[0]),
-        np.empty_like(terms.explained[0]), np.empty_like(terms.F[0]),
+def problem(starts: Start, b: int) -> Start:
+    """Return the start of one of several problems: views."""
+    return Start(
+        starts.Y[b], starts.packed[b], starts.K[b : b + 1], starts.nu[b], starts.tau[b],
+        starts.log_prior_inactive[b : b + 1], starts.estimate_rho[b : b + 1],
+        starts.log_odds_new[b : b + 1], starts.fill_target[b : b + 1],
     )  # fmt: skip
 
 
 @compiled_part
-def load(terms: Terms, b: int, e: Terms) -> None:
-    """Copy what a problem starts with."""
-    K = terms.K[b, 0]
-    e.K[0], e.log_prior_inactive[0] = K, terms.log_prior_inactive[b, 0]
-    for f in range(e.Y.shape[0]):
-        e.nu[f], e.tau[f] = terms.nu[b, f], terms.tau[b, f]
-        for m in range(e.Y.shape[1]):
-            for n in range(e.Y.shape[2]):
-                e.Y[f, m, n] = terms.Y[b, f, m, n]
-    for i in range(e.packed.shape[0]):
-        for c in range(K):
-            e.packed[i, c] = terms.packed[b, i, c]
+def space(F: int, M: int, N: int, L: int, n_products: int) -> Terms:
+    """Return a record with space for L components."""
+    of_each, numbers, per_bin = np.empty((3, L)), np.empty((3, 1)), np.empty((3, F))
+    return Terms(
+        np.empty((F, M, N), dtype=np.complex128), np.empty((7, L)), np.empty(1, dtype=np.int64),
+        per_bin[0], per_bin[1], numbers[0], np.empty((F, 3, L, M), dtype=np.complex128),
+        np.empty((F, n_products, L, L), dtype=np.complex128),
+        np.empty((F, 3, L, N), dtype=np.complex128), np.empty((F, L)),
+        of_each[0], of_each[1], of_each[2], numbers[1],
+        np.empty((F, L, N), dtype=np.complex128), np.empty((F, L, L), dtype=np.complex128),
+        per_bin[2], numbers[2],
+    )  # fmt: skip
 
 
 @compiled_part
-def store(e: Terms, terms: Terms, b: int) -> None:
-    """Copy the terms of a solution; those of unused slots are 0."""
-    K = e.K[0]
-    terms.K[b, 0], terms.log_prior_inactive[b, 0] = K, e.log_prior_inactive[0]
-    terms.log_prior[b, 0], terms.F[b, 0] = e.log_prior[0], e.F[0]
-    n_start = terms.packed.shape[2]
-    for i in range(e.packed.shape[0]):
-        for c in range(n_start):
-            terms.packed[b, i, c] = e.packed[i, c] if c < K else 0.0
+def load(start: Start, e: Terms) -> None:
+    """Copy what a problem starts with."""
+    e.K[0], e.log_prior_inactive[0] = start.K[0], start.log_prior_inactive[0]
     for f in range(e.Y.shape[0]):
-        terms.nu[b, f], terms.tau[b, f] = e.nu[f], e.tau[f]
-        terms.explained[b, f] = e.explained[f]
-    for c in range(K):
-        terms.prior_gradient[b, c] = e.prior_gradient[c]
-        terms.prior_curvature[b, c], terms.D[b, c] = e.prior_curvature[c], e.D[c]
-        for f in range(e.Y.shape[0]):
-            terms.uncertainty_loss[b, f, c] = e.uncertainty_loss[f, c]
-            for m in range(e.Y.shape[1]):
-                terms.responses[b, f, 0, c, m] = e.responses[f, 0, c, m]
+        e.nu[f], e.tau[f] = start.nu[f], start.tau[f]
+        for m in range(e.Y.shape[1]):
             for n in range(e.Y.shape[2]):
-                terms.W[b, f, c, n] = e.W[f, c, n]
-                for p in range(3):
-                    terms.h[b, f, p, c, n] = e.h[f, p, c, n]
-            for j in range(K):
-                terms.G[b, f, c, j] = e.G[f, c, j]
-                for p in range(e.X.shape[1]):
-                    terms.X[b, f, p, c, j] = e.X[f, p, c, j]
+                e.Y[f, m, n] = start.Y[f, m, n]
+    for i in range(e.packed.shape[0]):
+        for c in range(start.K[0]):
+            e.packed[i, c] = start.packed[i, c]
+
+
+@compiled_part
+def store(e: Terms, start: Start) -> None:
+    """Copy the components and variances of a solution."""
+    start.K[0] = e.K[0]
+    for f in range(e.Y.shape[0]):
+        start.nu[f], start.tau[f] = e.nu[f], e.tau[f]
+    for i in range(e.packed.shape[0]):
+        for c in range(e.K[0]):
+            start.packed[i, c] = e.packed[i, c]

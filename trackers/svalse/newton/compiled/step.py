@@ -25,14 +25,7 @@ from arrivals.typing import Float
 def newton_step(chart: ChartNumbers, now: Terms, trial: Terms) -> bool:
     """Evaluate one Newton step in `trial`; return False if F decreases however short it is."""
     K = now.K[0]
-    g, curvature, H = np.zeros(K), np.zeros(K), np.zeros((K, K))
-    add_derivatives(now, g, curvature, H)
-    for c in range(K):
-        g[c] = g[c] / chart.tempering - now.prior_gradient[c]
-        curvature[c] = now.prior_curvature[c] - curvature[c] / chart.tempering
-        for j in range(K):
-            H[c, j] /= chart.tempering
-        H[c, c] += curvature[c]
+    g, curvature, H = derivatives(chart, now)
     d = ascent_direction(g, H)
     longest = 1e-300
     for c in range(K):
@@ -41,6 +34,21 @@ def newton_step(chart: ChartNumbers, now: Terms, trial: Terms) -> bool:
     for c in range(K):
         d[c] *= shorter
     return take_step(chart, now, trial, d, curvature)
+
+
+@compiled_part
+def derivatives(chart: ChartNumbers, e: Terms) -> tuple[Float, Float, Float]:
+    """Return ∂F/∂μ, the curvature with the amplitudes held, and -∂²F/∂μ∂μ' without them."""
+    K = e.K[0]
+    g, curvature, H = np.zeros(K), np.zeros(K), np.zeros((K, K))
+    add_derivatives(e, g, curvature, H)
+    for c in range(K):
+        g[c] = g[c] / chart.tempering - e.prior_gradient[c]
+        curvature[c] = e.prior_curvature[c] - curvature[c] / chart.tempering
+        for j in range(K):
+            H[c, j] /= chart.tempering
+        H[c, c] += curvature[c]
+    return g, curvature, H
 
 
 @compiled_part
@@ -176,23 +184,29 @@ def take_step(chart: ChartNumbers, now: Terms, trial: Terms, d: Float, curvature
 
 
 @compiled_part
+def power_sums(chart: ChartNumbers, e: Terms, f: int) -> tuple[float, float, float, float]:
+    """Return the energy Σ |ŵ|² of a bin, tr G, N tr JG, and the power lost by uncertainty."""
+    K, N, energy, trace, loss = e.K[0], e.Y.shape[2], 0.0, 0.0, 0.0
+    for c in range(K):
+        w2 = 0.0
+        for n in range(N):
+            w2 += e.W[f, c, n].real ** 2 + e.W[f, c, n].imag ** 2
+        energy += w2
+        trace += e.G[f, c, c].real
+        loss += w2 * e.uncertainty_loss[f, c]
+    gamma = N * (K - e.nu[f] / e.tau[f] * trace)
+    return energy, trace, gamma, min(loss, 0.5 * chart.tempering * K * e.nu[f])
+
+
+@compiled_part
 def update_variances(chart: ChartNumbers, now: Terms) -> None:
     """Set ν and τ by their fixed points, (58) and (59); if F decreases, by the EM step of (58)."""
     K, n_bins, M, N = now.K[0], now.Y.shape[0], now.Y.shape[1], now.Y.shape[2]
     before, nu_new, tau, em = now.F[0], np.empty(n_bins), np.empty(n_bins), np.empty(n_bins)
     for f in range(n_bins):
         nu, ratio = now.nu[f], now.nu[f] / now.tau[f]
-        energy, trace, S = 0.0, 0.0, 0.0
-        for c in range(K):
-            w2 = 0.0
-            for n in range(N):
-                w2 += now.W[f, c, n].real ** 2 + now.W[f, c, n].imag ** 2
-            energy += w2
-            trace += now.G[f, c, c].real
-            S += w2 * now.uncertainty_loss[f, c]
+        energy, trace, gamma, S = power_sums(chart, now, f)
         E = M * N - now.explained[f] - ratio * energy
-        gamma = N * (K - ratio * trace)
-        S = min(S, 0.5 * chart.tempering * K * nu)
         freedom = max(M * N - gamma - S / nu, MIN_FREEDOM_SHARE * M * N)
         nu_new[f] = max((E - S) / freedom, chart.noise_floor)
         tau[f] = (energy + N * nu * trace) / max(N * K, 1)
