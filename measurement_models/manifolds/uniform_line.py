@@ -114,9 +114,10 @@ class UniformLineManifold:
 
     def doa_std(self, theta: ArrayLike, std: ArrayLike) -> Float:
         """Return half the width of the directions of θ ± std, at most that of a uniform one."""
-        inside = np.clip(np.asarray(theta, dtype=np.float64), -self.step, self.step)
-        ends = (inside + np.multiply.outer([-1.0, 1.0], np.asarray(std))) / self.step
-        low, high = np.arcsin(np.clip(ends, -1, 1))
+        theta, std = np.asarray(theta, dtype=np.float64), np.asarray(std)
+        inside = np.minimum(np.maximum(theta, -self.step), self.step)
+        low = np.arcsin(np.maximum((inside - std) / self.step, -1))
+        high = np.arcsin(np.minimum((inside + std) / self.step, 1))
         return np.asarray(np.minimum((high - low) / 2, UNIFORM_STD_OF_LINE))
 
     def slope(self, theta: ArrayLike) -> Float:

@@ -130,8 +130,8 @@ def initial_values(
         Y=np.stack([step.Y for step in steps]),
         components=tracked_components(steps, response.chart),
         K=K,
-        nu=np.outer(nu, np.ones(response.n_bins)),
-        tau=np.outer(tau, response.n_sensors / response.norm2),
+        nu=nu[:, None] + np.zeros(response.n_bins),
+        tau=tau[:, None] * (response.n_sensors / response.norm2[:, 0]),
         log_prior_inactive=np.where(estimate_rho, all_inactive, 0.0),
         log_odds_new=log_odds(rho),
         estimate_rho=estimate_rho,
@@ -170,4 +170,5 @@ def log_odds(rho: Float) -> Float:
     array([-500.,    0.,  500.])
     """
     with np.errstate(divide="ignore"):
-        return np.asarray(np.clip(np.log(rho) - np.log1p(-rho), -MAX_LOG_ODDS, MAX_LOG_ODDS))
+        odds = np.log(rho) - np.log1p(-rho)
+    return np.minimum(np.maximum(odds, -MAX_LOG_ODDS), MAX_LOG_ODDS)

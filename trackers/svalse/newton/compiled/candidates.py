@@ -69,7 +69,8 @@ def exclude_near(chart: ChartNumbers, grid: GridNumbers, e: Terms, c: int, out: 
     if grid.merge_correlation == 0:
         doa = direction(chart, e.packed[MU, c])
         for q in range(len(grid.theta)):
-            out[q] |= np.cos(doa - grid.doa[q]) > grid.cos_merge
+            apart = abs(doa - grid.doa[q])
+            out[q] |= min(apart, 2 * np.pi - apart) < grid.merge
         return
     for q in range(len(grid.theta)):
         alike = True
