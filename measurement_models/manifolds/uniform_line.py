@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -66,7 +66,7 @@ class UniformLineManifold:
         """One frequency."""
         return 1
 
-    @property
+    @cached_property
     def reference_index(self) -> int:
         """Grid point at which the phase is counted."""
         if self.reference == "first":
