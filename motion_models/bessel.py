@@ -3,6 +3,8 @@
 A(κ) = I₁(κ)/I₀(κ) is the mean resultant length of a von Mises density. All take leading axes.
 """
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -198,6 +200,23 @@ def _circular_variance(kappa: Float) -> Float:
 def from_log_ratio(log_ratio: Float) -> Float:
     """Return A⁻¹ of a ratio given by its logarithm."""
     return _concentration(np.exp(log_ratio), -np.expm1(log_ratio))
+
+
+def blurred(kappa: ArrayLike, step: Float, n_steps: float) -> Float:
+    """Return κ' of a density after steps of a concentration: A(κ') = A(κ) A(κ_step)^n.
+
+    Examples
+    --------
+    >>> blurred([0.0, 100.0, np.inf], np.array(100.0), 1.0).round(2)
+    array([  0.  ,  50.25, 100.  ])
+    """
+    of_step = log_bessel_ratio(step) if step.ndim else _log_ratio_of(float(step))
+    return from_log_ratio(log_bessel_ratio(kappa) + n_steps * of_step)
+
+
+@lru_cache(maxsize=64)  # a walk has one step concentration at all times
+def _log_ratio_of(kappa: float) -> Float:
+    return log_bessel_ratio(kappa)
 
 
 def _concentration(ratio: Float, variance: Float) -> Float:

@@ -4,13 +4,12 @@ The kernels take arrays with any leading axes. Concentrations run from 0 (unifor
 """
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.motion_models.base import MotionModel
-from arrivals.motion_models.bessel import concentrations, from_log_ratio, log_bessel_ratio
+from arrivals.motion_models.bessel import blurred, concentrations, from_log_ratio, log_bessel_ratio
 from arrivals.typing import Complex, Float
 from arrivals.validation import count, instance, positive, real, state, time_step
 
@@ -259,7 +258,8 @@ class VonMisesWalk(MotionModel):
 
     def Q(self, dt: float = 1.0) -> Float:
         """Return the variance of the wrapped normal step of the same A, -2 ln A(κ) dt, in rad²."""
-        return np.full((1, 1), -2 * self.log_ratio * time_step(dt))
+        log_ratio = log_bessel_ratio(self.step_concentration())
+        return np.full((1, 1), -2 * log_ratio * time_step(dt))
 
     def blur(self, kappa: ArrayLike, dt: float = 1.0, slope: ArrayLike = 1.0) -> Float:
         """Return the concentration after a step of densities that had concentration `kappa`.
@@ -290,15 +290,7 @@ class VonMisesWalk(MotionModel):
         >>> VonMisesWalk(kappa=100.0).blur([0.0, 100.0, np.inf]).round(2)
         array([  0.  ,  50.25, 100.  ])
         """
-        one = self.log_ratio if self.sigma_doa is None else None  # the same at every slope
-        if one is None:
-            one = log_bessel_ratio(self.step_concentration(slope))
-        return from_log_ratio(log_bessel_ratio(kappa) + time_step(dt) * one)
-
-    @cached_property
-    def log_ratio(self) -> Float:
-        """Ln A(κ) of the step of an angle of unit slope, per unit of time."""
-        return log_bessel_ratio(self.step_concentration())
+        return blurred(kappa, self.step_concentration(slope), time_step(dt))
 
     def sample(self, x: ArrayLike, rng: np.random.Generator, dt: float = 1.0) -> Float:
         """Draw angles after one von Mises step, of concentration A⁻¹(A(κ)^dt)."""
