@@ -171,4 +171,4 @@ def log_odds(rho: Float) -> Float:
     """
     with np.errstate(divide="ignore"):
         odds = np.log(rho) - np.log1p(-rho)
-    return np.minimum(np.maximum(odds, -MAX_LOG_ODDS), MAX_LOG_ODDS)
+    return np.asarray(np.minimum(np.maximum(odds, -MAX_LOG_ODDS), MAX_LOG_ODDS))
