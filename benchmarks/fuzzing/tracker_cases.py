@@ -14,6 +14,7 @@ from arrivals.measurement_models import (
     LinearMeasurement,
     LogNormalRSS,
     SensorArray,
+    Station,
     Tones,
     db_to_neper,
 )
@@ -60,6 +61,7 @@ CIRCLE = ArraySnapshot(
 SPHERE = CIRCLE.replace(wavelength=1.0, n_snapshots=1, unknowns="sphere")
 SPACE = CIRCLE.replace(array=SensorArray(0.4 * fibonacci_sphere(6)), unknowns="sphere")
 RANGE = LINE.replace(unknowns="range")
+SINGLE = CIRCLE.replace(wavelength=1.0, n_snapshots=1)
 NEAR = LINE.replace(unknowns="range", nearest=1.0)
 NEWTON = ("svalse", "valse")
 ON_SPHERE = ("cbf", "mvdr", "music", "peaks_gnn", *NEWTON)
@@ -89,6 +91,16 @@ def snapshots(model: ArraySnapshot, n_steps: int = 6) -> list[Any]:
     distance = np.full((n_steps, 2), [2.0, np.inf]) if model.unknowns == "range" else None
     doa = np.full((n_steps, 2), [0.5, -0.4])
     return list(model.simulate(doa, [1.0, 0.7j], RNG, elevation, distance))
+
+
+def at_stations() -> list[Any]:
+    """Return snapshots of two sources on the map at all stations, (n_stations, n_sensors)."""
+    steps = []
+    for _ in range(5):
+        d = np.array([[5.0, 4.0], [2.0, 7.0]]) - np.array(STATIONS)[:, None]
+        doa = np.arctan2(d[..., 1], d[..., 0])
+        steps.append(np.array([SINGLE.simulate(each, [1.0, 0.7j], RNG) for each in doa]))
+    return steps
 
 
 def samples() -> list[Any]:
@@ -191,6 +203,16 @@ CASES: dict[str, list[Case]] = {
             samples(),
         )
         for v in ("B", "C", "D", "phasor")
+    ],
+    "fused": [
+        (
+            lambda: create(
+                "fused",
+                motion=ConstantVelocity(0.01),
+                stations=[Station(SINGLE, place) for place in STATIONS],
+            ),
+            at_stations(),
+        ),
     ],
     "rss_vb": [
         (lambda: create("rss_vb", motion=WALK, measurement=RECEIVED, **START), readings()),

@@ -96,7 +96,8 @@ def wrong(tracker: Tracker) -> str | None:
     finite = np.where(np.isfinite(P), P, 0.0)
     if P.ndim == 2 and not is_symmetric_and_positive(finite):
         return f"P not a covariance: {P.ravel()[:6]}"
-    for name in ("doa", "position", "log_amplitude"):
+    has_levels = getattr(tracker, "rss", True) is not None  # `fused` may have none
+    for name in ("doa", "position", *["log_amplitude"] * has_levels):
         value = getattr(estimate, name, np.zeros(0))
         if not np.isfinite(value).all():
             return f"silent NaN or inf in estimate.{name}: {value.ravel()[:6]}"

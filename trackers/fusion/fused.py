@@ -250,7 +250,7 @@ class Fused(Tracker):
             fit = guided_fit(step, doa, *expected)
         else:
             fit = fit_directions(step, doa)
-        variance = self.detection.inflation**2 * np.diagonal(fit.error_covariance)
+        variance = self.detection.inflation**2 * np.diagonal(fit.covariance)
         return StationBearings(station.to_map(fit.doa), variance)
 
     def _fuse(
