@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models import LogNormalRSS, Station
-from arrivals.measurements import is_missing
+from arrivals.measurements import is_missing, numbers
 from arrivals.messages import shown
 from arrivals.motion_models import MotionModel
 from arrivals.trackers.base import Tracker
@@ -226,8 +226,10 @@ class Fused(Tracker):
     def _entries(self, z: Any) -> tuple[Any, ...]:
         """Return one entry a station, and one for readings."""
         n = len(self.stations) + (self.rss is not None)
-        if z is None or (isinstance(z, np.ndarray | float) and is_missing(z)):
-            return (None,) * n
+        if not isinstance(z, list | tuple):  # masked and labelled arrays, too
+            z = numbers("z", np.nan if z is None else z)
+            if is_missing(z):
+                return (None,) * n
         entries = items("z", z)
         if len(entries) != n:
             readings = ", and one for the readings" if self.rss is not None else ""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from arrivals.messages import shown
 from arrivals.trackers.gaussian.arguments import matrix_with_columns
 from arrivals.trackers.gaussian.equations import update_gaussian
 from arrivals.typing import Float
@@ -58,6 +59,9 @@ def update_by_functions(
     residual : callable
         residual(z, z_pred), the difference of two measurements.
     """
+    for name, function in (("HJacobian", HJacobian), ("Hx", Hx)):
+        if not callable(function):
+            raise TypeError(f"{name} must be a function; got {shown(function)}")
     x, P = tracker.belief()
     args, hx_args = (each if isinstance(each, tuple) else (each,) for each in (args, hx_args))
     state = np.array(tracker.x, dtype=np.float64)
