@@ -79,11 +79,11 @@ def interpolation_ekf() -> tuple[Tracker, Any]:
 
 
 STEPS: list[tuple[Callable[[], tuple[Tracker, Any]], int]] = [
-    (kalman, 7),
+    (kalman, 8),
     (svalse, 31),
-    (wideband_mixture, 22),
+    (wideband_mixture, 21),
     (rss_vb, 15),
-    (interpolation_ekf, 18),
+    (interpolation_ekf, 19),
 ]
 
 

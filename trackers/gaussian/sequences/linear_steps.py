@@ -39,6 +39,7 @@ class LinearSteps:
 
     Examples
     --------
+    >>> import numpy as np
     >>> from arrivals.measurement_models import LinearMeasurement
     >>> from arrivals.motion_models import RandomWalk
     >>> from arrivals.trackers import Kalman

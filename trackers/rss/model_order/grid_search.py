@@ -206,7 +206,7 @@ def bounded_exp(x: Float) -> Float:
     Examples
     --------
     >>> bounded_exp(np.array([0.0, 1e9])).round(-146)
-    array([0.00000000e+000, 4.00000000e+147])
+    array([0.0e+000, 4.6e+147])
     """
     return np.exp(np.maximum(np.minimum(x, MAX_EXPONENT), -MAX_EXPONENT))
 

@@ -8,8 +8,6 @@ from typing import Any, TypeVar
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 MIN_NUMBA = (0, 61)  # the first for numpy 2.1 and later
-# Sums may be reordered, products contracted; NaN and infinities stay what they are.
-FAST_MATH = {"reassoc", "contract", "nsz", "arcp"}
 
 
 def compiled(function: Function) -> Function:
@@ -31,7 +29,8 @@ def _with_options(function: Function, **options: bool) -> Function:
     import numba
 
     jit: Any = numba.njit
-    result: Function = jit(function, cache=True, fastmath=FAST_MATH, error_model="numpy", **options)
+    # no fast math: sums reordered by what is inlined differ between compiled and loaded functions
+    result: Function = jit(function, cache=True, error_model="numpy", **options)
     return result
 
 
