@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -82,7 +83,7 @@ class ObservedSnapshots:
             bins = np.asarray(bins & has_power)
         return cls(Y[np.ix_(bins, sensors, times)], bins, sensors, times, manifold)
 
-    @property
+    @cached_property
     def manifold(self) -> Manifold:
         """Response of the valid sensors at the valid bins."""
         if self.full_manifold is None:

@@ -105,8 +105,8 @@ class MoveStopWalk(FrozenModel):
         -------
         ndarray, shape (3, ..., 2)
         """
-        P = np.repeat(np.asarray(variance, dtype=np.float64)[..., None], 2, axis=-1)
-        return np.stack([np.zeros_like(P), P, np.broadcast_to(self.weights, P.shape)])
+        P = np.asarray(variance, dtype=np.float64)[..., None]
+        return _modes(0.0, P, self.weights, P.shape[:-1])
 
     def renewed(self, modes: Float, variance: ArrayLike) -> Float:
         """Return modes, initial ones where their mixture does not have this variance.
@@ -153,7 +153,9 @@ class MoveStopWalk(FrozenModel):
         q = np.asarray(step_variance, dtype=np.float64)[..., None] * self.relative_variances
         P_k = P_k + q * dt
         shift, variance = _moments(o_k, P_k, c)
-        return MixtureStep(shift[..., 0], variance[..., 0], np.stack([o_k - shift, P_k, c]))
+        return MixtureStep(
+            shift[..., 0], variance[..., 0], _modes(o_k - shift, P_k, c, P_k.shape[:-1])
+        )
 
     def update(self, modes: Float, deviation: ArrayLike, noise: ArrayLike) -> MixtureStep:
         """Update the modes by a measurement.
@@ -180,7 +182,14 @@ class MoveStopWalk(FrozenModel):
         # o_k += P_k/S_k e_k,  P_k = P_k R/S_k
         o, P = o + P / S * e, P * R / S
         shift, variance = _moments(o, P, w)
-        return MixtureStep(shift[..., 0], variance[..., 0], np.stack([o - shift, P, w]))
+        return MixtureStep(shift[..., 0], variance[..., 0], _modes(o - shift, P, w, P.shape[:-1]))
+
+
+def _modes(o: Float | float, P: Float, w: Float, shape: tuple[int, ...]) -> Float:
+    """Return offsets, variances and weights of densities of a shape as one array, (3, ..., 2)."""
+    modes = np.empty((3, *shape, 2))  # faster than np.stack
+    modes[0], modes[1], modes[2] = o, P, w
+    return modes
 
 
 def _moments(o: Float, P: Float, w: Float) -> tuple[Float, Float]:

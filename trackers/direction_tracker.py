@@ -49,8 +49,8 @@ def padded(values: Float | Int | Bool, n: int, filler: float) -> Float:
     >>> padded(np.array([1.0, 2.0]), 4, np.nan)
     array([ 1.,  2., nan, nan])
     """
-    full = np.full((n, *values.shape[1:]), filler)
-    full[: len(values[:n])] = values[:n]
+    full = np.empty((n, *values.shape[1:]))
+    full[: len(values)], full[len(values) :] = values[:n], filler
     return full
 
 

@@ -181,8 +181,7 @@ class RunRecorder:
 
     def add(self, estimate: Estimate, x: Float) -> None:
         """Append the estimate and the state of one step."""
-        values = {"n_found": estimate.n_found, "x": x}
-        values |= {name: getattr(estimate, name) for name in vars(estimate)}
+        values = {"n_found": estimate.n_found, "x": x} | vars(estimate)
         for name, value in values.items():
             array = np.asarray(value)
             column = self._column_for(name, array)
