@@ -30,15 +30,11 @@ from arrivals.trackers.svalse.prediction import (
     n_moments,
     nuisance_weights,
     predicted_components,
+    stacked,
     with_modes,
 )
-from arrivals.trackers.svalse.reporting import (
-    detected,
-    existence_of,
-    is_direction,
-    located,
-    prior_spread,
-)
+from arrivals.trackers.svalse.report_when_read import PredictedReport
+from arrivals.trackers.svalse.reporting import detected, existence_of
 from arrivals.trackers.svalse.valse import DEFAULT_SOLVER, VALSE, Engine
 from arrivals.typing import Bool, Complex, Float, Int
 from arrivals.validation import instance, no_control, one_of, time_step
@@ -190,10 +186,10 @@ class SVALSE(VALSE):
     def predict_batch(self, trackers: Sequence[Self], dt: float) -> None:
         """Predict the beliefs of copies of this tracker by `dt`."""
         dt = time_step(dt)
-        existence = np.stack([tracker.existence for tracker in trackers])
-        tracked = np.stack([tracker.tracked for tracker in trackers])
+        existence = stacked([tracker.existence for tracker in trackers])
+        tracked = stacked([tracker.tracked for tracker in trackers])
         # μ' = μ   (62);  A(κ') = A(κ) A(κ_r), of which (63) is the limit for large κ
-        moved = predicted_components(self.full_manifold, self.motion, trackers, dt)
+        moved = predicted_components(self.full_manifold, self.motion, trackers, tracked, dt)
         mu, kappa, modes, slope = moved
         # ρ' = (1 - p_d) ρ + p_a (1 - ρ)   (64)
         rho = np.where(tracked, self.motion.predict_existence(existence, dt), 0.0)
@@ -220,18 +216,12 @@ class SVALSE(VALSE):
 
     def report_prior(self) -> None:
         """Report the components that are expected before a measurement."""
-        manifold = self.full_manifold
-        likely = np.flatnonzero(self.tracked & (self.existence >= 0.5) & (self.label >= 0))
-        spread = prior_spread(self.kappa[likely])
-        real = is_direction(manifold, self.mu[likely], spread)
-        likely, spread = likely[real], spread[real]
-        estimate = self.estimate_kind(
-            **located(manifold, self.mu[likely], spread, self.curved[likely]),
-            existence=self.existence[likely],
-            amplitude=np.full(len(likely), complex(np.nan, np.nan)),
-            label=self.label[likely],
-        )
-        self.report_estimate(estimate)
+        self.report_when_read(
+            PredictedReport(
+                self.estimate_kind, self.full_manifold, self.mu.copy(), self.kappa.copy(),
+                self.existence.copy(), self.label.copy(), self.curved.copy(),
+            )
+        )  # fmt: skip
 
     def observe(self, z: ArrayLike | None) -> ObservedSnapshots | None:
         """Return the valid data; None also if there are too few sensors for the components."""
@@ -277,18 +267,20 @@ class SVALSE(VALSE):
     def _keep(self, posterior: ComponentPosterior, label: Int) -> None:
         """Track active components and recent ones, as many as there are slots."""
         n, age = self.n_slots, posterior.age
-        order = np.concatenate([np.flatnonzero(age == 0), np.flatnonzero(age > 0)])[:n]
+        order = np.concatenate([(age == 0).nonzero()[0], (age > 0).nonzero()[0]])[:n]
         existence: Float = posterior.active.astype(np.float64)
         if self.carry_existence == "probability":
             existence = existence * existence_of(posterior)
         self.mu = padded(posterior.theta[order], n, np.nan)
         self.kappa = padded(posterior.kappa[order], n, 0.0)
-        curved = np.ones(len(age), dtype=np.bool_) if posterior.curved is None else posterior.curved
-        self.curved: Bool = padded(curved[order], n, 0.0) > 0
+        self.curved: Bool = np.arange(n) < len(order)
+        if posterior.curved is not None:
+            self.curved[: len(order)] = posterior.curved[order]
         self.existence: Float = padded(existence[order], n, 0.0)
         self.label: Int = padded(label[order], n, -1).astype(np.int64)
         self.age: Int = padded(age[order], n, 0).astype(np.int64)
-        self.nuisance = np.tile(nuisance_weights(self.full_manifold), (n, 1))
+        weights = nuisance_weights(self.full_manifold)
+        self.nuisance = np.zeros((n, len(weights))) + weights
         self.moments = np.zeros((n, self.n_moments), dtype=np.complex128)
         self.modes = np.zeros((n_mode_rows(self.full_manifold), n, 2))
         if posterior.modes is not None:

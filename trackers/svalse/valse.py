@@ -12,7 +12,7 @@ from arrivals.measurement_models.direction_measurement import DirectionMeasureme
 from arrivals.measurement_models.manifolds.manifold import Manifold, Reference
 from arrivals.measurement_models.observed import ObservedSnapshots, merge_noise
 from arrivals.messages import shown
-from arrivals.trackers.direction_tracker import BatchDirectionTracker, warn_of_ambiguity
+from arrivals.trackers.direction_tracker import warn_of_ambiguity
 from arrivals.trackers.registry import register
 from arrivals.trackers.svalse.components import (
     ComponentPosterior,
@@ -23,6 +23,7 @@ from arrivals.trackers.svalse.components import (
 from arrivals.trackers.svalse.coordinate.solver import CoordinateSolver, PosteriorName
 from arrivals.trackers.svalse.newton.solver import NewtonSolver
 from arrivals.trackers.svalse.prediction import same_unknowns
+from arrivals.trackers.svalse.report_when_read import ReportWhenRead
 from arrivals.trackers.svalse.reporting import (
     amplitudes,
     detected,
@@ -39,7 +40,7 @@ DEFAULT_SOLVER = NewtonSolver()
 
 
 @register("valse")
-class VALSE(BatchDirectionTracker):
+class VALSE(ReportWhenRead):
     """Variational Bayesian line spectral estimation: every step on its own.
 
     Parameters

@@ -127,7 +127,7 @@ def initial_values(
     rho[estimate_rho] = half / max(n_components, 2)
     all_inactive = n_components * np.log1p(-np.minimum(rho, 0.999))
     return InitialValues(
-        Y=np.stack([step.Y for step in steps]),
+        Y=steps[0].Y[None] if len(steps) == 1 else np.stack([step.Y for step in steps]),
         components=tracked_components(steps, response.chart),
         K=K,
         nu=nu[:, None] + np.zeros(response.n_bins),
@@ -143,20 +143,22 @@ def initial_values(
 def tracked_components(steps: Sequence[StepInput], chart: Chart) -> Components:
     """Return the tracked components as they start."""
     L = max(1, *(step.n_tracked for step in steps))
-    components = Components.zeros(len(steps), L, chart.layout).with_slots(np.arange(L))
+    components = Components.zeros(len(steps), L, chart.layout)
+    components.packed[:, -1] = np.arange(L)  # slots
+    point, precision, constant = (
+        components.point, components.prior_precision, components.kl_constant
+    )  # fmt: skip
     rho = np.full((len(steps), L), 0.5)
     for i, step in enumerate(steps):
-        n = step.n_tracked
-        components.point[i, :, :n] = step.prior.mu[:n].T
-        components.prior_precision[i, :, :n] = step.prior.kappa[:n].T
-        components.kl_constant[i, :n] = chart.prior_constant(
-            components.prior_precision[i : i + 1, :, :n]
-        )[0]
-        if step.prior.curved is not None and chart.has_curvature:
-            components.curved[i, :n] = step.prior.curved[:n]
-        rho[i, :n] = step.prior.existence[:n]
-    components.prior_mean[...] = components.point
-    components.covariance[...] = chart.start_covariance(components.prior_precision)
+        n, prior = step.n_tracked, step.prior
+        point[i, :, :n] = prior.mu[:n].T
+        precision[i, :, :n] = prior.kappa[:n].T
+        constant[i, :n] = chart.prior_constant(precision[i : i + 1, :, :n])[0]
+        if prior.curved is not None and chart.has_curvature:
+            components.curved[i, :n] = prior.curved[:n]
+        rho[i, :n] = prior.existence[:n]
+    components.prior_mean[...] = point
+    components.covariance[...] = chart.start_covariance(precision)
     components.log_odds[...] = log_odds(rho)
     return components
 
