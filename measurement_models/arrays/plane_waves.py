@@ -97,9 +97,10 @@ class PlaneWaves(FrozenModel):
         else:
             height = np.zeros(1) if self.elevation is None else np.asarray(self.elevation)
             flat = np.cos(height)[:, None]
-            axes = [flat * np.cos(angle), flat * np.sin(angle)]
-            axes += [np.sin(height)[:, None] + 0 * angle] * (self.array.dim - 2)
-            u = np.stack(axes, axis=-1)
+            u = np.empty((len(height), len(angle), self.array.dim))
+            u[..., 0], u[..., 1] = flat * np.cos(angle), flat * np.sin(angle)
+            if self.array.dim > 2:
+                u[..., 2] = np.sin(height)[:, None]
         if self.slowness is None:
             return np.asarray(u[None] if self.is_line else u)
         return np.asarray(np.asarray(self.slowness)[:, None, None] * u)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from arrivals.measurement_models import ArraySnapshot, SensorArray
+from arrivals.measurements import is_complete
 
 SINGLE = ArraySnapshot(SensorArray.ula(5, spacing=0.5), wavelength=1.0)
 WIDE = ArraySnapshot(SensorArray.ula(3, spacing=0.5), wavelength=[1.0, 1.2], n_snapshots=2)
@@ -74,3 +75,24 @@ def test_likelihood_leaves_out_masked_numbers() -> None:
     doa = np.array([[0.1], [0.4]])
     expected = SINGLE.log_likelihood(nan, doa)
     np.testing.assert_array_equal(SINGLE.log_likelihood(masked, doa), expected)
+
+
+@pytest.mark.parametrize("size", [1e-139, 1.0, 1e75, 9e139])
+def test_valid_numbers_of_any_size_are_the_measurement(size: float) -> None:
+    model = ArraySnapshot(SensorArray.ula(3, 0.5), 1.0, n_snapshots=2)
+    z = size * np.exp(1j * np.arange(6.0)).reshape(2, 3)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        np.testing.assert_array_equal(model.snapshot(z), z)
+
+
+def test_is_complete_finds_one_nan_in_arrays_of_any_layout() -> None:
+    z = np.full((2, 3, 4), 1e200 + 1j)  # the sum of squares overflows
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for scale in (1.0, 1e-200):
+            y = scale * z
+            views = [y, y.swapaxes(1, 2), y[..., 1::2], y.imag]
+            assert all(map(is_complete, views))
+            y[1, 2, 3] = complex(1.0, np.nan)
+            assert not any(map(is_complete, views))

@@ -10,9 +10,10 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.arrays.noise_coherence import NoiseCoherence
+from arrivals.measurements import is_complete
 from arrivals.trackers.beamforming.scan_grid import ScanGrid
 from arrivals.trackers.beamforming.spectrum import mean_beam_power
-from arrivals.trackers.gaussian.linalg import lapack
+from arrivals.trackers.gaussian.linalg import identity, lapack
 from arrivals.typing import Bool, Complex, Float
 
 TINY = np.finfo(float).tiny
@@ -227,10 +228,11 @@ def root_mean_amplitudes(model: ArraySnapshot, directions: Float, Y: Complex) ->
         return np.zeros(0, dtype=np.complex128)
     A = plane_wave_responses(model, directions)
     A = A[0] if len(A) == 1 else strongest(A, [mean_beam_power(a[None], Y) for a in A])
-    AH, missing = A.conj().swapaxes(1, 2), np.isnan(Y)
-    if not missing.any():  # normal equations of a bin, (n_bins, K, K)
-        w, n_valid = _normal_solution(AH @ A, AH @ Y), len(Y) * Y.shape[2]
+    AH = A.conj().swapaxes(1, 2)
+    if is_complete(Y):  # normal equations of a bin, (n_bins, K, K)
+        w, n_valid = _least_squares(A, AH, Y), len(Y) * Y.shape[2]
     else:  # of each snapshot, (n_bins, n_snapshots, K, K)
+        missing = np.isnan(Y)
         valid, y = ~missing, np.where(missing, 0, Y)
         products = np.einsum("fkm,fmn,fml->fnkl", AH, valid, A, optimize=True)
         right = np.swapaxes(AH @ y, 1, 2)[..., None]
@@ -263,11 +265,11 @@ def strongest(A: Complex, power: ArrayLike) -> Complex:
     return np.asarray(np.moveaxis(A[best, :, :, np.arange(len(best))], 0, -1))
 
 
-def _normal_solution(G: Complex, b: Complex) -> Complex:
-    """Return G⁻¹b of Gram matrices (n_bins, K, K), loaded as by `_loaded`."""
-    if len(G) > 1:
-        return np.asarray(np.linalg.solve(_loaded(G), b))
-    _, w, failed = lapack().zposv(_loaded(G[0]), b[0])  # a third of the time
+def _least_squares(A: Complex, AH: Complex, Y: Complex) -> Complex:
+    """Return (AᴴA)⁻¹AᴴY of responses (n_bins, n_sensors, K), AᴴA loaded as by `_loaded`."""
+    if len(A) > 1:
+        return np.asarray(np.linalg.solve(_loaded(AH @ A), AH @ Y))
+    _, w, failed = lapack().zposv(_loaded(AH[0].dot(A[0])), AH[0].dot(Y[0]))  # a third of the time
     if failed:
         raise np.linalg.LinAlgError("steering vectors must be finite")
     return np.asarray(w[None])
@@ -276,7 +278,5 @@ def _normal_solution(G: Complex, b: Complex) -> Complex:
 def _loaded(G: Complex) -> Complex:
     """Return Gram matrices with 1e-12 of their mean diagonal added: equal waves share."""
     K = G.shape[-1]
-    loaded = G.reshape(*G.shape[:-2], -1).copy()
-    diagonal = loaded[..., :: K + 1]
-    diagonal += np.maximum(1e-12 / K * diagonal.real.sum(axis=-1, keepdims=True), TINY)
-    return loaded.reshape(G.shape)
+    load = np.maximum(1e-12 / K * G.trace(axis1=-2, axis2=-1).real, TINY)
+    return np.asarray(G + load[..., None, None] * identity(K))

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from arrivals.measurements import is_complete
 from arrivals.trackers.beamforming.source_number import number_of_sources
 from arrivals.typing import Bool, Complex, Float
 
@@ -113,7 +114,7 @@ class PatternSums:
         Y = z.reshape(*bins, -1, M)
         if len(self.valid) == 1 and self.valid.all():
             products = Y.swapaxes(-1, -2) @ Y.conj()
-            if not np.isnan(products).any():  # the usual case
+            if is_complete(products):  # the usual case
                 n = Y.shape[-2]
                 return PatternSums(
                     self.valid, self.products + products, self.weights + n, self.squared_weight + n

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
+from arrivals.measurements import is_complete
 from arrivals.trackers.beamforming.block_scan import part_in_use, root_mean_amplitudes
 from arrivals.trackers.beamforming.covariance import used_data
 from arrivals.trackers.beamforming.source_number import number_of_sources
@@ -180,12 +181,10 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
     def update(self, z: ArrayLike | None) -> None:
         """Add the snapshots of a step; compute directions at every `interval`-th snapshot."""
         z = self.measurement.snapshot(z)
-        missing = np.isnan(z)
-        is_complete = not missing.any()
-        if not is_complete and missing.all():
+        n_new = self.measurement.n_snapshots if is_complete(z) else self._count(~np.isnan(z))
+        if n_new == 0:
             return
         self.update_subspace(z)
-        n_new = self.measurement.n_snapshots if is_complete else self._count(~missing)
         self.total_weight = self.total_weight + n_new
         self.total_squared_weight = self.total_squared_weight + n_new
         is_due = (self.n_snapshots + n_new) // self.interval > self.n_snapshots // self.interval

@@ -76,7 +76,9 @@ def projected_power(A: ArrayLike, basis: Complex) -> Float:
     array([1., 0.])
     """
     projection = basis.conj().swapaxes(-1, -2) @ np.asarray(A).swapaxes(-1, -2)
-    return np.asarray((projection.real**2 + projection.imag**2).sum(axis=-2))
+    power = projection.real**2
+    power += projection.imag**2
+    return np.asarray(np.add.reduce(power, axis=-2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,7 +173,8 @@ def _highest(power: Float) -> Float:
 
 def _mean(power: Float, highest: Float) -> Float:
     """Return the mean over the bins, the largest over a second unknown, (n,)."""
-    return np.asarray(np.maximum((power / highest).mean(axis=1).max(axis=0), TINY))
+    mean = np.add.reduce(power / highest, axis=1) / power.shape[1]
+    return np.asarray(np.maximum(mean[0] if len(mean) == 1 else mean.max(axis=0), TINY))
 
 
 def spectrum_search(model: ArraySnapshot, grid: ScanGrid) -> SpectrumSearch | NormalizedSearch:

@@ -63,6 +63,16 @@ def test_refined_peak_of_a_circle_lies_within_the_circle(azimuth: float) -> None
     assert abs(np.angle(np.exp(1j * (doa - azimuth)))) < 1e-3
 
 
+def test_parabola_at_an_end_continues_evenly_on_a_line_and_around_a_circle() -> None:
+    level, ends = np.array([4.0, 3.0, 0.0, 1.0, 3.5]), np.array([0, 4])
+    line, circle = np.linspace(-np.pi / 2, np.pi / 2, 5), np.linspace(-np.pi, np.pi, 5, False)
+    np.testing.assert_array_equal(parabolic_peak(line, level, ends), line[ends])
+    # the vertex through 3.5, 4 and 3, and through 1, 3.5 and 4: limited to half a step
+    expected = np.array([np.pi - (np.pi / 15), circle[4] + np.pi / 5])
+    np.testing.assert_allclose(parabolic_peak(circle, level, ends), expected, rtol=1e-12)
+    assert parabolic_peak(line, level, ends[:0]).shape == (0,)
+
+
 @pytest.mark.parametrize("name", [*SCANS, *OTHERS])
 def test_one_source_without_noise_is_one_direction(name: str) -> None:
     model = ArraySnapshot(SensorArray.ula(8, spacing=0.5), wavelength=1.0, noise=0.01)
