@@ -144,7 +144,7 @@ class Bearing(MeasurementModel):
     def _angles(self, delta: Float) -> Float:
         """Return the angles of vectors from the sensors, (..., n_sensors, n_dims)."""
         azimuth = np.arctan2(delta[..., 1], delta[..., 0])
-        if self.n_dims == 2:
+        if delta.shape[-1] == 2:
             return azimuth
         elevation = np.arctan2(delta[..., 2], np.hypot(delta[..., 0], delta[..., 1]))
         return np.stack([azimuth, elevation], axis=-1).reshape(*azimuth.shape[:-1], self.dim_z)
@@ -161,10 +161,12 @@ class Bearing(MeasurementModel):
 
     def h_and_H(self, x: ArrayLike) -> tuple[Float, Float]:
         """Return `h` and `H` of one state."""
-        if type(self) is not Bearing or np.ndim(x) != 1:
+        if type(self) is not Bearing:
             return super().h_and_H(x)  # a subclass may replace one of them
         x, position = self._state(x)
-        delta = self._from_sensors(x, position)
+        if x.ndim != 1:
+            return super().h_and_H(x)
+        delta = x.take(position) - self.sensor_positions  # a third of the time of an index
         return self._angles(delta), self._slopes(delta, x.size, position)
 
     def _slopes(self, delta: Float, n: int, position: tuple[int, ...]) -> Float:

@@ -44,6 +44,18 @@ def test_h_and_its_jacobian_together_equal_each_alone(px: float, py: float, pz: 
         np.testing.assert_array_equal(H, model.H(x))
 
 
+@pytest.mark.parametrize("shape", [(2, 4), (4, 1), (), (1,)])
+def test_h_and_its_jacobian_of_no_single_state_are_refused_as_by_the_jacobian(
+    shape: tuple[int, ...],
+) -> None:
+    model, x = Bearing([[0.0, 0.0], [9.0, 0.0]], 0.1), np.ones(shape)
+    with pytest.raises(ValueError, match="must have shape") as alone:
+        model.H(x)
+    with pytest.raises(ValueError, match="must have shape") as together:
+        model.h_and_H(x)
+    assert str(together.value) == str(alone.value)
+
+
 def test_h_and_its_jacobian_of_a_subclass_are_those_it_defines() -> None:
     class Biased(Bearing):
         def h(self, x: ArrayLike) -> Float:

@@ -212,7 +212,7 @@ class GaussianFilter(ModelMatrices, DeclaredAttributes, Tracker):
         if self.handed:
             self.take_back()
         if self.x is self._known_x and self.P is self._known_P:
-            return self.x.reshape(-1), self.P
+            return self.x if self.x.ndim == 1 else self.x.reshape(-1), self.P
         return belief_arrays(self.x, self.P, self.dim_x)
 
     def set_belief(self, x: Float, P: Float) -> None:

@@ -98,7 +98,9 @@ def joseph(P: Float, K: Float, H: Float, R: Float) -> Float:
     dot = multiplication(P)
     # P = (I - K H) P (I - K H)' + K R K'   (Bar-Shalom 5.2.3-18)
     I_KH = identity(P.shape[-1]) - dot(K, H)
-    return symmetric(dot(dot(I_KH, P), I_KH.mT) + dot(dot(K, R), K.mT))
+    updated = dot(dot(I_KH, P), I_KH.mT)
+    updated += dot(dot(K, R), K.mT)
+    return symmetric(updated)
 
 
 def leave_out(missing: Bool, PHT: Float, S: Float) -> tuple[Float, Float]:

@@ -72,7 +72,7 @@ def linear_step(
     Q: ArrayLike | None = None,
 ) -> tuple[Linearization, Float]:
     """Return the linearized motion and its noise, or F and Q where they are not None."""
-    n = tracker.dim_x
+    n = x.shape[-1]
     if F is None:
         motion = tracker.linearize_motion(x, P, dt)
     else:
