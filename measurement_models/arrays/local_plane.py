@@ -13,6 +13,7 @@ from arrivals.validation import real
 SEMI_MAJOR_AXIS = 6378137.0  # m, WGS 84
 ECCENTRICITY_SQUARED = 0.00669437999014
 SHAPE = np.array([1.0, 1.0, 1 / (1 - ECCENTRICITY_SQUARED)]) / SEMI_MAJOR_AXIS**2
+MIN_SQUARE = 1e-300  # m²; nearer to the origin the quotient of squares underflows
 MAX_DISTANCE = 1e6  # m from the origin
 N_ITERATIONS = 12  # of the inverse; each divides the error by at least 20 at 1000 km
 
@@ -146,7 +147,8 @@ class LocalPlane:
         north = east * (1 - ECCENTRICITY_SQUARED) / w
         square = x**2 + y**2
         curvature = np.divide(x**2 / east + y**2 / north, square,
-                              out=np.full_like(square, 1 / east), where=square > 0)  # fmt: skip
+                              out=np.full_like(square, 1 / east),
+                              where=square > MIN_SQUARE)  # fmt: skip
         return np.asarray(1 / curvature)
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from arrivals.measurement_models.arrays.local_plane import LocalPlane
@@ -12,6 +12,7 @@ metres = st.floats(-6e5, 6e5)
 
 
 @given(angles, metres, metres)
+@example((60.0, 25.0), 1e-161, 0.0)
 def test_plane_is_a_round_trip(origin: tuple[float, float], x: float, y: float) -> None:
     plane = LocalPlane(*origin)
     back = plane.to_xy(*plane.to_lat_lon(x, y))
