@@ -26,8 +26,8 @@ from arrivals.trackers.svalse.newton.batch import Components
 from arrivals.trackers.svalse.newton.charts.angle_chart import LOG_2PI
 from arrivals.trackers.svalse.newton.elbo import evaluate
 from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse
-from arrivals.trackers.svalse.newton.solver import NewtonSolver
 from arrivals.trackers.svalse.newton.problems import log_odds
+from arrivals.trackers.svalse.newton.solver import NewtonSolver
 from arrivals.typing import Complex
 
 FIGURES = ("svalse_fig4", "svalse_fig5", "svalse_fig6")
