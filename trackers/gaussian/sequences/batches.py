@@ -60,7 +60,7 @@ def run_batch(
 def _rectangle(
     measurements: Iterable[Iterable[ArrayLike | None]], m: int
 ) -> Float | list[list[ArrayLike | None]]:
-    """Return measurements (n_sequences, n_steps, m), or sequences if there is no such array."""
+    """Return measurements (n_sequences, n_steps, m), or sequences if they form no array."""
     is_array = isinstance(measurements, np.ndarray) and measurements.shape[2:] == (m,)
     if is_array and np.size(measurements):  # type: ignore[arg-type]  # an array
         return real_numbers("measurements", measurements)

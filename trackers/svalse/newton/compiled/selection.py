@@ -48,7 +48,7 @@ def is_compiled(choice: CompiledChoice, manifold: Manifold, n_moments: int = 0) 
 
 
 def missing_kernel(manifold: Manifold, n_moments: int = 0) -> str | None:
-    """Return of which case there is no compiled form; None if there is one."""
+    """Return the case without a compiled form; None if there is one."""
     if not is_angle_manifold(manifold):
         return "manifolds of points"
     if n_moments or len(manifold.nuisance_weights) > 1:
@@ -59,7 +59,7 @@ def missing_kernel(manifold: Manifold, n_moments: int = 0) -> str | None:
 
 
 def require_kernel(missing: str | None, error: str | None) -> None:
-    """Raise ValueError if there is no compiled form, or numba cannot be used."""
+    """Raise ValueError without a compiled form, or if numba cannot be used."""
     if missing is not None:
         raise ValueError(f'compiled must be "auto" or False for {missing}; got True')
     if error is not None:
