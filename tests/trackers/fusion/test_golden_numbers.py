@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from arrivals.measurement_models import LogNormalRSS, Station
+from arrivals.measurement_models import ArraySnapshot, LogNormalRSS, SensorArray, Station
 from arrivals.motion_models import ConstantVelocity
-from arrivals.trackers import AmplitudePrior, BearingDetection, Fused, GlobalHypotheses
+from arrivals.trackers import AmplitudePrior, BearingDetection, Fused, GlobalHypotheses, bearings
+from arrivals.trackers.fusion.births.crossings import crossing
 from arrivals.trackers.fusion.signal_strength import ValidReadings, update_by_levels
 from arrivals.trackers.fusion.state_layout import StateLayout
 from arrivals.trackers.fusion.tracks import Tracks
@@ -95,5 +96,17 @@ def test_birth_with_unknown_headings_golden_8() -> None:
     )
 
 
-def test_bearings_of_snapshots_have_inflated_variances() -> None:
-    assert BearingDetection().inflation == 1.3
+@pytest.mark.parametrize("inflation", [1.0, 1.3])
+def test_bearings_of_snapshots_have_inflated_variances(inflation: float) -> None:
+    """With three bearings of one source the start has the covariance of their crossing."""
+    model = ArraySnapshot(SensorArray.uca(8, 0.65), 1.0, noise=0.01)
+    stations = [Station(model, place) for place in PLACES]
+    azimuth = np.arctan2(*(SOURCE - PLACES).T[::-1])
+    z = [model.simulate([each], [1.0], np.random.default_rng(2)) for each in azimuth]
+    fused = Fused(MOTION, stations, detection=BearingDetection(inflation=inflation))
+    fused.predict()
+    fused.update(z)
+    found = [bearings(model, one, [each]) for one, each in zip(z, azimuth, strict=True)]
+    variance = [inflation**2 * R[0, 0] for _, R, _ in found]
+    _, C, _ = crossing(PLACES, [doa[0] for doa, _, _ in found], variance)
+    assert tracks(fused).P[0][::2, ::2] == pytest.approx(C, rel=0.05)

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from arrivals.measurement_models import Station
+from arrivals.measurement_models import Station, StationEntries
 from arrivals.motion_models.von_mises import wrap
 from arrivals.trackers.fusion.births.area import Area
 from arrivals.trackers.fusion.births.crossings import crossing
@@ -24,6 +24,7 @@ MAX_GATE = 12.0  # the same of a bearing that may join a set, with the variance 
 MAX_SPREAD = 0.25  # standard deviation of a crossing, over the size of the area
 MIN_RANGE = 0.005  # of a crossing from a station of the set, over the size of the area
 MARGIN = 0.05  # beyond the area, over its size
+PLACE = StationEntries((0, 1), None)  # of a position alone
 
 
 class Detections(NamedTuple):
@@ -154,13 +155,12 @@ class BirthModel(NamedTuple):
         here = np.flatnonzero(detections.station == s)
         if not len(here):
             return sets
-        d = sets.position - self.stations[s].position
-        square = (d * d).sum(axis=-1)
-        slope = np.stack([-d[:, 1], d[:, 0]], axis=-1) / square[:, None]
+        station = self.stations[s]
+        slope = station.slope(sets.position, PLACE)
         spread = np.einsum("si,sij,sj->s", slope, sets.covariance, slope)
-        e = wrap(detections.azimuth[here] - np.arctan2(d[:, 1], d[:, 0])[:, None])
+        spread = spread + station.position_std**2 * (slope * slope).sum(axis=-1)
+        e = wrap(detections.azimuth[here] - station.azimuth(sets.position, PLACE)[:, None])
         S = spread[:, None] + self._variance(detections)[here]
-        S = S + (self.stations[s].position_std ** 2 / square)[:, None]
         joins = (e * e < MAX_GATE * S) & (sets.members[:, s] < 0)[:, None]
         joins &= unexplained[sets.hypothesis[:, None], here] > MIN_UNEXPLAINED
         row, j = np.nonzero(joins)

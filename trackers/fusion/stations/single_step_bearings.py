@@ -29,8 +29,8 @@ class DirectionFit(NamedTuple):
         Directions, rad.
     covariance : ndarray, shape (n_sources, n_sources)
         Inverse of the joint information, rad².
-    error_covariance : ndarray, shape (n_sources, n_sources)
-        Covariance of the errors, with the noise in the amplitudes, rad².
+    excess : ndarray, shape (n_sources, n_sources)
+        Part of the information that is noise in the amplitudes, as in `error_covariance`, rad⁻².
     noise : float
         Variance of the residual at a sensor; NaN without a degree of freedom for it.
     energy : float
@@ -42,10 +42,16 @@ class DirectionFit(NamedTuple):
 
     doa: Float
     covariance: Float
-    error_covariance: Float
+    excess: Float
     noise: float
     energy: float
     explained: Float
+
+    @property
+    def error_covariance(self) -> Float:
+        """Covariance of the errors, with the noise in the amplitudes, rad²."""
+        J: Float = np.linalg.inv(self.covariance).astype(np.float64)
+        return error_covariance(J, self.excess)
 
 
 def fit_directions(step: StepSnapshots, doa: ArrayLike, *, n_steps: int = 2) -> DirectionFit:
@@ -92,12 +98,12 @@ def fit_directions(step: StepSnapshots, doa: ArrayLike, *, n_steps: int = 2) -> 
         if i < n_steps:
             # θ = θ + (J + I)⁻¹ g
             theta = theta + np.clip(R @ at.gradient, -MAX_STEP, MAX_STEP)
-    error = error_covariance(J, at.excess)
+    excess = at.excess
     if step.is_line:
         side = np.where(np.cos(theta) < 0, -1.0, 1.0)  # of a mirror image
-        R, error = side[:, None] * R * side, side[:, None] * error * side
+        R, excess = side[:, None] * R * side, side[:, None] * excess * side
     R, theta = (R + R.T) / 2, in_range(theta, step.is_line)
-    return DirectionFit(theta, R, error, at.noise, at.energy, at.explained)
+    return DirectionFit(theta, R, excess, at.noise, at.energy, at.explained)
 
 
 def error_covariance(J: Float, excess: Float) -> Float:
@@ -182,7 +188,7 @@ def _without_information(step: StepSnapshots, theta: Float) -> DirectionFit:
     energy, noise = (0.0, np.nan) if K else (step.energy, step.energy / n_numbers)
     prior = np.eye(K) / PRIOR_INFORMATION
     directions = in_range(theta, step.is_line)
-    return DirectionFit(directions, prior, prior, noise, energy, np.zeros(K))
+    return DirectionFit(directions, prior, np.zeros((K, K)), noise, energy, np.zeros(K))
 
 
 def _checked(doa: ArrayLike) -> Float:
