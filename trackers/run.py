@@ -102,6 +102,11 @@ class Run:
             }
         )
 
+    @property
+    def header(self) -> tuple[str, ...]:
+        """Names of the columns of `rows`."""
+        return header(self.kind)
+
     def rows(self) -> Iterator[tuple[Any, ...]]:
         """Iterate over the rows of the tracks file.
 
@@ -127,7 +132,7 @@ class Run:
         run = self if time is None else self.at(time)
         with atomic_write(path) as file:
             writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(header(self.kind))
+            writer.writerow(self.header)
             writer.writerows(map(text, run.rows()))
 
     def at(self, time: ArrayLike) -> Run:

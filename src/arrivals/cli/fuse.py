@@ -7,12 +7,11 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-from arrivals.cli.outputs import check_different
+from arrivals.cli.outputs import check_different, draw, write_table
 from arrivals.cli.reading import add_file_options
 from arrivals.files import check_output
 from arrivals.recordings.fusion.fusing import fuse
 from arrivals.recordings.fusion.stations_file import read_stations
-from arrivals.trackers.run import text
 
 # options whose names are those of arguments of `fuse`
 NAMES = (
@@ -142,19 +141,8 @@ def run_fuse(arguments: argparse.Namespace, bar: Callable[..., Any]) -> None:
     )
     if not arguments.quiet:
         print(f"arrivals: {fused.understood}", file=sys.stderr)
-    if next(iter(fused.rows()), None) is None:
-        print(f"arrivals: no source was found in {len(fused)} steps", file=sys.stderr)
-    if arguments.out:
-        fused.to_csv(arguments.out)
-    else:
-        sys.stdout.write(",".join(fused.header) + "\n")
-        for row in fused.rows():
-            sys.stdout.write(",".join(text(row)) + "\n")
-    if arguments.plot:
-        from arrivals.plots.bearing_time import save
-        from arrivals.plots.runs import plot
-
-        save(plot(fused), arguments.plot)
+    write_table(fused, arguments.out)
+    draw(arguments.plot, fused)
 
 
 def _check_outputs(arguments: argparse.Namespace, files: tuple[str, ...]) -> None:

@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 
 from arrivals.cli.separated_signals import check_suffix
 from arrivals.files import check_output, open_live
-from arrivals.trackers.run import Run, header, text
+from arrivals.trackers.run import Run, text
 
 Bar: TypeAlias = Callable[..., Any]
 
@@ -73,7 +73,7 @@ def write_table(result: Run, path: str | None) -> None:
     if path:
         result.to_csv(path)
         return
-    sys.stdout.write(",".join(header(result.kind)) + "\n")
+    sys.stdout.write(",".join(result.header) + "\n")
     for row in result.rows():
         sys.stdout.write(",".join(text(row)) + "\n")
 

@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields
-from os import PathLike
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from arrivals.files import atomic_write
 from arrivals.measurement_models import Station
 from arrivals.measurement_models.arrays.local_plane import LocalPlane
 from arrivals.recordings.networks.times import iso_text
-from arrivals.trackers.run import Run, header, text
+from arrivals.trackers.fusion.fused_estimate import MIN_RECEIVED
+from arrivals.trackers.run import Run
 from arrivals.typing import Float
-
-MIN_RECEIVED = 0.5  # weight above which a station is named in the row of a track
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +76,7 @@ class FusedRun(Run):
     def header(self) -> tuple[str, ...]:
         """Names of the columns of `rows`."""
         return (
-            *header(self.kind),
+            *super().header,
             *(() if self.plane is None else ("lat_deg", "lon_deg")),
             *(() if self.start is None else ("time_utc",)),
         )
@@ -103,22 +98,6 @@ class FusedRun(Run):
                     place = (self.lat[step, slot], self.lon[step, slot])
                     cells += tuple(f"{degrees:.8f}" for degrees in place)
                 yield cells if self.start is None else (*cells, iso_text(self.start + time))
-
-    def to_csv(self, path: str | PathLike[str], *, time: ArrayLike | None = None) -> None:
-        """Write the tracks file; it has its final name only when it is complete.
-
-        Parameters
-        ----------
-        path : str or path
-            Name of the CSV file.
-        time : array_like, shape (n_steps,), optional
-            Times, s; those of the run if None.
-        """
-        run = self if time is None else self.at(time)
-        with atomic_write(path) as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(self.header)
-            writer.writerows(map(text, run.rows()))
 
 
 def station_names(stations: Sequence[Station], weights: Float) -> str:
