@@ -18,6 +18,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
+import arrivals
 from arrivals import measurement_models, motion_models, trackers
 from arrivals.files import atomic_write, open_input
 from arrivals.scenarios.experiments.batch import Row
@@ -30,20 +31,22 @@ MAX_CONFIG = 2**24  # characters of the first line
 
 
 def fingerprint(config: Mapping[str, Any]) -> str:
-    """Return a hash of a configuration, ten hexadecimal digits.
+    """Return a hash of a configuration without the version, ten hexadecimal digits.
 
     Examples
     --------
     >>> fingerprint({"seed": 0}) == fingerprint({"seed": 1})
     False
     """
-    return hashlib.sha256(_text(config).encode()).hexdigest()[:10]
+    identity = {key: value for key, value in config.items() if key != "version"}
+    return hashlib.sha256(_text(identity).encode()).hexdigest()[:10]
 
 
 def code_mark(modules: Iterable[str] | None = None) -> str:
     """Return a hash of the code of trackers, models and the named modules, ten digits.
 
-    All scenarios are included if no modules are given.
+    It has the modules that all share, too, and all scenarios if no modules are given. The version
+    is not part of it: a release with the same code continues a study.
 
     Examples
     --------
@@ -52,6 +55,8 @@ def code_mark(modules: Iterable[str] | None = None) -> str:
     """
     packages = (measurement_models, motion_models, trackers)
     files = {path for package in packages for path in Path(package.__path__[0]).rglob("*.py")}
+    shared = Path(arrivals.__file__).parent.glob("*.py")
+    files |= {path for path in shared if path.name != "__init__.py"}  # which has the version
     if modules is None:
         files |= set(Path(__file__).parents[1].rglob("*.py"))
     named = (getattr(sys.modules.get(name), "__file__", None) for name in modules or ())
@@ -89,11 +94,15 @@ class Results:
         self.path = None if path is None else _place(Path(path), config)
         self._rows: list[Row] = []
         if self.path is not None and self.path.exists():
-            self._check(read_config(self.path))
+            stored = read_config(self.path)
+            self._check(stored)
+            if "version" in stored:  # in which the study began
+                self.config["version"] = stored["version"]
 
     def _check(self, other: Mapping[str, Any]) -> None:
         """Reject a file of another study, or with rows of cases that its first line lacks."""
-        differ = sorted(k for k in {*self.config, *other} if self.config.get(k) != other.get(k))
+        keys = {*self.config, *other} - ({"version"} & other.keys())
+        differ = sorted(k for k in keys if self.config.get(k) != other.get(k))
         if differ:
             raise ValueError(
                 f"{self.path} must be the file of this study; got another {', '.join(differ)}: "

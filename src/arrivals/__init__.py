@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from arrivals.recordings.readers import read
     from arrivals.recordings.tracking import track
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 __all__ = ["__version__", "check", "fuse", "locate", "plot", "read", "track"]
 
 LAZY = {

@@ -11,6 +11,7 @@ import pytest
 import small_studies
 from small_studies import numbers, reference, small
 
+import arrivals
 from arrivals.scenarios import Method, Study, monte_carlo
 from arrivals.scenarios.experiments import results_file
 from arrivals.scenarios.experiments.batch import Row
@@ -70,6 +71,34 @@ def test_changed_configuration_has_its_own_file(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"must be the file of this study; got another seed: "):
         monte_carlo("svalse_fig6", ["cbf"], 1, seed=1, metrics=["gospa"], out=a.path)
     assert len(Study.read(str(a.path)).rows()) == 2
+
+
+def test_study_of_another_version_of_the_same_code_resumes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(arrivals, "__version__", "0.0.1")
+    path = small(2, out=tmp_path).path
+    assert path is not None
+    before = path.read_bytes()
+    assert b'"version": "0.0.1"' in before
+    monkeypatch.undo()
+    study = small(out=tmp_path)  # one run more, checksums of the same first line
+    assert study.path == path
+    assert path.read_bytes().startswith(before)
+    assert numbers(study) == reference()
+
+
+def test_code_mark_has_modules_that_all_share(monkeypatch: pytest.MonkeyPatch) -> None:
+    read, opened = Path.read_bytes, list[Path]()
+
+    def read_and_note(path: Path) -> bytes:
+        opened.append(path)
+        return read(path)
+
+    monkeypatch.setattr(Path, "read_bytes", read_and_note)
+    results_file.code_mark([])
+    assert {"symmetric.py", "svalse.py", "measurements.py"} <= {path.name for path in opened}
+    assert Path(arrivals.__file__) not in opened  # the version counts for nothing
 
 
 def test_changed_code_has_its_own_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import arrivals
 from arrivals import scenarios
 from arrivals.scenarios import Scenario, Study
 from arrivals.scenarios.reproduce import studies as reproduce
@@ -211,6 +212,9 @@ def test_reproduce_all_skips_finished_studies(
     reproduce.reproduce("one", tmp_path, runs=2)  # a single study is always run
     assert calls == [2, 2, 2, 2]
     reproduce.reproduce("all", tmp_path, runs=2, seed=1)
+    monkeypatch.setattr(arrivals, "__version__", "9.9.9")  # with the same code
+    reproduce.reproduce("all", tmp_path, runs=2, seed=1)
+    assert len(calls) == 6
     monkeypatch.setattr(reproduce, "code_mark", lambda: "other")
     reproduce.reproduce("all", tmp_path, runs=2, seed=1)
     assert len(calls) == 8
