@@ -24,6 +24,7 @@ KERNELS = [
 HAS_NUMBA = compiler.compiler_error() is None
 CASES: dict[str, tuple[ArraySnapshot, dict[str, Any]]] = {
     "line": (ArraySnapshot(LINE, 1.0), {}),
+    "line with gaps": (ArraySnapshot(SensorArray.ula(13, 0.5, missing=[2, 9]), 1.0), {}),
     "line, many snapshots": (ArraySnapshot(LINE, 1.0, n_snapshots=15), {}),
     "circle": (ArraySnapshot(CIRCLE, 1.0), {"max_components": 4}),
     "circle, bins and snapshots": (ArraySnapshot(CIRCLE, [1.0, 0.9], n_snapshots=3), {}),

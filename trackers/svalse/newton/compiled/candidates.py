@@ -78,7 +78,7 @@ def exclude_near(chart: ChartNumbers, grid: GridNumbers, e: Terms, c: int, out: 
             size = np.sqrt(e.X[f, 0, c, c].real * grid.norm2[f, q])
             product = 0j
             for m in range(grid.A.shape[2]):
-                product += np.conj(e.responses[f, 0, c, m]) * grid.A[f, q, m]
+                product += np.conj(e.responses[f, c, 0, m]) * grid.A[f, q, m]
             alike = alike and abs(product) > grid.merge_correlation * size
         out[q] |= alike
 
@@ -110,41 +110,73 @@ def removal_gains(chart: ChartNumbers, e: Terms, kl_weight: float, reestimate: b
 @compiled_part
 def grid_evidence(chart: ChartNumbers, grid: GridNumbers, e: Terms) -> tuple[Float, Float, Float]:
     """Return gain, power |u|² and variance of one more component at each point, (n_points,)."""
-    K, M, N, n_points = e.K[0], e.Y.shape[1], e.Y.shape[2], len(grid.theta)
+    N, n_points, share = e.Y.shape[2], len(grid.theta), 1 / chart.tempering
     gain, power, variance = np.zeros(n_points), np.zeros(n_points), np.zeros(n_points)
-    residual, P = np.empty((N, M), dtype=np.complex128), np.empty(K, dtype=np.complex128)
-    A, G, a = grid.A, e.G, e.responses
     for f in range(e.Y.shape[0]):
         nu, tau = e.nu[f], e.tau[f]
-        for n in range(N):
-            for m in range(M):
-                rest = e.Y[f, m, n]
-                for c in range(K):
-                    rest -= a[f, 0, c, m] * e.W[f, c, n]
-                residual[n, m] = rest
+        z2, PGP = grid_powers(grid, e, f)
         for q in range(n_points):
-            z2, PGP = 0.0, 0.0
-            for n in range(N):
-                z = 0j
-                for m in range(M):
-                    z += np.conj(residual[n, m]) * A[f, q, m]
-                z2 += z.real**2 + z.imag**2
-            for c in range(K):
-                p = 0j
-                for m in range(M):
-                    p += np.conj(a[f, 0, c, m]) * A[f, q, m]
-                P[c], half = p, 0j  # âᴴa
-                for j in range(c):
-                    half += G[f, c, j] * P[j]
-                PGP += 2 * (np.conj(p) * half).real + G[f, c, c].real * (p.real**2 + p.imag**2)
-            d = grid.norm2[f, q] + nu / tau - PGP
-            u2 = z2 / d**2
+            d = grid.norm2[f, q] + nu / tau - PGP[q]
+            fits, u2 = z2[q] / d, z2[q] / d**2
             power[q] += u2
-            gain[q] += (N * np.log(nu / (tau * d)) + z2 / (d * nu)) / chart.tempering
-            variance[q] += 2 * u2 * grid.gram[f, q] / nu / chart.tempering
+            gain[q] += (N * np.log(nu / (tau * d)) + fits / nu) * share
+            variance[q] += 2 * u2 * grid.gram[f, q] / nu * share
     for q in range(n_points):
         variance[q] = 1 / max(variance[q], 1 / chart.max_variance)
     return gain, power, variance
+
+
+@compiled_part
+def grid_powers(grid: GridNumbers, e: Terms, f: int) -> tuple[Float, Float]:
+    """Return Σ |aᴴη|² over snapshots, η the residual, and PᴴGP with P = âᴴa, (n_points,) each."""
+    K, N = e.K[0], e.Y.shape[2]
+    products = np.dot(real_coefficients(grid, e, f), grid.R[f].T)
+    z, P, n = products[: 2 * N], products[2 * N :], len(products) - 2 * N
+    G = np.empty((n, n))  # [Re G, -Im G; Im G, Re G] of real and imaginary parts
+    for c in range(n):
+        for j in range(n):
+            value = e.G[f, c % K, j % K]
+            if c // K == j // K:
+                G[c, j] = value.real
+            else:
+                G[c, j] = value.imag if c > j else -value.imag
+    return summed_products(z, z), summed_products(P, np.dot(G, P))
+
+
+@compiled_part
+def real_coefficients(grid: GridNumbers, e: Terms, f: int) -> Float:
+    """Return coefficients of the columns of R: of aᴴη, (N,), and of âᴴa, (K,), as real rows.
+
+    First the real parts, then the imaginary ones, of the N, and then of the K.
+    """
+    K, (M, N), C = e.K[0], e.Y.shape[1:], grid.R.shape[2] // 2
+    conj, rows = np.empty(N + K, dtype=np.complex128), np.zeros((2 * (N + K), 2 * C))
+    for m in range(M):
+        for n in range(N):
+            conj[n] = np.conj(e.Y[f, m, n])
+        for c in range(K):
+            conj[N + c] = np.conj(e.responses[f, c, 0, m])
+            for n in range(N):
+                conj[n] -= conj[N + c] * np.conj(e.W[f, c, n])
+        cosine, sine, sign = grid.column[m], C + grid.column[m], grid.sign[m]
+        for i in range(N + K):
+            real = i if i < N else N + i
+            imag = real + (N if i < N else K)
+            rows[real, cosine] += conj[i].real
+            rows[imag, cosine] += conj[i].imag
+            rows[real, sine] -= sign * conj[i].imag
+            rows[imag, sine] += sign * conj[i].real
+    return rows
+
+
+@compiled_part
+def summed_products(one: Float, other: Float) -> Float:
+    """Return the sums of products over the rows."""
+    total = np.zeros(one.shape[1])
+    for i in range(len(one)):
+        for q in range(one.shape[1]):
+            total[q] += one[i, q] * other[i, q]
+    return total
 
 
 @compiled_part

@@ -24,113 +24,75 @@ MIN_PIVOT = 1e-16  # of a diagonal entry
 @compiled_part
 def evaluate(chart: ChartNumbers, e: Terms) -> None:
     """Evaluate the components and variances of a record: all other fields follow."""
-    if chart.G.shape[0] == 0:
-        set_harmonics(chart, e)
-    else:
-        set_responses(chart, e)
-        set_products(e)
+    set_responses(chart, e)
+    set_products(e)
     set_norms(chart, e)
     set_priors(e)
     set_amplitudes(chart, e)
 
 
 @compiled_part
-def set_harmonics(chart: ChartNumbers, e: Terms) -> None:
-    """Set â, X and h where the sensors are the harmonics: â_k = exp(jkμ - k²s/2), ∂â = jk â.
-
-    The derivatives of â are not kept.
-    """
-    k, a, X, h, y = chart.harmonics, e.responses, e.X, e.h, e.Y
-    for c in range(e.K[0]):
-        mu, s = e.packed[MU, c], e.packed[VARIANCE, c]
-        for m in range(len(k)):
-            size = np.exp(-0.5 * k[m] * k[m] * s)
-            a[0, 0, c, m] = complex(size * np.cos(k[m] * mu), size * np.sin(k[m] * mu))
-        for j in range(c):
-            x0, x1, x2 = 0j, 0j, 0j
-            for m in range(len(k)):
-                product = np.conj(a[0, 0, c, m]) * a[0, 0, j, m]
-                x0 += product
-                x1 += k[m] * product
-                x2 += k[m] * k[m] * product
-            x1, x2 = -1j * x1, -x2
-            X[0, 0, c, j], X[0, 1, c, j], X[0, 2, c, j] = x0, x1, x2
-            X[0, 0, j, c], X[0, 1, j, c] = np.conj(x0), -np.conj(x1)
-            X[0, 2, j, c] = np.conj(x2)
-        for n in range(y.shape[2]):
-            x0, x1, x2 = 0j, 0j, 0j
-            for m in range(len(k)):
-                product = np.conj(a[0, 0, c, m]) * y[0, m, n]
-                x0 += product
-                x1 += k[m] * product
-                x2 += k[m] * k[m] * product
-            h[0, 0, c, n], h[0, 1, c, n], h[0, 2, c, n] = x0, -1j * x1, -x2
-
-
-@compiled_part
 def set_responses(chart: ChartNumbers, e: Terms) -> None:
     """Set â, ∂â/∂μ and ∂²â/∂μ² = 2 ∂â/∂s: â = G ⟨d⟩ with ⟨d_k⟩ = exp(jkμ - k²s/2)."""
-    k, a, G = chart.harmonics, e.responses, chart.G
-    for c in range(e.K[0]):
+    k, sizes, G, K, M = chart.harmonics, chart.sizes, chart.G, e.K[0], e.Y.shape[1]
+    n, phasors = len(k), np.empty(len(sizes), dtype=np.complex128)
+    rows = e.responses[0] if G.shape[0] == 0 else np.empty((K, 3, n), dtype=np.complex128)
+    for c in range(K):
         mu, s = e.packed[MU, c], e.packed[VARIANCE, c]
-        for f in range(a.shape[0]):
-            for p in range(3):
-                for m in range(a.shape[3]):
-                    a[f, p, c, m] = 0
-        for i in range(len(k)):
-            size = np.exp(-0.5 * k[i] * k[i] * s)
-            d = complex(size * np.cos(k[i] * mu), size * np.sin(k[i] * mu))
-            for f in range(a.shape[0]):
-                for m in range(a.shape[3]):
-                    part = d * G[f, i, m]
-                    a[f, 0, c, m] += part
-                    a[f, 1, c, m] += 1j * k[i] * part
-                    a[f, 2, c, m] -= k[i] * k[i] * part
+        for i in range(len(sizes)):
+            size = np.exp(-0.5 * sizes[i] * sizes[i] * s)
+            phasors[i] = complex(size * np.cos(sizes[i] * mu), size * np.sin(sizes[i] * mu))
+        for i in range(n):
+            d = phasors[chart.column[i]]
+            d = d if k[i] > 0 else np.conj(d)
+            rows[c, 0, i], rows[c, 1, i], rows[c, 2, i] = d, 1j * k[i] * d, -k[i] * k[i] * d
+    for f in range(G.shape[0]):
+        np.dot(rows.reshape(3 * K, n), G[f], e.responses[f].reshape(-1, M)[: 3 * K])
 
 
 @compiled_part
 def set_products(e: Terms) -> None:
-    """Set X off the diagonal: âᴴâ, (∂â)ᴴâ, (∂²â)ᴴâ and (∂â)ᴴ∂â; and h."""
-    a, X, h, y, K = e.responses, e.X, e.h, e.Y, e.K[0]
+    """Set X: âᴴâ, (∂â)ᴴâ, (∂²â)ᴴâ, and (∂â)ᴴ∂â where it is not -(∂²â)ᴴâ; and h."""
+    a, X, h, K, (M, N) = e.responses, e.X, e.h, e.K[0], e.Y.shape[1:]
+    conj, slope = np.empty((K + N, M), dtype=np.complex128), np.empty((K, M), dtype=np.complex128)
     for f in range(a.shape[0]):
+        for m in range(M):
+            for c in range(K):
+                conj[c, m], slope[c, m] = np.conj(a[f, c, 0, m]), a[f, c, 1, m]
+            for n in range(N):
+                conj[K + n, m] = np.conj(e.Y[f, m, n])
+        products = np.dot(a[f].reshape(-1, M)[: 3 * K], conj.T)  # conjugates of X and h
         for c in range(K):
-            for j in range(K):
-                x0, x1, x2, x3 = 0j, 0j, 0j, 0j
-                for m in range(a.shape[3]):
-                    x0 += np.conj(a[f, 0, c, m]) * a[f, 0, j, m]
-                    x1 += np.conj(a[f, 1, c, m]) * a[f, 0, j, m]
-                    x2 += np.conj(a[f, 2, c, m]) * a[f, 0, j, m]
-                    x3 += np.conj(a[f, 1, c, m]) * a[f, 1, j, m]
-                X[f, 0, c, j], X[f, 1, c, j], X[f, 2, c, j], X[f, 3, c, j] = x0, x1, x2, x3
             for p in range(3):
-                for n in range(y.shape[2]):
-                    h[f, p, c, n] = 0
-                for m in range(a.shape[3]):
-                    conj = np.conj(a[f, p, c, m])
-                    for n in range(y.shape[2]):
-                        h[f, p, c, n] += conj * y[f, m, n]
+                for j in range(K):
+                    X[f, p, c, j] = np.conj(products[3 * c + p, j])
+                for n in range(N):
+                    h[f, p, c, n] = np.conj(products[3 * c + p, K + n])
+        if X.shape[1] > 3:
+            for c in range(K):
+                for m in range(M):
+                    conj[c, m] = np.conj(slope[c, m])
+            X[f, 3, :K, :K] = np.dot(conj[:K], slope.T)
 
 
 @compiled_part
 def set_norms(chart: ChartNumbers, e: Terms) -> None:
     """Set the diagonal of X: ⟨‖a‖²⟩, half its first and second derivatives; and the loss."""
-    X, a, series = e.X, e.responses, chart.series
+    X, series = e.X, chart.series
     for c in range(e.K[0]):
         mu, s = e.packed[MU, c], e.packed[VARIANCE, c]
         for f in range(X.shape[0]):
+            size = X[f, 0, c, c].real
             for p in range(X.shape[1]):
                 X[f, p, c, c] = 0
             if series.shape[0] == 0:
                 X[f, 0, c, c] = chart.norm2[f]
             for i in range(series.shape[1]):
-                size = np.exp(-0.5 * i * i * s)
-                d = complex(size * np.cos(i * mu), size * np.sin(i * mu)) * series[f, i]
+                scale = np.exp(-0.5 * i * i * s)
+                d = complex(scale * np.cos(i * mu), scale * np.sin(i * mu)) * series[f, i]
                 X[f, 0, c, c] += d.real
                 X[f, 1, c, c] -= 0.5 * i * d.imag
                 X[f, 2, c, c] -= 0.5 * i * i * d.real
-            size = 0.0
-            for m in range(a.shape[3]):
-                size += a[f, 0, c, m].real ** 2 + a[f, 0, c, m].imag ** 2
             e.uncertainty_loss[f, c] = X[f, 0, c, c].real - size
 
 

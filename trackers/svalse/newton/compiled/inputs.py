@@ -23,7 +23,7 @@ from arrivals.trackers.svalse.newton.marginals import ComponentMarginals
 from arrivals.trackers.svalse.newton.problems import InitialValues
 from arrivals.trackers.svalse.newton.state import SolverResult
 from arrivals.trackers.svalse.newton.support_search import SupportSearch
-from arrivals.typing import Float
+from arrivals.typing import Float, Int
 
 
 @lru_cache(maxsize=16)
@@ -40,7 +40,7 @@ def numbers_of(search: SupportSearch) -> tuple[ChartNumbers, GridNumbers, Search
     none = np.zeros((0, 0), dtype=np.complex128)
     return (
         ChartNumbers(
-            k, G, chart.norm2[:, 0].astype(np.float64),
+            k, *sizes_of(k), G, chart.norm2[:, 0].astype(np.float64),
             none if chart.series is None else np.ascontiguousarray(chart.series.T),
             float(response.tempering), float(response.power_floor), float(response.noise_floor),
             float(chart.longest_step), float(chart.max_variance),
@@ -48,9 +48,9 @@ def numbers_of(search: SupportSearch) -> tuple[ChartNumbers, GridNumbers, Search
             bool(manifold.front_back_ambiguous),
         ),
         GridNumbers(
-            grid.theta, grid.doa, np.ascontiguousarray(grid.A), full(grid.gram[:, 0], F, grid),
-            full(grid.norm2, F, grid), float(grid.log_range), float(grid.cos_apart),
-            float(grid.cos_merge), float(grid.cos_near), float(grid.merge),
+            grid.theta, grid.doa, np.ascontiguousarray(grid.A), *real_responses(chart, grid),
+            full(grid.gram[:, 0], F, grid), full(grid.norm2, F, grid), float(grid.log_range),
+            float(grid.cos_apart), float(grid.cos_merge), float(grid.cos_near), float(grid.merge),
             float(grid.merge_correlation or 0.0),
         ),
         SearchNumbers(
@@ -65,6 +65,23 @@ def numbers_of(search: SupportSearch) -> tuple[ChartNumbers, GridNumbers, Search
 def full(values: Float, n_bins: int, grid: AngleCandidates) -> Float:
     """Return values for each bin and point of the grid."""
     return np.ascontiguousarray(np.broadcast_to(values, (n_bins, grid.n_points)))
+
+
+def sizes_of(k: Float) -> tuple[Float, Int]:
+    """Return the values of |k|, and where that of each harmonic stands."""
+    sizes, column = np.unique(np.abs(k), return_inverse=True)
+    return sizes, column.astype(np.int64)
+
+
+def real_responses(chart: AngleChart, grid: AngleCandidates) -> tuple[Float, Int, Float]:
+    """Return R, column and sign of `GridNumbers`; sensors k and -k of a line have one column."""
+    k = chart.jk.imag
+    if not chart.is_linear:
+        k = np.arange(1.0, chart.n_sensors + 1)  # every sensor has its own
+    _, first, column = np.unique(np.abs(k), return_index=True, return_inverse=True)
+    R = np.concatenate([grid.A.real[:, :, first], grid.A.imag[:, :, first]], axis=2)
+    sign = np.where(k * k[first][column] < 0, -1.0, 1.0)
+    return np.ascontiguousarray(R), column.astype(np.int64), sign
 
 
 def solve_compiled(search: SupportSearch, values: InitialValues) -> SolverResult:

@@ -100,7 +100,7 @@ def residual_powers(e: Terms, f: int) -> Float:
         for m in range(M):
             rest = e.Y[f, m, n]
             for c in range(e.K[0]):
-                rest -= e.responses[f, 0, c, m] * e.W[f, c, n]
+                rest -= e.responses[f, c, 0, m] * e.W[f, c, n]
             powers[n] += rest.real**2 + rest.imag**2
         mean += powers[n] / N
     for n in range(N):

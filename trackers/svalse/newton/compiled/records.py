@@ -16,6 +16,10 @@ class ChartNumbers(NamedTuple):
     Attributes
     ----------
     harmonics : ndarray, shape (n_k,)
+    sizes : ndarray, shape (C,)
+        Values of |k|.
+    column : ndarray of int, shape (n_k,)
+        Where the size of each stands.
     G : ndarray, shape (F, n_k, M)
         Coefficients of the harmonics; empty if the harmonics are the sensors.
     norm2 : ndarray, shape (F,)
@@ -28,6 +32,8 @@ class ChartNumbers(NamedTuple):
     """
 
     harmonics: Float
+    sizes: Float
+    column: Int
     G: Complex
     norm2: Float
     series: Complex
@@ -47,6 +53,12 @@ class GridNumbers(NamedTuple):
     ----------
     theta, doa : ndarray, shape (n_points,)
     A : ndarray, shape (F, n_points, M)
+    R : ndarray, shape (F, n_points, 2 C)
+        Real and imaginary parts of a, of one sensor of those with a and a*.
+    column : ndarray of int, shape (M,)
+        Where the real part of each sensor stands in R; the imaginary one C columns later.
+    sign : ndarray, shape (M,)
+        -1 if a* stands there, else 1.
     gram, norm2 : ndarray, shape (F, n_points)
     log_range, cos_apart, cos_merge, cos_near, merge : float
     merge_correlation : float
@@ -56,6 +68,9 @@ class GridNumbers(NamedTuple):
     theta: Float
     doa: Float
     A: Complex
+    R: Float
+    column: Int
+    sign: Float
     gram: Float
     norm2: Float
     log_range: float
@@ -91,7 +106,7 @@ class Terms(NamedTuple):
 
     Attributes
     ----------
-    responses : ndarray, shape (F, 3, L, M)
+    responses : ndarray, shape (F, L, 3, M)
         â, ∂â and ∂²â.
     X : ndarray, shape (F, 3, L, L) or (F, 4, L, L)
     """

@@ -142,7 +142,7 @@ def space(F: int, M: int, N: int, L: int, n_products: int) -> Terms:
     of_each, numbers, per_bin = np.empty((3, L)), np.empty((3, 1)), np.empty((3, F))
     return Terms(
         np.empty((F, M, N), dtype=np.complex128), np.empty((7, L)), np.empty(1, dtype=np.int64),
-        per_bin[0], per_bin[1], numbers[0], np.empty((F, 3, L, M), dtype=np.complex128),
+        per_bin[0], per_bin[1], numbers[0], np.empty((F, L, 3, M), dtype=np.complex128),
         np.empty((F, n_products, L, L), dtype=np.complex128),
         np.empty((F, 3, L, N), dtype=np.complex128), np.empty((F, L)),
         of_each[0], of_each[1], of_each[2], numbers[1],
