@@ -1,5 +1,6 @@
 """The compiled Newton solver beside the array program, with numba and as plain Python."""
 
+import importlib
 import sys
 import types
 import warnings
@@ -80,6 +81,15 @@ def test_compiled_solver_equals_arrays(case: str, kind: type[VALSE]) -> None:
         for compiled in (True, False)
     )
     assert_same(one, other)
+
+
+@pytest.mark.skipif(not HAS_NUMBA, reason="needs numba")
+def test_compiled_solver_has_one_form_for_all_cases() -> None:
+    """A second one, as of arrays that are read-only, would take 20 s to compile."""
+    for model, settings in CASES.values():
+        SVALSE(model, solver=NewtonSolver(**settings, compiled=True)).run(measurements(model, 2))
+    solve = importlib.import_module("arrivals.trackers.svalse.newton.compiled.solve")
+    assert len(solve.solve_all.signatures) == 1
 
 
 @pytest.mark.usefixtures("plain_python")

@@ -63,8 +63,11 @@ def numbers_of(search: SupportSearch) -> tuple[ChartNumbers, GridNumbers, Search
 
 
 def full(values: Float, n_bins: int, grid: AngleCandidates) -> Float:
-    """Return values for each bin and point of the grid."""
-    return np.ascontiguousarray(np.broadcast_to(values, (n_bins, grid.n_points)))
+    """Return a copy of values for each bin and point of the grid.
+
+    It can be written to for any number of bins: numba compiles anew for one that cannot.
+    """
+    return np.array(np.broadcast_to(values, (n_bins, grid.n_points)), order="C")
 
 
 def sizes_of(k: Float) -> tuple[Float, Int]:
