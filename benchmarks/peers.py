@@ -56,8 +56,7 @@ def timed(job: Job, rounds: int) -> Timed:
 
 
 def _repetitions(work: Callable[[], object]) -> int:
-    for _ in range(2):  # what is made once, or at the second step
-        work()
+    work()  # what is made once
     return max(1, int(SHORTEST / max(_cpu(work, 1), 1e-6)))
 
 

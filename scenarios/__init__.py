@@ -5,7 +5,7 @@ The classes of the scenes are in `arrivals.scenarios.simulations`; `create` make
 
 from arrivals.plots.arrays import plot_array
 from arrivals.plots.bearing_time import plot_bearing_time
-from arrivals.plots.ranges import plot_range
+from arrivals.plots.over_time import plot_range
 from arrivals.plots.sky import plot_sky
 from arrivals.recordings.networks import Network, calibrate, read_network
 from arrivals.recordings.readers import read

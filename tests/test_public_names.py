@@ -33,6 +33,10 @@ NAMES = {
         WidebandMixture as_filterpy available bearings create find find_peaks is_missing
         refine_peaks register update_by_cells
     """,
+    "plots": """
+        plot plot_array plot_bearing_time plot_coverage plot_map plot_metric plot_range
+        plot_reliability plot_sky plot_tracks
+    """,
     "trackers.filterpy": "ExtendedKalmanFilter IMMEstimator KalmanFilter UnscentedKalmanFilter",
     "scenarios": """
         Gospa Method Network Recording Reliability Scenario Study Trial ar_signals available

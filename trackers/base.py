@@ -114,7 +114,7 @@ class Tracker(Configurable, ABC):
             self.predict(dt=dt)
             self.update(z)
             recorder.add(self.estimate, self.x)
-        return recorder.run(dt=dt, elapsed=time.perf_counter() - started)
+        return recorder.run(dt=dt, elapsed=time.perf_counter() - started).made_by(self)
 
     def run_batch(
         self, measurements: Iterable[Iterable[ArrayLike | None]], dt: float = 1.0

@@ -42,6 +42,10 @@ class Run:
     extras : mapping of str to ndarray
         Results per step that are not part of an estimate, first axis time; attributes too, such as
         `run.signals` (n_steps, n_sources).
+    tracker : str
+        Class of the tracker, for titles; empty if it is not known.
+    measurement : MeasurementModel, optional
+        Measurement model of the tracker.
 
     Examples
     --------
@@ -60,6 +64,8 @@ class Run:
     time: Float = field(repr=False)
     elapsed: float
     extras: Mapping[str, NDArray[Any]] = field(default_factory=dict, repr=False)
+    tracker: str = field(default="", repr=False)
+    measurement: Any = field(default=None, repr=False)
 
     def __getattr__(self, name: str) -> NDArray[Any]:
         for home in ("fields", "extras"):
@@ -153,6 +159,22 @@ class Run:
             raise ValueError(f"time must have shape {self.time.shape}; got {time.shape}")
         return replace(self, time=time)
 
+    def made_by(self, tracker: Any) -> Run:
+        """Return the same run with the class and the measurement model of its tracker.
+
+        Parameters
+        ----------
+        tracker : Tracker
+            Tracker that the estimates are from.
+
+        Returns
+        -------
+        Run
+            A copy with `tracker` and `measurement`.
+        """
+        measurement = getattr(tracker, "measurement", None)
+        return replace(self, tracker=type(tracker).__name__, measurement=measurement)
+
 
 def header(kind: type[Estimate]) -> tuple[str, ...]:
     """Return the column names of a tracks file of a class of estimates."""
@@ -186,8 +208,7 @@ class RunRecorder:
 
     def add(self, estimate: Estimate, x: Float) -> None:
         """Append the estimate and the state of one step."""
-        values: dict[str, Any] = {"n_found": estimate.n_found, "x": x}
-        values |= {each.name: getattr(estimate, each.name) for each in fields(estimate)}
+        values = {"n_found": estimate.n_found, "x": x} | vars(estimate)
         for name, value in values.items():
             array = np.asarray(value)
             column = self._column_for(name, array)

@@ -127,7 +127,7 @@ class MethodComparison:
             plot_bearing_time(
                 run, snapshots=steps, measurement=self.measurement, time=run.time, ax=ax
             )
-            ax.set_title(title, loc="left", fontsize=11)
+            ax.set_title(title, fontsize=11)
             ax.set(**self.axes)
             ax.label_outer()
         save(panels[0], path)

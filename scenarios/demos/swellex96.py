@@ -10,7 +10,8 @@ import numpy as np
 
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.plots.bearing_time import plot_bearing_time, save
-from arrivals.plots.ranges import plot_range
+from arrivals.plots.labels import legend_beside
+from arrivals.plots.over_time import plot_range
 from arrivals.recordings.readers import read
 from arrivals.scenarios.demos.comparison import Bar, MethodComparison, silent
 from arrivals.scenarios.simulations.swellex96 import TowPastLine
@@ -125,10 +126,10 @@ def draw_ranges(path: Path, run: Run, snapshots: Complex, measurement: ArraySnap
     figure = Figure(figsize=(9.0, 7.0), layout="constrained")
     above, below = figure.subplots(2, sharex=True)
     plot_bearing_time(run, snapshots=snapshots, measurement=measurement, time=run.time, ax=above)
-    above.set_title("SVALSE with range: tracks, one colour a label", loc="left", fontsize=11)
+    above.set_title("SVALSE with range: tracks, one colour a label", fontsize=11)
     above.set(**AXES)
     above.label_outer()
     plot_range(run, time=run.time, ax=below)
     below.plot(run.time, slant_range()[: len(run)], color="black", linewidth=1, label="ship")
-    below.legend(loc="upper right")
+    legend_beside(below)
     save(below, path)

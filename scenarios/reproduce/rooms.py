@@ -123,6 +123,6 @@ def _draw(seed: int) -> Figure:
         plot_bearing_time(run, ax=ax)
         ax.plot(np.rad2deg(trial.truth), linestyle="none", marker="+", markersize=4,
                 color="black", zorder=5)  # fmt: skip
-        ax.set_title(f"{method}; crosses: truth", loc="left", fontsize=11)
+        ax.set_title(f"{method}; crosses: truth", fontsize=11)
         ax.label_outer()
     return figure

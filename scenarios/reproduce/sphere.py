@@ -201,7 +201,5 @@ def _draw(seed: int) -> Figure:
             azimuth, radius = trial.truth[::5], 90 - np.rad2deg(trial.elevation[::5])
             x, y = radius * np.cos(azimuth), radius * np.sin(azimuth)
             ax.plot(x, y, linestyle="none", marker="+", markersize=4, color="black", zorder=5)
-        ax.set_title(
-            f"{array}, 10 snapshots, 20 dB; crosses: truth, circles: ends", loc="left", fontsize=11
-        )
+        ax.set_title(f"{array}, 10 snapshots, 20 dB; crosses: truth, circles: ends", fontsize=11)
     return figure

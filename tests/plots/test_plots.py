@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from matplotlib.collections import LineCollection, PathCollection, QuadMesh
+from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 
 import arrivals
@@ -43,14 +43,17 @@ def scene(model: ArraySnapshot, n_steps: int = 20) -> Complex:
     return model.simulate(doa, 1.0, np.random.default_rng(0))
 
 
+def drawn(ax: Any, name: str) -> Any:
+    (artist,) = [each for each in ax.collections if each.get_label() == f"_{name}"]
+    return artist
+
+
 def lines(ax: Any) -> tuple[Any, Any]:
-    halo, tracks = [c for c in ax.collections if isinstance(c, LineCollection)]
-    return halo, tracks
+    return drawn(ax, "halo"), drawn(ax, "tracks")
 
 
 def dots(ax: Any) -> Any:
-    (scatter,) = [c for c in ax.collections if isinstance(c, PathCollection)]
-    return scatter
+    return drawn(ax, "dots")
 
 
 def test_each_label_is_one_line_of_its_own_colour() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from matplotlib.collections import LineCollection, PathCollection, PolyCollection
+from matplotlib.collections import PathCollection, PolyCollection
 from two_unknowns import range_estimate, run_of, sphere_estimate
 
 import arrivals
@@ -29,7 +29,8 @@ def ranges(*steps: list[float]) -> Run:
 
 
 def segments(ax: Any) -> Any:
-    return [c for c in ax.collections if isinstance(c, LineCollection)][-1].get_segments()
+    (tracks,) = [c for c in ax.collections if c.get_label() == "_tracks"]
+    return tracks.get_segments()
 
 
 def dots(ax: Any) -> tuple[Any, Any]:

@@ -256,7 +256,7 @@ class BlockProcessor(Tracker):
         snapshots = to_snapshots(measurements, self.measurement)
         history = self._process(np.concatenate([self._pending(), snapshots]), open_end=True)
         history.signals.append(self._provisional_signals(self.belief, self._pending()[None]))
-        return history.run(0, dt, time.perf_counter() - started)
+        return history.run(0, dt, time.perf_counter() - started).made_by(self)
 
     def run_batch(
         self, measurements: Iterable[Iterable[ArrayLike | None]], dt: float = 1.0
@@ -293,4 +293,4 @@ class BlockProcessor(Tracker):
         belief, done, history = self._process_intervals(belief, z)
         history.signals.append(self._provisional_signals(belief, z[:, done:]))
         elapsed = (time.perf_counter() - started) / len(z)
-        return [history.run(n, dt, elapsed) for n in range(len(z))]
+        return [history.run(n, dt, elapsed).made_by(self) for n in range(len(z))]

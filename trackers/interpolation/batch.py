@@ -62,7 +62,8 @@ def run(self: InterpolationEKF, measurements: Iterable[ArrayLike | None], dt: fl
         variances.append(float(self.error.of(self.P).variance))
     states = np.array(xs).reshape(len(snapshots), self.dim_x)
     doa, std = directions(self.measurement, states, np.array(variances))
-    return direction_run(doa, std, states, dt, time.perf_counter() - started)
+    run = direction_run(doa, std, states, dt, time.perf_counter() - started)
+    return run.made_by(self)
 
 
 def run_batch(
@@ -98,7 +99,8 @@ def run_batch(
     x, _, variance = beliefs(self, np.array(sequences), dt)
     doa, std = directions(self.measurement, x, variance)
     elapsed = (time.perf_counter() - started) / len(sequences)
-    return [direction_run(*each, dt, elapsed) for each in zip(doa, std, x, strict=True)]
+    runs = (direction_run(*each, dt, elapsed) for each in zip(doa, std, x, strict=True))
+    return [run.made_by(self) for run in runs]
 
 
 def trajectory(

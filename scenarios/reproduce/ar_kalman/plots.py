@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from arrivals.measurement_models.manifolds.symmetric_line import ArrayManifold
+from arrivals.plots.colours import PALETTE
+from arrivals.plots.labels import legend_above
 from arrivals.scenarios.reproduce.ar_kalman.experiments import Experiment
 from arrivals.scenarios.reproduce.ar_kalman.scores import Lines, Results
 from arrivals.scenarios.simulations.autoregressive_sources import AutoregressiveField, SourceField
@@ -17,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-COLOURS = ("#1f77b4", "#d62728", "#2ca02c")
+COLOURS = PALETTE[:3]
 TRUTH: dict[str, Any] = {"color": "black", "linewidth": 1.4, "linestyle": (0, (4, 3)), "zorder": 5}
 REPORTED: dict[str, Any] = {"linewidth": 1.0, "linestyle": ":"}
 BAND: dict[str, Any] = {"alpha": 0.25, "linewidth": 0}
@@ -145,13 +147,13 @@ def draw_pacf(results: Results) -> Figure:
                     color=COLOURS[n])  # fmt: skip
     band = float(results["band", labels[0], ""][0])
     axes[0].axhspan(-band, band, color="0.7", zorder=0, label=f"95 % band, ±{band:.3f}")
-    axes[0].set_title("whole recordings", fontsize=10)
+    axes[0].set_title("whole recordings", fontsize=10, pad=22)
     axes[0].set(xlabel="lag", ylabel="partial autocorrelation", xticks=range(1, 21, 2))
-    axes[1].set_title("intervals of 30 samples with power", fontsize=10)
+    axes[1].set_title("intervals of 30 samples with power", fontsize=10, pad=22)
     axes[1].axhline(5, color="black", linestyle=":", linewidth=1, label="white noise, 5 %")
     axes[1].set(xlabel="lag", ylabel="beyond their band, %", xticks=range(1, 5))
-    for ax in axes:
-        ax.legend(fontsize=8)
+    legend_above(axes[0], 3)
+    legend_above(axes[1], 1)
     return figure
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from arrivals.measurement_models import DelayInterpolator
+from arrivals.plots.labels import legend_beside
 from arrivals.scenarios.reproduce.interpolation.plots import (
     COLOURS,
     LEAVES,
@@ -124,7 +125,8 @@ def _draw(number: int, paths: dict[tuple[float, str], Float], doa: float, start:
     axes[0].fill_between([], [], [], color="0.8", label="80 % of the trials")
     handles, labels = axes[0].get_legend_handles_labels()
     wanted = dict(zip(labels, handles, strict=True))  # the last of each name
-    figure.legend(wanted.values(), wanted, loc="outside upper center", ncols=7, fontsize=8)
+    figure.legend(wanted.values(), wanted, loc="outside upper center", ncols=7, fontsize=8,
+                  frameon=False)  # fmt: skip
     return figure
 
 
@@ -133,7 +135,7 @@ def _coefficients(runs: int, seed: int, results: dict[tuple[Any, ...], Float]) -
     scenario = InterpolationTone(doa_deg=60.0, n_steps=100)
     taps, model = DelayInterpolator(scenario.correlation), scenario.measurement
     true = taps.coefficients(model.delay(np.pi / 3))
-    figures = {name: make_figure(1, 1, (6.4, 3.8)) for name, _, _ in COEFFICIENTS}
+    figures = {name: make_figure(1, 1, (8.2, 3.8)) for name, _, _ in COEFFICIENTS}
     for method in PANELS[0]:
         doa = np.deg2rad(filter_directions(scenario, draws(scenario, runs, seed), method, 50.0))
         c = taps.coefficients(model.delay(doa))
@@ -150,7 +152,7 @@ def _coefficients(runs: int, seed: int, results: dict[tuple[Any, ...], Float]) -
             title=f"Fig. {figure[3:]}: coefficient {name} at 60 degrees, 5 dB, from 50; medians",
         )
         ax.title.set_fontsize(10)
-        ax.legend(fontsize=8)  # fmt: skip
+        legend_beside(ax)
     return {name: figure for name, (figure, _) in figures.items()}
 
 

@@ -114,5 +114,6 @@ def _draw_ramp(runs: int, seed: int) -> Figure:
     axes[1].set(ylabel="estimate - present truth, degrees", ylim=(-5, 5), title="Errors")
     for ax in axes:
         ax.set_xlabel("snapshot")
-    axes[0].legend(fontsize=8)
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=5, fontsize=8, frameon=False)
     return figure

@@ -8,6 +8,8 @@ import numpy as np
 
 from arrivals.measurement_models import ArraySamples
 from arrivals.plots import plot_array
+from arrivals.plots.colours import PALETTE
+from arrivals.plots.labels import legend_above
 from arrivals.typing import Float
 
 if TYPE_CHECKING:
@@ -26,9 +28,8 @@ NAMES = {
     "mvdr": "MVDR",
 }
 LEAVES = "a bar that leaves the logarithmic axis reaches 0"  # for captions
-COLOURS = {"literal": "#8c564b", "frozen": "#e377c2", "B": "#d62728", "C": "#ff7f0e",
-           "D": "#9467bd", "E": "#2ca02c", "E2": "#2ca02c", "conventional": "#1f77b4",
-           "mvdr": "#17becf"}  # fmt: skip
+ORDER = (9, 4, 1, 3, 7, 2, 2, 0, 5)  # of the colours
+COLOURS = {name: PALETTE[n] for name, n in zip(NAMES, ORDER, strict=True)}
 
 
 def make_figure(
@@ -81,22 +82,22 @@ def draw_geometry(ax: Axes, model: ArraySamples, doa_deg: float) -> None:
         # the front reaches the largest coordinate first; the path that is left takes j delays
         path = np.array([positions.max() - position, 0.0]) @ towards
         ends = np.array([[position, 0.0], np.array([position, 0.0]) + path * towards])
-        ax.plot(*ends.T, color="#d62728", linewidth=1, zorder=2)
+        ax.plot(*ends.T, color=PALETTE[1], linewidth=1, zorder=2)
         ax.annotate(f"{j}Δ" if j > 1 else "Δ" if j else "", ends.mean(axis=0), (4, 2),
-                    textcoords="offset points", fontsize=8, color="#d62728")  # fmt: skip
+                    textcoords="offset points", fontsize=8, color=PALETTE[1])  # fmt: skip
         ax.annotate(f"{j + 1}", (position, 0), (0, -13), textcoords="offset points", fontsize=8)
     first = np.array([positions.max(), 0.0])
     for n in range(3):
         front = first + n * 0.25 * size * towards
         ends = front + np.array([[-0.95], [0.15]]) * size * along
-        ax.plot(*ends.T, color="#1f77b4", linewidth=1.2 if n == 0 else 0.8,
+        ax.plot(*ends.T, color=PALETTE[0], linewidth=1.2 if n == 0 else 0.8,
                 label="wave fronts" if n == 0 else None)  # fmt: skip
     start, end = (tuple(first + share * size * towards) for share in (0.95, 0.6))
     ax.annotate("", end, start, arrowprops={"arrowstyle": "->"})
     ax.annotate("source", start, fontsize=9)
     ax.plot([first[0]] * 2, [0, 0.8 * size], color="0.6", linewidth=0.8, linestyle=":")
     ax.annotate(f"θ = {doa_deg:g}°", (first[0] + 0.02 * size, 0.6 * size), fontsize=9)
-    ax.plot([], [], color="#d62728", label=f"path left, samples; Δ = κ sin θ = {delay:g}")
+    ax.plot([], [], color=PALETTE[1], label=f"path left, samples; Δ = κ sin θ = {delay:g}")
     ax.set(aspect="equal", ylim=(-0.2 * size, 1.3 * size), xlim=(positions.min() - 0.1 * size,
            positions.max() + 0.8 * size), xlabel="position, samples of delay")  # fmt: skip
-    ax.legend(fontsize=8, loc="upper left", frameon=False)
+    legend_above(ax, 2)

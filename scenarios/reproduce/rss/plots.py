@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from arrivals.measurement_models import neper_to_db
+from arrivals.plots.colours import PALETTE
 from arrivals.scenarios.metrics.position_errors import assign
 from arrivals.scenarios.reproduce.rss.trials import Draws, TrialEstimates
 from arrivals.typing import Float
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 MAX_TRIALS = 300  # drawn
 POWERS_DB = 15  # from the mean of the prior: edge of the histograms
-VB, ML, OURS, TRUTH = "#1f77b4", "#ff7f0e", "#2ca02c", "#d62728"
+VB, ML, OURS, TRUTH = PALETTE[0], PALETTE[3], PALETTE[2], PALETTE[1]
 
 
 def draw_figure_4(

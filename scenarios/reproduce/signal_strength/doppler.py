@@ -11,6 +11,8 @@ import numpy as np
 from arrivals.measurement_models import AveragedEnvelope, LogGains, LogNormalRSS, db_to_neper
 from arrivals.measurement_models.signal_strength.path_loss import doppler_log_gain
 from arrivals.motion_models import ConstantVelocity
+from arrivals.plots.colours import PALETTE
+from arrivals.plots.labels import legend_beside
 from arrivals.scenarios.experiments.statistics import standard_error
 from arrivals.scenarios.reproduce.claims import Claim
 from arrivals.scenarios.reproduce.decisions import Both, Decision, below, by_forms, negative
@@ -128,10 +130,10 @@ def _errors(
 def _draw(results: Results) -> Figure:
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(9.0, 3.8), layout="constrained")
-    colours = dict(zip(FORMS, ("0.5", "#d62728", "#2ca02c"), strict=True))
+    figure = Figure(figsize=(10.5, 3.8), layout="constrained")
+    colours = dict(zip(FORMS, ("0.5", PALETTE[1], PALETTE[2]), strict=True))
     for ax, name, label in zip(
-        figure.subplots(1, 2), ("error", "lead"), ("(a) error, m", "(b) lead, m"), strict=True
+        figure.subplots(1, 2), ("error", "lead"), ("(a) error", "(b) lead"), strict=True
     ):
         for n, form in enumerate(FORMS):
             parts = [getattr(results[speed, form], name) for speed in SPEEDS]
@@ -139,11 +141,11 @@ def _draw(results: Results) -> Figure:
             x = np.array(SPEEDS) + 0.3 * (n - 1)
             ax.errorbar(x, [float(part.mean()) for part in parts], half, color=colours[form],
                         marker="o", capsize=3, label=form)  # fmt: skip
-        ax.set(xlabel="speed, m/s", title=label)
+        ax.set(xlabel="speed, m/s", ylabel=f"{name}, m", title=label)
         ax.set_xticks(SPEEDS)
         ax.grid(alpha=0.3)
     figure.axes[0].set_ylim(bottom=0)
-    figure.axes[0].legend(fontsize=8, title=BARS, title_fontsize=8)
+    legend_beside(figure.axes[1], title=BARS, title_fontsize=8)
     return figure
 
 

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from arrivals.plots.colours import PALETTE
+from arrivals.plots.labels import legend_above
 from arrivals.scenarios.bounds.detection import (
     amplitude_gaussian_detection,
     exact_detection,
@@ -37,7 +39,7 @@ from arrivals.typing import Float
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-COLOURS = {LOG: "#1f77b4", EXACT: "#2ca02c", AMPLITUDE: "#ff7f0e", ENERGY: "#9467bd"}
+COLOURS = {LOG: PALETTE[0], EXACT: PALETTE[2], AMPLITUDE: PALETTE[3], ENERGY: PALETTE[6]}
 MARKS = {LOG: "o", EXACT: "s", AMPLITUDE: "^", ENERGY: "v"}
 
 
@@ -50,34 +52,34 @@ def draw_drive_by(sound: Float, law: EnvelopeLaw) -> Figure:
     grid = figure.add_gridspec(2, 2, width_ratios=[1.3, 1])
     top, bottom, normal, lags = (figure.add_subplot(grid[n % 2, n // 2]) for n in range(4))
     t = 1e3 * np.arange(len(sound)) / RATE
-    top.plot(t, sound, color="#1f77b4", linewidth=1, label="sound")
+    top.plot(t, sound, color=PALETTE[0], linewidth=1, label="sound")
     z = envelope(sound)
     part = SEGMENT * 1e3 / RATE
     centres = part * (np.arange(len(z)) + 0.5)
     segment = np.repeat(z, SEGMENT) * np.exp(2e-3j * np.pi * CARRIER * t)
-    top.plot(t, segment.real, "--", color="#d62728", linewidth=0.9,
+    top.plot(t, segment.real, "--", color=PALETTE[1], linewidth=0.9,
              label="sinusoid of 1100 Hz with the envelope of the segment")  # fmt: skip
-    bottom.plot(centres, z.real, "-", color="#1f77b4", label="real part")
-    bottom.plot(centres, z.imag, "o", color="#ff7f0e", label="imaginary part")
+    bottom.plot(centres, z.real, "-", color=PALETTE[0], label="real part")
+    bottom.plot(centres, z.imag, "o", color=PALETTE[3], label="imaginary part")
     for ax in (top, bottom):
         for edge in part * np.arange(1, len(z)):
             ax.axvline(edge, color="0.7", linewidth=0.8, zorder=0)
-        ax.legend(fontsize=8)
-    top.set(ylabel="amplitude", title="synthetic drive-by sound, 48 kHz, N = 4 segments",
-            ylim=(1.1 * sound.min(), 1.7 * sound.max()))  # fmt: skip
+        legend_above(ax, 2)
+    top.set_title("synthetic drive-by sound, 48 kHz, N = 4 segments", pad=24)
+    top.set(ylabel="amplitude", ylim=(1.1 * sound.min(), 1.1 * sound.max()))
     bottom.set(xlabel="time, ms", ylabel="complex envelope", xlim=top.get_xlim())
     x = np.sort(law.samples)
-    normal.plot(ndtri((np.arange(len(x)) + 0.5) / len(x)), x, ".", markersize=2, color="#1f77b4",
+    normal.plot(ndtri((np.arange(len(x)) + 0.5) / len(x)), x, ".", markersize=2, color=PALETTE[0],
                 label="real and imaginary parts")  # fmt: skip
     normal.plot([-3, 3], [-3, 3], color="0.4", linewidth=0.8, label="Gaussian")
     normal.set(xlabel="Gaussian quantile", ylabel="quantile of the envelope")
-    lags.plot(part * np.arange(len(law.correlation)), law.correlation, "o-", color="#1f77b4",
+    lags.plot(part * np.arange(len(law.correlation)), law.correlation, "o-", color=PALETTE[0],
               label="correlation of the envelope")  # fmt: skip
     lags.axhline(law.limit, color="0.4", linestyle="--", label="95 % of independent samples")
     lags.axvline(part * FAR_SEGMENTS, color="0.7", linewidth=0.8, label="far apart")
     lags.set(xlabel="lag, ms", ylabel="correlation", ylim=(0, 1.05))
-    for ax in (normal, lags):
-        ax.legend(fontsize=8)
+    legend_above(normal, 2)
+    legend_above(lags, 3)
     return figure
 
 

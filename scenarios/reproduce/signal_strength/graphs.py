@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from arrivals.measurement_models import LogNormalRSS, neper_to_db
+from arrivals.plots.colours import PALETTE
+from arrivals.plots.labels import legend_above
 from arrivals.scenarios.simulations.signal_strength import RSSTrial
 from arrivals.trackers.rss.inference.joint_posterior import JointPosterior, Prior
 
@@ -72,7 +74,7 @@ def _draw_network(ax: Axes, trial: RSSTrial) -> None:
     x, y = model.sensors.T
     shown = ax.scatter(x, y, s=28, c=level, cmap="viridis", label="sensor")
     ax.figure.colorbar(shown, ax=ax, label="reading ξ, dB")
-    ax.plot(*truth.T, "*", color="#d62728", markersize=15, label="source")
+    ax.plot(*truth.T, "*", color=PALETTE[1], markersize=15, label="source")
     source = truth[0]
     distance = np.hypot(*(model.sensors - source).T)
     i = int(np.argsort(distance)[len(distance) // 4])
@@ -90,11 +92,11 @@ def _draw_network(ax: Axes, trial: RSSTrial) -> None:
         ax.plot(source[0] + radius * np.cos(phi), source[1] + radius * np.sin(phi), "--",
                 color="0.7", linewidth=0.8, zorder=0)  # fmt: skip
     v = source + np.array([22.0, -12.0])
-    ax.annotate("", v, source, arrowprops={"arrowstyle": "->", "color": "#d62728", "lw": 1.6})
-    ax.text(v[0] + 1.5, v[1] + 1.5, "v", fontsize=11, color="#d62728")
+    ax.annotate("", v, source, arrowprops={"arrowstyle": "->", "color": PALETTE[1], "lw": 1.6})
+    ax.text(v[0] + 1.5, v[1] + 1.5, "v", fontsize=11, color=PALETTE[1])
     ax.set(xlabel="x, m", ylabel="y, m", title="Fig. 1: sources, wavefronts and sensors")
     ax.set_aspect("equal")
-    ax.legend(fontsize=8, loc="lower left")
+    legend_above(ax, 2)
 
 
 def _draw_nodes(ax: Axes, n_sources: int, n_sensors: int) -> None:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from arrivals.plots.colours import PALETTE
+from arrivals.plots.labels import legend_beside
 from arrivals.scenarios import create
 from arrivals.scenarios.experiments.statistics import standard_error
 from arrivals.scenarios.reproduce.claims import Claim
@@ -28,7 +30,7 @@ NUMBERS = 7  # in a posterior: u and its variance, two coordinates, three entrie
 SETTLED = 5  # steps after which errors count
 LOST = 20.0  # m
 LEGEND = "number beside a mark: sensors or cells\nbars: two standard errors of the mean of logs"
-COLOURS = {ALL: "k", INFORMATION: "#1f77b4", NEAREST: "#ff7f0e", CELLS: "#2ca02c"}
+COLOURS = {ALL: "k", INFORMATION: PALETTE[0], NEAREST: PALETTE[3], CELLS: PALETTE[2]}
 REMARKS = (
     "Three crossing sources at 2 to 2.5 m/s, 100 sensors in a disc of 100 m (`rss_crossing`). "
     "Numbers sent: the readings that reach the centre in a step, and for a subset the positions "
@@ -162,7 +164,7 @@ def _draw(results: Results) -> Figure:
                         color=COLOURS[form])  # fmt: skip
     ax.set(xlabel="numbers sent in a step", yscale="log",
            ylabel="median error, m (geometric mean of the runs)")  # fmt: skip
-    ax.legend(fontsize=8, title=LEGEND, title_fontsize=8)
+    legend_beside(ax, title=LEGEND, title_fontsize=8)
     ax.grid(alpha=0.3)
     return figure
 

@@ -190,6 +190,6 @@ def _draw(seed: int) -> Figure:
         truth: Float = np.rad2deg(trial.truth)
         ax.plot(truth, linestyle="none", marker="+", markersize=4, color="black", zorder=5)
         ax.set_title(f"SVALSE, {n_snapshots} snapshot{'s' * (n_snapshots > 1)} a step, 20 dB; "
-                     "crosses: truth", loc="left", fontsize=11)  # fmt: skip
+                     "crosses: truth", fontsize=11)  # fmt: skip
         ax.label_outer()
     return figure

@@ -286,12 +286,12 @@ def _figures(pooled: Pooled) -> dict[str, Figure]:
 
     from arrivals.plots.calibration import plot_coverage, plot_reliability
 
-    first = Figure(figsize=(8.0, 1.6 + 0.24 * len(pooled)), layout="constrained")
+    first = Figure(figsize=(9.6, 1.6 + 0.24 * len(pooled)), layout="constrained")
     stated = {scene.label: result.default for scene, result in pooled.items()}
     covered, errors = ({label: of(part) for label, part in stated.items()}
                        for of in (shares, share_errors))  # fmt: skip
     plot_coverage(covered, LEVELS, errors=errors, ax=first.subplots())
-    second = Figure(figsize=(5.0, 4.6), layout="constrained")
+    second = Figure(figsize=(6.2, 4.6), layout="constrained")
     ax = second.subplots()
     for label, loud in (("10 dB and more", True), ("0 dB", False)):
         plot_reliability(reliability_of(pooled, loud).table, label=label, ax=ax)

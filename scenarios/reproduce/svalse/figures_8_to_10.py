@@ -7,7 +7,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from arrivals.plots.study import METHOD_COLOURS, plot_metric
+from arrivals.plots.colours import METHOD_COLOURS
+from arrivals.plots.study import plot_metric
 from arrivals.scenarios.base import Scenario
 from arrivals.scenarios.bounds.snapshot import LineBound, line_bound
 from arrivals.scenarios.experiments.methods import Method, methods

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from string import ascii_lowercase
+from textwrap import fill
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from arrivals.plots.bearing_time import NEUTRAL, PALETTE, plot_bearing_time
-from arrivals.plots.study import METHOD_COLOURS
+from arrivals.plots.bearing_time import plot_bearing_time
+from arrivals.plots.colours import METHOD_COLOURS, NEUTRAL, PALETTE
+from arrivals.plots.labels import legend_below
 from arrivals.scenarios.base import Trial
 from arrivals.scenarios.experiments.methods import tracker_name
 from arrivals.scenarios.experiments.study import Study
@@ -25,9 +26,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-PARTS = {"distance": "#9aa5b1", "missed": "#1f77b4", "false": "#d62728"}
-TRUTH = "#00b050"
-LABELLED = len(PALETTE) - 1  # colour of all labels: not that of the truth, VALSE or SVALSE
+PARTS = {"distance": "#9aa5b1", "missed": PALETTE[0], "false": PALETTE[1]}
+TRUTH = PALETTE[2]
+LABELLED = PALETTE[7]  # colour of all labels: not that of the truth, VALSE or SVALSE
 TRUTH_MARKS: dict[str, Any] = {
     "color": TRUTH, "marker": "o", "markersize": 4.5, "markerfacecolor": "none",
     "markeredgewidth": 0.8, "linestyle": "",
@@ -109,22 +110,14 @@ def draw_activation(drawn: Sequence[DrawnRun], paper: Sequence[float]) -> Figure
 def _draw_run(ax: Axes, one: DrawnRun) -> None:
     trial = one.trial
     plot_bearing_time(
-        _recoloured(one.run), snapshots=trial.measurements, measurement=trial.measurement, ax=ax  # type: ignore[arg-type]  # complex
+        one.run, snapshots=trial.measurements, measurement=trial.measurement,  # type: ignore[arg-type]  # complex
+        colour=LABELLED, ax=ax,
     )  # fmt: skip
     _draw_truth(ax, trial)
 
 
 def _named(method: str) -> str:
     return method if method in AS_PRINTED.values() else f"{method}, ours"
-
-
-def _recoloured(run: Run) -> Run:
-    """Return the run with other labels, all of the colour `LABELLED`."""
-    if "label" not in run.fields:
-        return run
-    label = run.fields["label"]
-    other = np.where(label < 0, -1, len(PALETTE) * label + LABELLED)
-    return replace(run, fields={**run.fields, "label": other})
 
 
 def _draw_beam_and_truth(ax: Axes, trial: Trial) -> None:
@@ -148,8 +141,7 @@ def _draw_gospa(ax: Axes, drawn: Sequence[DrawnRun], paper: Mapping[str, float])
                 linestyle="--" if printed else "-", linewidth=1.0, label=label)  # fmt: skip
     ax.set_title("(d) GOSPA of every step", fontsize=10)
     ax.set(xlabel="step", ylabel="GOSPA, degrees", ylim=(0, None))
-    ax.legend(fontsize=8, ncols=2, loc="upper center")
-    ax.set_ylim(top=1.35 * ax.get_ylim()[1])
+    legend_below(ax, 2)
 
 
 def _draw_number(ax: Axes, drawn: Sequence[DrawnRun]) -> None:
@@ -165,7 +157,7 @@ def _draw_number(ax: Axes, drawn: Sequence[DrawnRun]) -> None:
     ax.set_title("number of sources, and of estimates (not in the paper)", fontsize=10)
     top = max(there.max(), *(one.run.n_found.max() for one in drawn))
     ax.set(xlabel="step", ylabel="number", ylim=(0, top + 0.5))
-    ax.legend(fontsize=8, ncols=3, loc="lower center")
+    legend_below(ax, 3)
 
 
 def _one_bar(figure: Figure, beside: Sequence[Axes], axes: Sequence[Axes]) -> None:
@@ -193,7 +185,7 @@ def _name_marks(figure: Figure) -> None:
             color=NEUTRAL,
             label="estimates without a label",
         ),
-        Line2D([], [], linewidth=2, color=PALETTE[LABELLED], label="estimates, one line a label"),
+        Line2D([], [], linewidth=2, color=LABELLED, label="estimates, one line a label"),
     ]
     figure.legend(handles=marks, loc="outside upper center", ncols=3, fontsize=9, frameon=False)
 
@@ -227,7 +219,7 @@ def draw_parts(study: Study, name: str) -> Figure:
         index = [labels.index(label) for label in beside]
         ax.plot(np.array(index) + 0.2, list(beside.values()), marker, color="black",
                 markerfacecolor="white", label=origin)  # fmt: skip
-    ax.set_xticks(at, [label.replace(" ", "\n", 1) for label in labels])
+    ax.set_xticks(at, [fill(label, 9) for label in labels])
     ax.set(ylabel="GOSPA, degrees")
     figure.legend(fontsize=8, loc="outside upper center", ncols=6, frameon=False)
     return figure

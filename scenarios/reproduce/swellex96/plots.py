@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from arrivals.plots.bearing_time import PALETTE
+from arrivals.plots.colours import PALETTE
+from arrivals.plots.labels import legend_below
 from arrivals.scenarios.ocean_acoustics.eigenrays import eigenrays
 from arrivals.scenarios.ocean_acoustics.rays import ray_line
 from arrivals.scenarios.reproduce.swellex96.field import beam
@@ -57,14 +58,14 @@ def _draw_paths(ax: Axes) -> None:
             ax.plot((distance - x) / 1e3, z, style, color=colour, linewidth=1, label=label)
         ax.plot(distance / 1e3, 9.0, "o", color=colour)
     ax.plot(np.zeros(64), depths, ".", color="black", markersize=3)
-    ax.axhline(guide.water_depth, color="#8c564b", linewidth=2)
-    ax.set(xlabel="range from the array, km", ylabel="depth, m", ylim=(260, 0), title="(a) paths")
-    ax.legend(fontsize=8, loc="lower center", ncols=3)
+    ax.axhline(guide.water_depth, color=PALETTE[9], linewidth=2)
+    ax.set(xlabel="range from the array, km", ylabel="depth, m", ylim=(225, 0), title="(a) paths")
+    legend_below(ax, 3)
 
 
 def _draw_speed(ax: Axes) -> None:
     guide = environment()
-    ax.plot(guide.speeds, guide.depths, color=PALETTE[1])
+    ax.plot(guide.speeds, guide.depths, color=PALETTE[0])
     ax.axhspan(94.125, 212.25, color="0.93", zorder=0)
     ax.annotate("array", (0.97, 0.3), xycoords="axes fraction", ha="right", fontsize=9)
     ax.set(xlabel="sound speed, m/s", ylabel="depth, m", ylim=(225, 0), title="(b) sound speed")
@@ -72,7 +73,7 @@ def _draw_speed(ax: Axes) -> None:
 
 def _draw_range(ax: Axes) -> None:
     ship = track()
-    ax.plot(ship["step"], ship["range_m"] / 1e3, color=PALETTE[1])
+    ax.plot(ship["step"], ship["range_m"] / 1e3, color=PALETTE[0])
     ax.set(xlabel="step", ylabel="range, km", ylim=(0, None), title="(c) range")
 
 
@@ -80,9 +81,9 @@ def _draw_track(ax: Axes) -> None:
     """Draw the ship's track, with a mark every 50 steps."""
     ship = track()
     x, y = ship["east_m"] / 1e3, ship["north_m"] / 1e3
-    ax.plot(x, y, color=PALETTE[1])
+    ax.plot(x, y, color=PALETTE[0])
     marks = ship["step"] % 50 == 0
-    ax.plot(x[marks], y[marks], "o", color=PALETTE[1], markersize=4)
+    ax.plot(x[marks], y[marks], "o", color=PALETTE[0], markersize=4)
     for step, point in zip(ship["step"][marks], np.stack([x, y], axis=1)[marks], strict=True):
         ax.annotate(f"{step:.0f}", point, (5, -3), textcoords="offset points", fontsize=7)
     ax.plot(0, 0, "^", color="black")

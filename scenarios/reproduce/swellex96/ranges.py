@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from arrivals.plots.bearing_time import PALETTE
+from arrivals.plots.colours import PALETTE
+from arrivals.plots.labels import legend_beside
 from arrivals.scenarios.experiments.workers import parallel_map
 from arrivals.scenarios.reproduce.claims import Claim
 from arrivals.scenarios.reproduce.decisions import Decision
@@ -186,10 +187,10 @@ def _draw(drawn: Mapping[str, PathRanges]) -> Figure:
     for ax, (model, found) in zip(axes, drawn.items(), strict=True):
         ax.plot(ship["step"], ship["range_m"], color="black", linewidth=1, label="ship")
         ax.plot(found.step, found.ratio * ship["range_m"][found.step - 1], ".",
-                color=PALETTE[1], label="paths")  # fmt: skip
+                color=PALETTE[0], label="paths")  # fmt: skip
         ax.set(xlim=(150, 350), ylim=(0, 4000), ylabel="range, m")
-        ax.set_title(f"field by {model}", loc="left", fontsize=11)
-    axes[0].legend(loc="upper right", fontsize=9)
+        ax.set_title(f"field by {model}", fontsize=11)
+    legend_beside(axes[0])
     axes[-1].set_xlabel("step")
     return figure
 

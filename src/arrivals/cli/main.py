@@ -157,6 +157,9 @@ def _add_track(commands: Any) -> None:
            help="write separated source signals (WAV or npy); needs a tracker that "
                 "estimates signals")  # fmt: skip
     option("--plot", metavar="PNG", help="draw the tracks over the beam power")
+    option("--normalize", choices=("run", "step"),
+           help="beam power of --plot relative to the highest of the recording, or of each step, "
+                "where quiet sources stay visible (run)")  # fmt: skip
     option("--window", type=int, metavar="N", help="length of a window, samples")
     option("--hop", type=int, metavar="N",
            help="samples between windows (the window), or between output lines of real "

@@ -29,6 +29,8 @@ def check_outputs(arguments: argparse.Namespace) -> None:
         check_output(name)
     if arguments.plot:
         picture_format(arguments.plot)
+    elif arguments.normalize:
+        raise ValueError("--normalize requires --plot: it sets the beam power of the picture")
     if arguments.signals:
         check_suffix(arguments.signals)
 

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import argparse
 
-from arrivals.cli.outputs import Bar, check_outputs
+from arrivals.cli.outputs import Bar, check_outputs, refuse
 from arrivals.cli.standard_input import standard_input
 from arrivals.cli.track_band import track_band
 from arrivals.cli.track_snapshots import track_snapshots
 from arrivals.cli.track_sources import separates, track_sources
 from arrivals.measurement_models import SensorArray
 from arrivals.recordings.choice.assembly import takes_samples
+
+NO_BEAM = "requires a tracker of snapshots: the beam power of this one is not drawn"
 
 
 def track(arguments: argparse.Namespace, bar: Bar) -> None:
@@ -36,8 +38,12 @@ def track(arguments: argparse.Namespace, bar: Bar) -> None:
     one_thread = threadpool_limits(1, "blas")  # matrices are small: more threads only wait
     with one_thread, standard_input(arguments):
         if separates(arguments):
+            refuse(arguments, ("normalize",), NO_BEAM)
             track_sources(arguments, array, bar)
         elif arguments.band and takes_samples(arguments.tracker):
+            refuse(arguments, ("normalize",), NO_BEAM)
             track_band(arguments, array, bar)
         else:
+            if arguments.unknowns == "sphere":
+                refuse(arguments, ("normalize",), "requires directions over time, not on the sky")
             track_snapshots(arguments, array, bar)

@@ -66,7 +66,8 @@ def _track_file(
     result = tracker.run(bar(announced, desc=choice.tracker, total=len(steps)))
     result = result if time is None else result.at(time)
     write_table(result, arguments.out)
-    draw(arguments.plot, result, snapshots=steps, measurement=measurement, time=time)
+    draw(arguments.plot, result, snapshots=steps, measurement=measurement, time=time,
+         normalize=arguments.normalize or "run")  # fmt: skip
 
 
 def _announcement(

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from arrivals.measurement_models import SensorArray
-from arrivals.plots.bearing_time import NEUTRAL, PALETTE, new_axes
+from arrivals.plots.bearing_time import new_axes
+from arrivals.plots.colours import NEUTRAL, PALETTE
 from arrivals.typing import Float
 
 if TYPE_CHECKING:
@@ -59,7 +60,7 @@ def plot_array(
         positions = np.column_stack([positions, np.zeros(len(positions))])
     elif clockwise:
         positions = np.column_stack([positions[:, 1], positions[:, 0], positions[:, 2:]])
-    cast(Any, ax).scatter(*positions.T, s=28, color=PALETTE[1], zorder=3)
+    cast(Any, ax).scatter(*positions.T, s=28, color=PALETTE[0], zorder=3)
     if array.n_sensors <= N_NUMBERED and array.dim < 3:
         for number, position in enumerate(positions, start=first):
             ax.annotate(str(number), position, (0, 6), textcoords="offset points",

@@ -4,24 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import islice
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 
 from arrivals.measurement_models import ArraySnapshot
+from arrivals.plots.tracks import N_STEPS
 from arrivals.trackers.beamforming.spectrum import bartlett_power, mean_beam_power, scan_directions
 from arrivals.typing import Complex, Float, Int
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+Normalize: TypeAlias = Literal["run", "step"]
+
+NORMALIZE: tuple[Normalize, ...] = ("run", "step")
 N_DIRECTIONS, N_COLUMNS = 361, 1500  # maximum size of the image
-N_STEPS = 6000  # maximum number of steps that are drawn
 ELEVATION_STEP = 10.0  # degrees, of the power on the sphere
 
 
 def draw_beam(
-    ax: Axes, at: Float, snapshots: Any, measurement: ArraySnapshot, range_db: float
+    ax: Axes,
+    at: Float,
+    snapshots: Any,
+    measurement: ArraySnapshot,
+    range_db: float,
+    normalize: Normalize = "run",
 ) -> None:
     """Draw the beam power in grey, light enough for the tracks to stand out.
 
@@ -37,6 +45,8 @@ def draw_beam(
         Array and wavelengths.
     range_db : float
         Power shown, down from the highest, dB.
+    normalize : {"run", "step"}
+        Whether the highest is that of all steps, or of each step.
 
     Raises
     ------
@@ -55,16 +65,36 @@ def draw_beam(
         powers.append(power_of(block))
     if not has_power:
         return
-    power = np.array(powers)
-    level = 10 * np.log10(np.maximum(power / power.max(), 1e-30))
+    level = relative_level(np.array(powers), normalize)
     light = LinearSegmentedColormap.from_list("light", ["#ffffff", "#c3c8cf", "#4d5560"])
     image = ax.pcolormesh(
         _edges(at[starts]), np.rad2deg(_edges(doa)), level.T,
         cmap=light, vmin=-range_db, vmax=0, rasterized=True,
     )  # fmt: skip
     bar = ax.figure.colorbar(image, ax=ax, pad=0.015, aspect=25, extend="min")
-    bar.set_label("beam power, dB re maximum")
+    bar.set_label("beam power, dB re maximum" + " of the step" * (normalize == "step"))
     bar.outline.set_visible(False)
+
+
+def relative_level(power: Float, normalize: Normalize) -> Float:
+    """Return powers (n_steps, n_directions) in dB re the highest of all steps, or of each.
+
+    Steps without power have the level of the smallest number that is drawn, -300 dB.
+
+    Examples
+    --------
+    >>> power = np.array([[1.0, 0.01], [1e-4, 1e-6], [0.0, 0.0]])
+    >>> relative_level(power, "run")[:2]
+    array([[  0., -20.],
+           [-40., -60.]])
+    >>> relative_level(power, "step")
+    array([[   0.,  -20.],
+           [   0.,  -20.],
+           [-300., -300.]])
+    """
+    highest = power.max(axis=1, keepdims=True) if normalize == "step" else power.max()
+    share = np.divide(power, highest, out=np.zeros_like(power), where=highest > 0)
+    return np.asarray(10 * np.log10(np.maximum(share, 1e-30)))
 
 
 def _blocks(snapshots: Any, sizes: Int, shape: tuple[int, ...]) -> Iterator[Complex]:

@@ -12,22 +12,26 @@ from numpy.typing import ArrayLike
 
 from arrivals.files import atomic_write
 from arrivals.measurement_models import ArraySnapshot
-from arrivals.messages import shown
-from arrivals.plots.beam import N_STEPS, draw_beam
+from arrivals.plots.beam import NORMALIZE, Normalize, draw_beam
+from arrivals.plots.labels import set_title, settings_text
+from arrivals.plots.tracks import (
+    draw_bands,
+    draw_tracks,
+    require_field,
+    step_times,
+    time_limits,
+    track_colours,
+    track_order,
+)
 from arrivals.trackers.run import Run
-from arrivals.typing import Bool, Complex, Float, Int
-from arrivals.validation import instance, one_of, positive, shaped
+from arrivals.typing import Complex, Float
+from arrivals.validation import one_of, positive
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# Strong colours that differ from each other on grey, also for the colour-blind.
-PALETTE = (
-    "#d62728", "#1f77b4", "#ff7f0e", "#2ca02c", "#9467bd",
-    "#e377c2", "#17becf", "#8c564b", "#b8a900", "#00429d",
-)  # fmt: skip
-NEUTRAL = "#202020"
+RANGES_DB = {"run": 30.0, "step": 10.0}
 PICTURES = (".png", ".pdf", ".svg", ".jpg")
 
 
@@ -37,14 +41,17 @@ def plot_bearing_time(
     snapshots: ArrayLike | Iterable[Complex] | None = None,
     measurement: ArraySnapshot | None = None,
     time: ArrayLike | None = None,
-    dynamic_range_db: float = 30.0,
+    dynamic_range_db: float | None = None,
+    normalize: Normalize = "run",
+    colour: str | None = None,
     ax: Axes | None = None,
 ) -> Axes:
     """Draw directions over time, over the power of the conventional beamformer.
 
     Each label has a colour (they repeat), directions without a label are dark, and the opacity
-    is the existence; without existence, all are opaque. Of more than 6000 steps, every n-th is
-    drawn.
+    is the existence; without existence, all are opaque. Bands are ± one standard deviation; a thin
+    line joins a track over its pauses. The title has the settings that the run knows. Of more than
+    6000 steps, every n-th is drawn.
 
     Parameters
     ----------
@@ -53,11 +60,16 @@ def plot_bearing_time(
     snapshots : array_like or iterable, shape (n_steps, *measurement.shape), optional
         Measurements of the run, iterated over once; without them, the beam is not drawn.
     measurement : ArraySnapshot, optional
-        Array and wavelength, required with `snapshots`.
+        Array and wavelength of the snapshots; those of the run's tracker if None.
     time : array_like, shape (n_steps,), optional
         Increasing times, s; the number of the step if None.
-    dynamic_range_db : float
-        Power shown, down from the highest of all steps, dB.
+    dynamic_range_db : float, optional
+        Power shown, down from the highest, dB; 30 of a run and 10 of a step if None.
+    normalize : {"run", "step"}
+        Whether the highest power is that of all steps, or of each step, where quiet sources stay
+        visible beside louder steps.
+    colour : str, optional
+        One colour for all labels.
     ax : matplotlib Axes, optional
         Axes of a new figure without a window if None; `save` writes it.
 
@@ -69,7 +81,7 @@ def plot_bearing_time(
     Raises
     ------
     ValueError
-        If shapes do not fit the run, or `snapshots` come without a `measurement`.
+        If shapes do not fit the run, or the `measurement` of snapshots is not known.
     TypeError
         If the run does not have directions.
 
@@ -84,92 +96,60 @@ def plot_bearing_time(
     ('step', 'direction of arrival, degrees')
     """
     require_field(run, "doa", "directions")
+    one_of("normalize", normalize, NORMALIZE)
     ax = new_axes((9.0, 4.5)) if ax is None else ax
     at = step_times(run, time)
+    known = run.measurement if measurement is None else measurement
     if snapshots is not None:
-        if measurement is None:
+        if not isinstance(known, ArraySnapshot):
             raise ValueError("measurement must be set with snapshots; got None")
-        range_db = positive("dynamic_range_db", dynamic_range_db)
-        draw_beam(ax, at, snapshots, measurement, range_db)
-    _draw_tracks(ax, at, run)
-    line = bool((np.abs(run.doa) > np.pi / 2).sum() == 0)
-    _name_axes(ax, line if measurement is None else measurement.array.dim == 1, time is None)
-    if len(at) > 0:
-        half = (at[-1] - at[0]) / max(1, len(at) - 1) / 2 or 0.5
-        ax.set_xlim(at[0] - half, at[-1] + half)
+        asked = RANGES_DB[normalize] if dynamic_range_db is None else dynamic_range_db
+        range_db = positive("dynamic_range_db", asked)
+        draw_beam(ax, at, snapshots, known, range_db, normalize)
+    limit = 90.0 if is_on_line(run, known) else 180.0
+    draw_directions(ax, at, run, limit, colour)
+    ax.set(xlabel="step" if time is None else "time, s")
+    set_title(ax, settings_text(run, measurement))
+    time_limits(ax, at)
     return ax
 
 
-def require_field(run: Run, name: str, words: str) -> None:
-    """Raise a TypeError unless a run has a field of its sources."""
-    if name not in instance("run", run, Run).fields:
-        raise TypeError(f"run must contain {words}; got {run.kind.__name__}")
+def is_on_line(run: Run, measurement: object = None) -> bool:
+    """Return True if directions are those of a line: of its array, or within ±90 degrees."""
+    dim = getattr(getattr(measurement, "array", None), "dim", None)
+    return bool((np.abs(run.doa) > np.pi / 2).sum() == 0) if dim is None else dim == 1
 
 
-def step_times(run: Run, time: ArrayLike | None) -> Float:
-    """Return the times of the steps, s, increasing; their numbers if None."""
-    if time is None:
-        return np.arange(len(run), dtype=np.float64)
-    at = shaped("time", time, len(run))
-    if not np.isfinite(at).all() or (np.diff(at) <= 0).any():
-        raise ValueError(f"time must be finite and increasing; got {shown(at)}")
-    return at
+def draw_directions(ax: Axes, at: Float, run: Run, limit: float, colour: str | None = None) -> None:
+    """Draw tracks and bands of directions, joined neither across ±180 degrees nor endfire.
 
-
-def _name_axes(ax: Axes, line: bool, steps: bool) -> None:
-    limit, tick = (90, 30) if line else (180, 60)
-    ax.set(ylim=(-limit, limit), yticks=np.arange(-limit, limit + 1, tick))
-    ax.set_ylabel("direction of arrival, degrees" if line else "azimuth, degrees")
-    ax.set_xlabel("step" if steps else "time, s")
-
-
-def _draw_tracks(ax: Axes, at: Float, run: Run) -> None:
-    """Draw each label as a line through successive steps, and isolated directions as dots."""
-    step, slot, joined = track_order(run)
-    point = np.stack([at[step], np.rad2deg(run.doa[step, slot])], 1)
-    furthest = 180 if (np.abs(point[:, 1]) > 90).any() else 90  # not across ±180°, on lines ±90°
-    near = np.abs(np.diff(point[:, 1])) < furthest
-    draw_tracks(ax, point, track_colours(run, step, slot), joined & near)
-
-
-def track_order(run: Run) -> tuple[Int, Int, Bool]:
-    """Return steps and slots of the directions by label and step, and which neighbours are joined.
-
-    Of more than 6000 steps, every n-th is taken. Neighbours are joined, (n - 1,), if they have one
-    label and successive steps.
+    Parameters
+    ----------
+    ax : matplotlib Axes
+        Axes of directions over time.
+    at : ndarray, shape (n_steps,)
+        Times.
+    run : Run
+        Run with directions.
+    limit : float
+        90 on a line, 180 elsewhere, degrees.
+    colour : str, optional
+        One colour for all labels.
     """
-    every = max(1, -(-len(run) // N_STEPS))
-    step, slot = np.nonzero(~np.isnan(run.doa[::every]))
-    label = run.label[::every][step, slot]
-    order = np.lexsort([step, label])
-    step, slot, label = step[order], slot[order], label[order]
-    joined = (np.diff(label) == 0) & (label[1:] >= 0) & (np.diff(step) == 1)
-    return step * every, slot, np.asarray(joined)
-
-
-def draw_tracks(ax: Axes, point: Float, colour: Float, joined: Bool) -> None:
-    """Draw points (n, 2): lines between neighbours that are joined, dots elsewhere."""
-    from matplotlib.collections import LineCollection
-
-    lines = list(np.stack([point[:-1][joined], point[1:][joined]], axis=1))
-    for width, paint in ((3.4, "white"), (1.7, colour[1:][joined])):
-        ax.add_collection(LineCollection(lines, colors=paint, linewidths=width, zorder=3))
-    alone = np.ones(len(point), dtype=np.bool_)
-    alone[:-1][joined] = False
-    alone[1:][joined] = False
-    x, y = point[alone].T
-    ax.scatter(x, y, s=9, c=colour[alone], edgecolors="white", linewidths=0.4, zorder=2)
-
-
-def track_colours(run: Run, step: Int, slot: Int) -> Float:
-    """Return RGBA rows: the colour from the label, the opacity from the existence."""
-    from matplotlib.colors import to_rgba_array
-
-    label, existence = run.label[step, slot], run.existence[step, slot]
-    palette = to_rgba_array((*PALETTE, NEUTRAL))
-    colour = palette[np.where(label < 0, -1, label % len(PALETTE))]
-    colour[:, 3] = np.where(np.isnan(existence), 1.0, np.clip(existence, 0.0, 1.0))
-    return np.asarray(colour)
+    order = track_order(run, run.doa)
+    x, y = at[order.step], np.rad2deg(run.doa[order.step, order.slot])
+    std = np.rad2deg(run.std[order.step, order.slot])
+    order = order.near(np.abs(np.diff(y)) < limit)
+    colours = track_colours(run, order, colour)
+    turns = (-360.0, 0.0, 360.0) if limit == 180.0 else (0.0,)
+    for turn in turns:  # bands beyond ±180 degrees go on at the other side
+        low, high = y - std + turn, y + std + turn
+        seen = (low < limit) & (high > -limit)
+        ends = np.where(seen, low, np.nan), np.where(seen, high, np.nan)
+        draw_bands(ax, x, ends, colours, order)
+    draw_tracks(ax, np.stack([x, y], 1), colours, order)
+    ax.set(ylim=(-limit, limit), yticks=np.arange(-limit, limit + 1, limit / 3))
+    ax.set_ylabel("direction of arrival, degrees" if limit == 90.0 else "azimuth, degrees")
 
 
 def new_axes(size: tuple[float, float], dim: int = 2) -> Axes:

@@ -8,27 +8,55 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from arrivals.plots.bearing_time import NEUTRAL, PALETTE
+from arrivals.messages import shown
+from arrivals.plots.colours import NEUTRAL, PALETTE
+from arrivals.plots.labels import legend_beside
+from arrivals.typing import Float, Int
+from arrivals.validation import real
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+LEVELS = np.linspace(0.05, 0.95, 19)  # stated shares of errors
 
-def plot_reliability(table: Any, *, label: str | None = None, ax: Axes | None = None) -> Axes:
-    """Draw the observed share over the stated probability of existence, with 95 % intervals.
+
+def plot_reliability(
+    stated: Any,
+    errors: ArrayLike | None = None,
+    *,
+    label: str | None = None,
+    ax: Axes | None = None,
+) -> Axes:
+    """Draw observed over stated shares, with 95 % binomial intervals.
+
+    Of probabilities of existence: the share of sources that are there. Of standard deviations: the
+    share of errors within the central interval of a Gaussian that holds a stated share of them.
+    A curve on the diagonal is honest; below it, the tracker is too sure.
 
     Parameters
     ----------
-    table : ReliabilityTable
-        With `count`, `stated` and `observed`, as `reliability` returns it.
+    stated : ReliabilityTable, or array_like of shape (n,)
+        Table of `reliability(...)`, with `count`, `stated` and `observed`; or, with `errors`,
+        stated standard deviations.
+    errors : array_like, shape (n,), optional
+        Errors of the estimates, in the unit of the deviations. Estimates whose error or deviation
+        is NaN are left out.
     label : str, optional
-        Entry of the legend.
+        Entry of the legend, beside the axes.
     ax : matplotlib Axes, optional
-        Axes of a new figure if None.
+        Axes of a new figure if None; further curves have further colours.
 
     Returns
     -------
     matplotlib Axes
+        Observed share upwards, stated share to the right, both from 0 to 1.
+
+    Raises
+    ------
+    TypeError
+        If `stated` is not a table and there are no errors.
+    ValueError
+        If shapes differ, a deviation is not positive, or nothing is left to compare.
 
     Examples
     --------
@@ -36,31 +64,57 @@ def plot_reliability(table: Any, *, label: str | None = None, ax: Axes | None = 
     >>> ax = plot_reliability(reliability([0.9, 0.9, 0.2], [True, True, False]).table)
     >>> ax.get_xlabel()
     'stated existence'
+    >>> plot_reliability([1.0, 2.0], [0.5, -3.0]).get_xlabel()
+    'stated share of errors'
     """
-    from scipy.stats import binomtest
-
     from arrivals.plots.bearing_time import new_axes
 
-    if ax is None:
-        ax = new_axes((4.8, 4.4))
+    if errors is not None:
+        shares, hits, counts = _within(stated, errors)
+        names = ("stated share of errors", "observed share of errors")
+    elif all(hasattr(stated, name) for name in ("count", "stated", "observed")):
+        shares, counts = np.asarray(stated.stated), np.asarray(stated.count)
+        hits = np.rint(np.asarray(stated.observed) * counts).astype(int)
+        names = ("stated existence", "share of sources")
+    else:
+        raise TypeError(f"stated must be a table of reliability, or have errors; got {stated!r}")
+    ax = new_axes((5.6, 4.4)) if ax is None else ax
     if not ax.lines:
         ax.plot([0, 1], [0, 1], color=NEUTRAL, linewidth=1.0)
-    hits = np.rint(np.asarray(table.observed) * table.count).astype(int)
-    ends = [
-        binomtest(int(k), int(n)).proportion_ci(method="wilson")
-        for k, n in zip(hits, table.count, strict=True)
-    ]
-    low, high = (np.array([getattr(end, side) for end in ends]) for side in ("low", "high"))
-    spread = np.abs([table.observed - low, high - table.observed])
+    observed = hits / counts
+    spread = np.abs(_intervals(hits, counts) - observed)
     colour = PALETTE[len(ax.containers) % len(PALETTE)]
     style: dict[str, Any] = {"marker": "o", "markersize": 4, "linewidth": 1.2, "capsize": 2}
-    ax.errorbar(table.stated, table.observed, yerr=spread, color=colour, label=label, **style)
-    ax.set(xlabel="stated existence", ylabel="share of sources", xlim=(0, 1), ylim=(0, 1))
+    ax.errorbar(shares, observed, yerr=spread, color=colour, label=label, **style)
+    ax.set(xlabel=names[0], ylabel=names[1], xlim=(0, 1), ylim=(0, 1))
     ax.grid(color="0.92")
     ax.set_axisbelow(True)
-    if label is not None:
-        ax.legend(fontsize=8)
+    legend_beside(ax)
     return ax
+
+
+def _within(std: Any, errors: ArrayLike) -> tuple[Float, Int, Int]:
+    """Return stated shares, and errors within the interval of each, of how many."""
+    from scipy.special import ndtri
+
+    deviation, error = real("stated", std), real("errors", errors)
+    if deviation.shape != error.shape or error.ndim != 1:
+        raise ValueError(f"errors must have shape {deviation.shape}; got {error.shape}")
+    known = ~(np.isnan(deviation) | np.isnan(error))
+    if not known.any() or not (deviation[known] > 0).all():
+        raise ValueError(f"stated must be positive deviations; got {shown(deviation)}")
+    size = np.abs(error[known]) / deviation[known]
+    widths = ndtri((1 + LEVELS) / 2)  # of a Gaussian, in standard deviations
+    hits = (size[:, None] <= widths).sum(axis=0)
+    return LEVELS, hits, np.full(len(LEVELS), known.sum())
+
+
+def _intervals(hits: Int, counts: Int) -> Float:
+    """Return the ends of 95 % intervals of shares, (2, n), by Wilson's formula."""
+    from scipy.stats import binomtest
+
+    tests = [binomtest(int(k), int(n)) for k, n in zip(hits, counts, strict=True)]
+    return np.array([test.proportion_ci(method="wilson") for test in tests]).reshape(-1, 2).T
 
 
 def plot_coverage(
@@ -121,6 +175,5 @@ def plot_coverage(
     ax.grid(color="0.92", axis="x")
     ax.set_axisbelow(True)
     bars = "" if errors is None else "\nbars: two standard errors"
-    ax.legend(fontsize=8, title=f"stated interval, dashed{bars}", title_fontsize=8,
-              loc="best")  # fmt: skip
+    legend_beside(ax, title=f"stated interval, dashed{bars}", title_fontsize=8)
     return ax

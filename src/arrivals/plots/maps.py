@@ -9,11 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models import Station
-from arrivals.plots.bearing_time import NEUTRAL, PALETTE, new_axes
+from arrivals.plots.bearing_time import new_axes
+from arrivals.plots.colours import NEUTRAL, label_colours
+from arrivals.plots.labels import legend_beside, set_title, settings_text
 from arrivals.plots.station_map import draw_bearings, draw_stations
+from arrivals.plots.tracks import PAUSE_WIDTH
 from arrivals.trackers.run import Run
 from arrivals.typing import Float
-from arrivals.validation import count, real
+from arrivals.validation import count, instance, real, shaped
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,6 +37,10 @@ def plot_map(
     ax: Axes | None = None,
 ) -> Axes:
     """Draw positions over time with 95 % ellipses, the sensors and the stations.
+
+    A thin line joins a track over its pauses. The legend is beside the map, and the title has the
+    settings that the run knows. Colours are those of `plot_bearing_time`; of several runs, they
+    count the tracks.
 
     Parameters
     ----------
@@ -62,7 +69,7 @@ def plot_map(
     TypeError
         If the run does not have positions.
     ValueError
-        If there are bearings without stations, or not one entry a station.
+        If a shape does not fit, or there are bearings without stations or not one a station.
 
     Examples
     --------
@@ -74,49 +81,56 @@ def plot_map(
     """
     runs = run if isinstance(run, Mapping) else {"": run}
     for one in runs.values():
-        if "position" not in one.fields:
+        if "position" not in instance("run", one, Run).fields:
             raise TypeError(f"run must contain positions; got {one.kind.__name__}")
     count("n_ellipses", n_ellipses)
+    if bearings is not None and stations is None:
+        raise ValueError("bearings must come with stations; got None")
+    places = None if sensors is None else _points("sensors", sensors, 2)
+    paths = None if truth is None else _points("truth", truth, 3)
     ax = new_axes((7.0, 6.4)) if ax is None else ax
-    if sensors is not None:
-        x, y = real("sensors", sensors).T
+    if places is not None:
+        x, y = places.T
         marker = "^" if stations is None else "s"  # stations are triangles
         ax.scatter(x, y, s=16, color="0.6", marker=marker, label="sensors")
-    if truth is not None:
-        for j, path in enumerate(np.moveaxis(real("truth", truth), 1, 0)):
+    if paths is not None:
+        for j, path in enumerate(np.moveaxis(paths, 1, 0)):
             ax.plot(*path.T, color="black", linewidth=0.8, linestyle=":",
                     label=None if j else "truth")  # fmt: skip
-    n_drawn = 0  # colours follow the tracks that are there, not their labels
+    n_drawn = 0
     for name, one in runs.items():
         labels = np.unique(one.label[one.label >= 0]).tolist()
+        several = label_colours(range(n_drawn, n_drawn + len(labels))).values()
+        colours = (
+            dict(zip(labels, several, strict=True)) if len(runs) > 1 else label_colours(labels)
+        )
         for label in labels:
             number = f"source {label}" if not name or len(labels) > 1 else ""
             text = " ".join(filter(None, (name, number))) if n_drawn < MAX_NAMES else None
-            _draw_track(ax, one, label, n_ellipses, text, PALETTE[n_drawn % len(PALETTE)])
+            _draw_track(ax, one, label, n_ellipses, text, colours[label])
             n_drawn += 1
     if stations is not None:
         draw_stations(ax, stations)
         ax.margins(MARGIN)
-    if bearings is not None:
-        if stations is None:
-            raise ValueError("bearings must come with stations; got None")
+    if stations is not None and bearings is not None:
         draw_bearings(ax, stations, bearings)
     ax.set(xlabel="x, m", ylabel="y, m")
     ax.set_aspect("equal", adjustable="datalim")
     ax.grid(color="0.92")
     ax.set_axisbelow(True)
-    _add_legend(ax, outside=stations is not None)
+    legend_beside(ax)
+    first = next(iter(runs.values()), None)
+    places_text = "" if stations is None else f"{len(stations)} stations"
+    set_title(ax, "" if first is None else settings_text(first), places_text)
     return ax
 
 
-def _add_legend(ax: Axes, outside: bool) -> None:
-    """Add a legend where it hides least; beside a map with stations."""
-    if not ax.get_legend_handles_labels()[0]:
-        return
-    if outside:
-        ax.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
-    else:
-        ax.legend(fontsize=8, loc="best")
+def _points(name: str, value: ArrayLike, ndim: int) -> Float:
+    """Return positions (..., 2) of so many axes."""
+    points = real(name, value)
+    if points.ndim != ndim:
+        raise ValueError(f"{name} must have {ndim} axes, the last of 2; got shape {points.shape}")
+    return shaped(name, points, *points.shape[:-1], 2)
 
 
 def _draw_track(
@@ -125,6 +139,8 @@ def _draw_track(
     step, slot = np.nonzero(run.label == label)
     position, spread = run.position[step, slot], run.covariance[step, slot]
     breaks = np.flatnonzero(np.diff(step) > 1) + 1
+    for at in breaks.tolist():
+        ax.plot(*position[at - 1 : at + 1].T, color=colour, linewidth=PAUSE_WIDTH, label="_pause")
     for n, part in enumerate(np.split(position, breaks)):
         ax.plot(*part.T, color=colour, linewidth=1.6, label=None if n else text)
     ax.scatter(

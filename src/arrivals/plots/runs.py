@@ -1,4 +1,4 @@
-"""Plot of any run: directions over time or on the sky, ranges over time, positions on a map."""
+"""Plot of any run: directions over time or on the sky, ranges or states over time, maps."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from arrivals.messages import shown
 from arrivals.plots.bearing_time import plot_bearing_time
 from arrivals.plots.maps import plot_map
-from arrivals.plots.ranges import plot_range
+from arrivals.plots.over_time import plot_range, plot_tracks
 from arrivals.plots.sky import plot_sky
 from arrivals.trackers.run import Run
 from arrivals.typing import Float
@@ -16,7 +16,13 @@ from arrivals.typing import Float
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-OVER_TIME = ("time", "snapshots", "measurement", "dynamic_range_db")  # not drawn on the sky
+OVER_TIME = (
+    "time",
+    "snapshots",
+    "measurement",
+    "dynamic_range_db",
+    "normalize",
+)  # not drawn on the sky
 
 
 class PlacedRuns(Protocol):
@@ -36,10 +42,11 @@ class PlacedRuns(Protocol):
 
 
 def plot(run: Run | PlacedRuns, **more: Any) -> Axes:
-    """Draw the directions of a run over time or on the sky, or positions on a map.
+    """Draw the directions of a run over time or on the sky, positions on a map, or a state.
 
     Runs with elevations are drawn by `plot_sky`; of runs with ranges, directions are above by
-    `plot_bearing_time`, and ranges below by `plot_range`.
+    `plot_bearing_time`, and ranges below by `plot_range`. Positions are drawn by `plot_map`, the
+    states of Kalman filters by `plot_tracks`.
 
     Parameters
     ----------
@@ -73,6 +80,8 @@ def plot(run: Run | PlacedRuns, **more: Any) -> Axes:
         return _plot_directions_and_ranges(run, **{"time": run.time} | more)
     if "doa" in run.fields:
         return plot_bearing_time(run, **{"time": run.time} | more)
+    if "position" not in run.fields:
+        return plot_tracks(run, **{"time": run.time} | more)
     # a run of `arrivals.fuse` has stations, and perhaps sensors
     known = {name: getattr(run, name, None) for name in ("stations", "bearings", "sensors")}
     return plot_map(run, **{name: one for name, one in known.items() if one is not None} | more)
@@ -86,4 +95,6 @@ def _plot_directions_and_ranges(run: Run, *, time: Any, **more: Any) -> Axes:
     figure = Figure(figsize=(9.0, 7.0), layout="constrained")
     above, below = figure.subplots(2, sharex=True, height_ratios=(4, 3))
     plot_bearing_time(run, time=time, ax=above, **more).set_xlabel("")
-    return plot_range(run, time=time, ax=below)
+    below = plot_range(run, time=time, ax=below)
+    below.set_title(below.get_title().removeprefix(above.get_title()).lstrip(", \n"), fontsize=10)
+    return below

@@ -6,10 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from arrivals.plots.bearing_time import (
-    NEUTRAL,
+from arrivals.plots.bearing_time import new_axes
+from arrivals.plots.colours import NEUTRAL
+from arrivals.plots.labels import set_title, settings_text
+from arrivals.plots.tracks import (
+    BAND_OPACITY,
     draw_tracks,
-    new_axes,
     require_field,
     track_colours,
     track_order,
@@ -24,6 +26,7 @@ RIM = 90.0  # degrees from the middle of a disc to its horizon
 APART = 250.0  # between the middles of two discs
 RINGS = (30, 60)  # elevations that are marked
 MAX_ENDS = 30  # tracks whose ends are marked, if there are no more
+MAX_AREAS = 600  # estimates that are drawn with their deviations
 
 
 def plot_sky(run: Run, *, clockwise: bool = False, ax: Axes | None = None) -> Axes:
@@ -32,6 +35,8 @@ def plot_sky(run: Run, *, clockwise: bool = False, ax: Axes | None = None) -> Ax
     The distance from the middle is 90 degrees minus the elevation. Directions below the horizon
     are on a second disc, with the nadir in the middle, as seen from above, too. Colours and opacity
     are those of `plot_bearing_time`; a ring is the last direction of a track, of at most 30.
+    Shaded ellipses are one standard deviation, of at most 600 directions; thin lines join tracks
+    over pauses.
 
     Parameters
     ----------
@@ -71,11 +76,21 @@ def plot_sky(run: Run, *, clockwise: bool = False, ax: Axes | None = None) -> Ax
     _draw_disc(ax, 0.0, "zenith" if below else "", clockwise)
     if below:
         _draw_disc(ax, APART, "nadir", clockwise)
-    step, slot, joined = track_order(run)
-    lower = run.elevation[step, slot] < 0
-    point = _on_disc(run.doa[step, slot], run.elevation[step, slot], clockwise)
-    colour, label = track_colours(run, step, slot), run.label[step, slot]
-    draw_tracks(ax, point, colour, joined & (lower[1:] == lower[:-1]))
+    order = track_order(run, run.elevation)
+    step, slot = order.step, order.slot
+    azimuth, elevation = run.doa[step, slot], run.elevation[step, slot]
+    order = order.near((elevation[1:] < 0) == (elevation[:-1] < 0))
+    point = _on_disc(azimuth, elevation, clockwise)
+    colour, label = track_colours(run, order), run.label[step, slot]
+    some = slice(None, None, max(1, -(-len(step) // MAX_AREAS)))
+    areas = _areas(
+        azimuth[some],
+        elevation[some],
+        run.covariance[step, slot].reshape(-1, 2, 2)[some],
+        clockwise,
+    )
+    _shade(ax, areas, colour[some])
+    draw_tracks(ax, point, colour, order)
     last = np.append(np.diff(label) != 0, True)[: len(label)] & (label >= 0)
     last &= last.sum() <= MAX_ENDS
     x, y = point[last].T
@@ -85,7 +100,43 @@ def plot_sky(run: Run, *, clockwise: bool = False, ax: Axes | None = None) -> Ax
     ax.set(xlim=(-edge, APART + edge if below else edge), ylim=(-edge, edge + (12 if below else 0)))
     ax.set_aspect("equal")
     ax.set_axis_off()
+    set_title(ax, settings_text(run))
     return ax
+
+
+def _areas(azimuth: Float, elevation: Float, covariance: Float, clockwise: bool) -> Float:
+    """Return outlines (n, 25, 2) of one standard deviation about directions, NaN if unknown.
+
+    Examples
+    --------
+    >>> zenith, std = np.array([np.pi / 2]), np.deg2rad(2.0)
+    >>> np.ptp(_areas(np.zeros(1), zenith, std**2 * np.eye(2)[None], False)[0], axis=0).round(2)
+    array([4., 4.])
+    """
+    known = np.asarray(np.isfinite(covariance).all(axis=(-2, -1)))
+    variance, axes = np.linalg.eigh(np.where(known[:, None, None], covariance, 0.0))
+    turn = np.linspace(0, 2 * np.pi, 25)
+    circle = np.stack([np.cos(turn), np.sin(turn)])
+    moved = (axes * np.sqrt(np.maximum(variance, 0))[:, None]) @ circle  # elevation, along azimuth
+    up, along = moved[:, 0], moved[:, 1]
+    # unit vectors of the tangent plane: a direction that moves over the zenith stays a direction
+    cos_a, sin_a = np.cos(azimuth)[:, None], np.sin(azimuth)[:, None]
+    cos_e, sin_e = np.cos(elevation)[:, None], np.sin(elevation)[:, None]
+    x = cos_e * cos_a - up * sin_e * cos_a - along * sin_a
+    y = cos_e * sin_a - up * sin_e * sin_a + along * cos_a
+    z = sin_e + up * cos_e
+    on_side = np.where(elevation < 0, np.minimum(z.T, -1e-9), np.maximum(z.T, 0.0)).T
+    outline = _on_disc(np.arctan2(y, x), np.arctan2(on_side, np.hypot(x, y)), clockwise)
+    return np.asarray(np.where(known[:, None, None], outline, np.nan))
+
+
+def _shade(ax: Axes, areas: Float, colour: Float) -> None:
+    from matplotlib.collections import PolyCollection
+
+    known = np.asarray(np.isfinite(areas).all(axis=(1, 2)))
+    pale = colour[known] * [1, 1, 1, BAND_OPACITY]
+    ax.add_collection(PolyCollection(list(areas[known]), facecolors=pale, edgecolors="none",
+                                     label="_deviations"))  # fmt: skip
 
 
 def _on_disc(azimuth: Float, elevation: Float, clockwise: bool) -> Float:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from arrivals.measurement_models import Station
-from arrivals.plots.bearing_time import NEUTRAL
+from arrivals.plots.colours import NEUTRAL
 from arrivals.typing import Float
 from arrivals.validation import real
 

@@ -92,7 +92,7 @@ def track_samples(
             tracker.update(z)
         if len(block) == every:
             recorder.add(tracker.estimate, tracker.x)
-    run = recorder.run(dt=1.0, elapsed=np.nan)
+    run = recorder.run(dt=1.0, elapsed=np.nan).made_by(tracker)
     return run.at((every * np.arange(1, len(run) + 1) - 1) / positive("rate", rate))
 
 

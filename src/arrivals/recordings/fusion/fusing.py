@@ -259,7 +259,7 @@ def _run(fused: Fused, steps: FusionSteps, progress: Callable[..., Any]) -> tupl
         if step == last:
             found = [_azimuths(fused, k, z[k]) for k in range(len(steps.stations))]
     elapsed = time.perf_counter() - started
-    return recorder.run(dt=steps.duration, elapsed=elapsed).at(steps.time), found
+    return recorder.run(dt=steps.duration, elapsed=elapsed).at(steps.time).made_by(fused), found
 
 
 def _azimuths(fused: Fused, k: int, entry: Any) -> Float | None:

@@ -191,7 +191,7 @@ def _track(
         tracker.update(z)
         recorder.add(tracker.estimate, tracker.x)
         evidence.append(tracker.log_likelihood)
-    run = recorder.run(dt=1.0, elapsed=np.nan).at(network.time)
+    run = recorder.run(dt=1.0, elapsed=np.nan).at(network.time).made_by(tracker)
     return replace(run, extras={"log_likelihood": np.array(evidence)})
 
 
