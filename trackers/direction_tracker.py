@@ -6,7 +6,7 @@ import copy
 import time
 import warnings
 from abc import abstractmethod
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import zip_longest
 from typing import Any, Self
 
@@ -18,40 +18,14 @@ from arrivals.measurement_models.manifolds.manifold import UNIFORM_STD_OF_CIRCLE
 from arrivals.measurements import rows
 from arrivals.trackers.base import Tracker
 from arrivals.trackers.direction_estimates import SphereEstimate
+from arrivals.trackers.direction_state import no_direction, state_of
 from arrivals.trackers.estimates import DirectionEstimate
 from arrivals.trackers.run import Run, RunRecorder
-from arrivals.typing import Bool, Complex, Float, Int
+from arrivals.typing import Complex, Float, Int
 from arrivals.validation import positive
 
 MISSING = complex(np.nan, np.nan)
 ENDED: Any = object()  # in place of a measurement after the end of a shorter sequence
-
-
-def padded(values: Float | Int | Bool, n: int, filler: float) -> Float:
-    """Return the first n values as floats, padded to length n.
-
-    Parameters
-    ----------
-    values : ndarray, shape (n_values, ...)
-        Values.
-    n : int
-        Length of the result.
-    filler : float
-        Padding value.
-
-    Returns
-    -------
-    ndarray, shape (n, ...)
-        Padded values.
-
-    Examples
-    --------
-    >>> padded(np.array([1.0, 2.0]), 4, np.nan)
-    array([ 1.,  2., nan, nan])
-    """
-    full = np.empty((n, *values.shape[1:]))
-    full[: len(values)], full[len(values) :] = values[:n], filler
-    return full
 
 
 def warn_of_ambiguity(measurement: DirectionMeasurement) -> None:
@@ -114,6 +88,7 @@ class DirectionTracker(Tracker):
     """
 
     estimate_kind: type[DirectionEstimate] = DirectionEstimate
+    _x: Float | None = None  # None until x or P is read
 
     @property
     @abstractmethod
@@ -128,7 +103,29 @@ class DirectionTracker(Tracker):
     @property
     def noise(self) -> float:
         """Estimated noise variance of one sensor; NaN where the method gives none."""
-        return self._estimate.noise
+        return self.estimate.noise
+
+    @property
+    def x(self) -> Float:
+        """Directions reported last, rad; NaN in unused slots."""
+        estimate = self.estimate
+        if self._x is None:
+            self._x, self._P = state_of(estimate, self._n_reported)
+        return self._x
+
+    @x.setter
+    def x(self, value: Float) -> None:
+        self._x, self._P = value, self.P
+
+    @property
+    def P(self) -> Float:
+        """Their variances on the diagonal, rad²; 0 where unknown."""
+        self.x  # noqa: B018  (computes both)
+        return self._P
+
+    @P.setter
+    def P(self, value: Float) -> None:
+        self._x, self._P = self.x, value
 
     def reset(self) -> None:
         """Report no direction; a subclass with a belief also returns to its initial one."""
@@ -144,16 +141,14 @@ class DirectionTracker(Tracker):
 
     def report_none(self) -> None:
         """Report no direction, as between measurements."""
-        n = self.n_slots * self.estimate_kind.n_unknowns
-        self._estimate = self.estimate_kind.empty()
-        self.x, self.P = np.full(n, np.nan), np.zeros((n, n))
+        self.report_estimate(no_direction(self.estimate_kind))
 
     def report(
         self,
         doa: ArrayLike,
         std: ArrayLike | None = None,
         existence: ArrayLike | None = None,
-        amplitude: ArrayLike | None = None,
+        amplitude: ArrayLike | Callable[[], Complex] | None = None,
         label: ArrayLike | None = None,
         *,
         converged: bool = True,
@@ -166,7 +161,9 @@ class DirectionTracker(Tracker):
         ----------
         doa : array_like, shape (n_sources,)
             Directions of arrival, rad; at most `n_slots` of them.
-        std, existence, amplitude : array_like, shape (n_sources,), optional
+        std, existence : array_like, shape (n_sources,), optional
+            As in `DirectionEstimate`; NaN if None.
+        amplitude : array_like, shape (n_sources,), or function, optional
             As in `DirectionEstimate`; NaN if None.
         label : array_like of int, shape (n_sources,), optional
             As in `DirectionEstimate`; -1 if None.
@@ -177,45 +174,27 @@ class DirectionTracker(Tracker):
         noise : float
             Estimated noise variance of one sensor.
         """
-        doa = np.asarray(doa, dtype=np.float64)
-        n, unknown = len(doa), np.full(len(doa), np.nan)
-        amplitude = np.full(n, MISSING) if amplitude is None else amplitude
-        estimate = DirectionEstimate(
-            doa=doa,
-            std=np.asarray(unknown if std is None else std, np.float64),
-            existence=np.asarray(unknown if existence is None else existence, np.float64),
-            amplitude=np.asarray(amplitude, np.complex128),
-            label=np.full(n, -1) if label is None else np.asarray(label, np.int64),
-            converged=converged,
-            iterations=iterations,
-            noise=noise,
+        fields = _fields(doa, std, existence, amplitude, label)
+        self.report_estimate(
+            DirectionEstimate(**fields, converged=converged, iterations=iterations, noise=noise)
         )
-        self.report_estimate(estimate)
 
     def report_estimate(self, estimate: DirectionEstimate) -> None:
-        """Make an estimate the present one, and set `x` and `P`, of one block a source.
+        """Make an estimate the present one, and that of `x` and `P`, of one block a source.
 
         Parameters
         ----------
         estimate : DirectionEstimate
             Of class `estimate_kind`, with at most `n_slots` sources.
         """
-        self._estimate = estimate
-        values, covariance = estimate.unknowns()
-        n, d = self.n_slots, values.shape[1]
-        self.x = padded(values.ravel(), n * d, np.nan)
-        blocks, known = np.zeros((n, d, n, d)), ~np.isnan(covariance[:n])
-        if known.any():
-            index = np.arange(len(known))
-            blocks[index, :, index] = np.where(known, covariance[:n], 0.0)
-        self.P = blocks.reshape(n * d, n * d)
+        self._estimate, self._x, self._n_reported = estimate, None, self.n_slots
 
     def report_directions(
         self,
         directions: Float,
         covariance: Float | None = None,
         existence: Float | None = None,
-        amplitude: Complex | None = None,
+        amplitude: Complex | Callable[[], Complex] | None = None,
         label: Int | None = None,
     ) -> None:
         """Make directions of one or two unknowns the present estimate, and set `x` and `P`.
@@ -230,23 +209,41 @@ class DirectionTracker(Tracker):
             As in `report`.
         """
         doa, d = directions[0], len(directions)
-        std = None
-        if covariance is not None:
-            std = np.sqrt(covariance[:, -1, -1])
-        if d > 1 and std is not None:
-            with np.errstate(divide="ignore"):
-                std = np.minimum(std / np.cos(directions[1]), UNIFORM_STD_OF_CIRCLE)
-        self.report(doa, std, existence, amplitude, label)
-        if d > 1:
-            unknown = np.full((len(doa), d, d), np.nan)
-            fields = {each: getattr(self._estimate, each) for each in DirectionEstimate.per_source}
-            self.report_estimate(
-                SphereEstimate(
-                    **fields,
-                    elevation=directions[1],
-                    covariance=unknown if covariance is None else covariance,
-                )
-            )
+        if d == 1:
+            std = None if covariance is None else np.sqrt(covariance[:, 0, 0])
+            self.report(doa, std, existence, amplitude, label)
+            return
+        if covariance is None:
+            covariance = np.full((len(doa), d, d), np.nan)
+        with np.errstate(divide="ignore"):
+            std = np.sqrt(covariance[:, -1, -1]) / np.cos(directions[1])
+        fields = _fields(doa, np.minimum(std, UNIFORM_STD_OF_CIRCLE), existence, amplitude, label)
+        self.report_estimate(
+            SphereEstimate(**fields, elevation=directions[1], covariance=covariance)
+        )
+
+
+def _fields(
+    doa: ArrayLike,
+    std: ArrayLike | None,
+    existence: ArrayLike | None,
+    amplitude: ArrayLike | Callable[[], Complex] | None,
+    label: ArrayLike | None,
+) -> dict[str, Any]:
+    """Return the fields of an estimate, NaN or -1 in place of None."""
+    doa = np.asarray(doa, dtype=np.float64)
+    n, unknown = len(doa), np.full(len(doa), np.nan)
+    if amplitude is None:
+        amplitude = np.full(n, MISSING)
+    elif not callable(amplitude):
+        amplitude = np.asarray(amplitude, np.complex128)
+    return {
+        "doa": doa,
+        "std": unknown if std is None else np.asarray(std, np.float64),
+        "existence": unknown if existence is None else np.asarray(existence, np.float64),
+        "amplitude": amplitude,
+        "label": np.full(n, -1) if label is None else np.asarray(label, np.int64),
+    }
 
 
 class BatchDirectionTracker(DirectionTracker):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
@@ -65,8 +65,9 @@ class DirectionEstimate(Estimate):
         Standard deviations, rad; NaN if the method does not estimate them.
     existence : ndarray, shape (n_sources,)
         Probability of existence; NaN if the method does not estimate it.
-    amplitude : ndarray, shape (n_sources,)
-        Complex amplitude at the origin of the array's coordinates; NaN if not estimated.
+    amplitude : ndarray, shape (n_sources,), or function without arguments
+        Complex amplitude at the origin of the array's coordinates; NaN if not estimated. A
+        function computes it when it is read first.
     label : ndarray of int, shape (n_sources,)
         Identity of a tracked source; -1 for methods that do not track.
     converged : bool
@@ -81,6 +82,8 @@ class DirectionEstimate(Estimate):
     >>> one = np.ones(1)
     >>> DirectionEstimate(0.5 * one, 0.01 * one, one, one + 0j, np.array([7])).n_found
     1
+    >>> DirectionEstimate(one, one, one, lambda: 3j * one, np.array([7])).amplitude
+    array([0.+3.j])
     """
 
     doa: Float
@@ -101,6 +104,25 @@ class DirectionEstimate(Estimate):
     }
     columns: ClassVar[tuple[str, ...]] = ("label", "doa_deg", "std_deg", "existence", "level_db")
     n_unknowns: ClassVar[int] = 1
+
+    def __post_init__(self) -> None:
+        if callable(self.amplitude):
+            parts = vars(self)
+            parts["_amplitude"] = parts.pop("amplitude")
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:  # of an attribute that is not there
+            parts = vars(self)
+            if name != "amplitude" or "_amplitude" not in parts:
+                raise AttributeError(f"{type(self).__name__} has no attribute {name!r}")
+            parts["amplitude"] = parts["_amplitude"]()
+            del parts["_amplitude"]
+            return parts["amplitude"]
+
+    def __getstate__(self) -> dict[str, Any]:  # copies have numbers
+        self.amplitude  # noqa: B018
+        return dict(vars(self))
 
     @classmethod
     def empty(cls, **others: Any) -> Self:

@@ -208,7 +208,8 @@ class RunRecorder:
 
     def add(self, estimate: Estimate, x: Float) -> None:
         """Append the estimate and the state of one step."""
-        values = {"n_found": estimate.n_found, "x": x} | vars(estimate)
+        values: dict[str, Any] = {"n_found": estimate.n_found, "x": x}
+        values |= {each.name: getattr(estimate, each.name) for each in fields(estimate)}
         for name, value in values.items():
             array = np.asarray(value)
             column = self._column_for(name, array)

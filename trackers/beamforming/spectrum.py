@@ -210,7 +210,8 @@ def local_maxima(power: Float, *, circular: bool, joined: bool, rise: float = 0.
     first, last = power[..., :1], power[..., -1:]
     before, after = (last, first) if circular else (power[..., 1:2], power[..., -2:-1])  # even
     extended = np.concatenate([before, power, after], axis=-1)
-    is_peak = (power > extended[..., :-2] + rise) & (power >= extended[..., 2:])
+    is_peak = power > extended[..., :-2] + rise
+    is_peak &= power >= extended[..., 2:]
     if joined and not circular and np.count_nonzero(is_peak[..., :: power.shape[-1] - 1]):
         first, last, inner = first[..., 0], last[..., 0], np.maximum(before, after)[..., 0] + rise
         at_last = last > first + rise

@@ -13,7 +13,7 @@ from arrivals.measurements import is_missing, numbers
 from arrivals.messages import shown
 from arrivals.motion_models import MotionModel
 from arrivals.trackers.base import Tracker
-from arrivals.trackers.direction_tracker import padded
+from arrivals.trackers.direction_state import padded
 from arrivals.trackers.fusion.arguments import (
     area_of,
     checked_readings,

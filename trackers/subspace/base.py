@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from functools import partial
 from typing import ClassVar, Generic, Literal, NamedTuple, Protocol, TypeAlias, TypeVar
 
 import numpy as np
@@ -10,12 +11,13 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurements import is_complete
-from arrivals.trackers.beamforming.block_scan import part_in_use, root_mean_amplitudes
+from arrivals.trackers.beamforming.block_scan import part_in_use
 from arrivals.trackers.beamforming.covariance import used_data
 from arrivals.trackers.beamforming.source_number import number_of_sources
 from arrivals.trackers.direction_tracker import DirectionTracker, warn_of_ambiguity
 from arrivals.trackers.estimates import DirectionEstimate
 from arrivals.trackers.kinds_of_estimates import kind_of_estimate
+from arrivals.trackers.subspace.amplitudes import wave_amplitudes
 from arrivals.typing import Bool, Complex, Float
 from arrivals.validation import count, instance, no_control, one_of, probability, time_step
 
@@ -48,36 +50,6 @@ class DirectionFinder(Protocol):
 
 
 F = TypeVar("F", bound=DirectionFinder)
-
-
-def least_squares_amplitudes(A: Complex, z: Complex) -> Complex:
-    """Return the least-squares amplitudes of plane waves in a snapshot.
-
-    Sensors that are NaN are left out; equal steering vectors have equal amplitudes.
-
-    Parameters
-    ----------
-    A : ndarray, shape (n_sources, n_sensors)
-        Steering vectors.
-    z : ndarray, shape (n_sensors,)
-        Snapshot.
-
-    Returns
-    -------
-    ndarray, shape (n_sources,)
-        Complex amplitudes.
-
-    Examples
-    --------
-    >>> A, z = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, 1.0]]), np.array([5.0, 1.0, np.nan])
-    >>> least_squares_amplitudes(A, z).real
-    array([3., 2.])
-    """
-    valid = ~np.isnan(z)
-    A, y = (A, z) if valid.all() else (A[:, valid], z[valid])
-    G = A.conj() @ A.T
-    G.flat[:: len(A) + 1] += 1e-12 * len(y)
-    return np.linalg.solve(G, A.conj() @ y).astype(np.complex128)
 
 
 class SubspaceTracker(DirectionTracker, Generic[F]):
@@ -192,7 +164,8 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
         follows_gap, self.n_missing = self.n_missing > 1, 0
         if is_due:
             directions = self._directions()
-            self.report_directions(directions, amplitude=self._amplitudes(directions, z))
+            amplitude = partial(wave_amplitudes, self.measurement, directions, z)
+            self.report_directions(directions, amplitude=amplitude)
             self.last_report = self.estimate
         elif follows_gap:
             self.last_report = self.estimate  # none
@@ -204,13 +177,6 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
         model = self.measurement
         has_data = valid.reshape(model.n_bins, model.n_snapshots, -1).any(axis=(0, 2))
         return int(has_data.sum())
-
-    def _amplitudes(self, directions: Float, z: Complex) -> Complex:
-        """Return amplitudes, or the root of the mean power over several bins and snapshots."""
-        model = self.measurement
-        if model.is_single:
-            return least_squares_amplitudes(model.steering_vector(*directions), z)
-        return root_mean_amplitudes(model, directions, model.with_all_axes(z))
 
     @abstractmethod
     def update_subspace(self, z: Complex) -> None:

@@ -75,10 +75,11 @@ def projected_power(A: ArrayLike, basis: Complex) -> Float:
     >>> projected_power([[1.0, 1.0], [1.0, 0.0]], np.array([[0.0], [1.0]]))
     array([1., 0.])
     """
-    projection = basis.conj().swapaxes(-1, -2) @ np.asarray(A).swapaxes(-1, -2)
-    power = projection.real**2
-    power += projection.imag**2
-    return np.asarray(np.add.reduce(power, axis=-2))
+    A = np.asarray(A, dtype=np.complex128)
+    projection = basis.conj().swapaxes(-1, -2) @ A.swapaxes(-1, -2)
+    squares = np.square(projection.view(np.float64))  # of real and imaginary parts in turn
+    power = np.add.reduce(squares, axis=-2)
+    return np.asarray(power[..., ::2] + power[..., 1::2])
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,13 +19,13 @@ from arrivals.trackers.subspace.base import DirectionFinder, NumberOfSources, Su
 from arrivals.trackers.subspace.bin_values import column, is_zero, larger, power_of, where_bins
 from arrivals.trackers.subspace.esprit import shift_invariance
 from arrivals.trackers.subspace.music_spectrum import spectrum_search
+from arrivals.trackers.subspace.past_blocks import past_steps
 from arrivals.trackers.subspace.past_steps import (
     TINY,
     SensorInverses,
     incomplete_step,
     limited_trace,
     past_step,
-    past_steps,
     subspace_eigenvectors,
     with_dimensions,
 )
@@ -90,8 +90,8 @@ class PAST(SubspaceTracker[DirectionFinder]):
     -----
     Labels are -1, `std` and `existence` NaN. Directions are in ascending order. A sensor that is
     missing does not change its row of W: once one was missing, each has a P of its own (PETRELS).
-    P starts at the inverse power of the first snapshot, so that the unit of the samples does not
-    matter.
+    P starts at the inverse power of the first snapshot: the unit of the samples does not matter.
+    With numba (`arrivals[fast]`) complete snapshots of one bin take a compiled loop.
 
     References
     ----------
@@ -174,13 +174,13 @@ class PAST(SubspaceTracker[DirectionFinder]):
             self._reset_subspace()
         if not bins:
             rows = z[None] if z.ndim == 1 else z
-            if self.rows is None and self.weight.all() and not np.isnan(rows).any():
-                self._add_complete(rows)
-                return
-            for y in rows:
-                valid = ~np.isnan(y)
-                if valid.any():
-                    self._add(np.where(valid, y, 0), valid, None)
+            valid = ~np.isnan(rows)
+            for n, y in enumerate(rows):
+                if self.rows is None and self.weight.all() and valid.all():
+                    self._add_complete(rows[n:])
+                    return
+                if valid[n].any():
+                    self._add(np.where(valid[n], y, 0), valid[n], None)
             return
         for y in np.swapaxes(z.reshape(*bins, -1, z.shape[-1]), 0, 1):
             is_number = ~np.isnan(y)

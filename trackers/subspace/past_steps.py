@@ -14,9 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from arrivals.trackers.gaussian.linalg import lapack
 from arrivals.typing import Bool, Complex, Float
 
 TINY = 1e-290  # an energy above zero
+MIN_RELATIVE_EIGENVALUE = 1e-6  # below, eigenvectors by a Gram matrix lose digits
 MAX_TRACE_RATIO = 1e12  # of the matrix of a sensor without data, relative to the common one
 
 
@@ -69,38 +71,6 @@ def past_step(W: Complex, P: Complex, y: Complex, beta: ArrayLike) -> tuple[Comp
     P = P + P.conj().swapaxes(-1, -2)
     # W = W + (y - W z) gᴴ
     return W + (y - product(W, z)) * gH, P
-
-
-def past_steps(
-    W: Complex, P: Complex, Y: Complex, beta: float, energy: float, max_trace: float
-) -> tuple[Complex, Complex, float]:
-    """Return W, P and the energy after successive snapshots of equal weight.
-
-    Parameters
-    ----------
-    W, P : ndarray
-        As in `past_step`, of one bin.
-    Y : ndarray, shape (n_snapshots, n_sensors)
-        Snapshots without gaps.
-    beta : float
-        Weight of the data before the first.
-    energy : float
-        Weighted sum of ‖y‖² before.
-    max_trace : float
-        Largest trace of P, relative to the energy.
-
-    Examples
-    --------
-    >>> W, P = np.array([[1.0], [0.0]]), np.eye(1)
-    >>> past_steps(W, P, np.array([[3.0, 4.0]] * 200), 1.0, 0.0, 1e12)[0].round(2).ravel()
-    array([0.6, 0.8])
-    """
-    for y, power in zip(Y, (Y.real**2 + Y.imag**2).sum(axis=1).tolist(), strict=True):
-        W, P = past_step(W, P, y, beta)
-        energy = beta * energy + power
-        P = limited_trace(P, max_trace / max(energy, TINY))
-        beta = 1.0
-    return W, P, energy
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,6 +210,10 @@ def subspace_eigenvectors(W: Complex, P: Complex, *, complete: bool) -> tuple[Fl
     >>> values.round(6), vectors.shape
     (array([4.]), (2, 2))
     """
+    if W.ndim == 2 and not complete:
+        values, vectors = _eigenvectors_by_gram(W, P)
+        if len(values) and values[-1] > MIN_RELATIVE_EIGENVALUE * values[0]:
+            return values, vectors
     L = min(W.shape[-2:])
     Q, R = np.linalg.qr(W, mode="complete" if complete else "reduced")
     R = R[..., :L, :]
@@ -252,3 +226,14 @@ def subspace_eigenvectors(W: Complex, P: Complex, *, complete: bool) -> tuple[Fl
     inside = Q[..., :L] @ rotation[..., ::-1]
     vectors = np.concatenate([inside, Q[..., L:]], axis=-1) if complete else inside
     return values[..., ::-1], vectors
+
+
+def _eigenvectors_by_gram(W: Complex, P: Complex) -> tuple[Float, Complex]:
+    """Return what `subspace_eigenvectors` does, in a third of the time; nothing if it fails.
+
+    Eigenvectors of W P⁻¹Wᴴ are W a, where WᴴW a = λ P a and aᴴP a = 1.
+    """
+    values, a, failed = lapack().zhegvd(W.conj().T.dot(W), P)
+    if failed or not values[0] > 0:
+        return np.zeros(0), W[:, :0]
+    return values[::-1], (W.dot(a) / np.sqrt(values))[:, ::-1]

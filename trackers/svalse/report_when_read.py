@@ -96,39 +96,9 @@ class ReportWhenRead(BatchDirectionTracker):
         self._due = None
         super().report_estimate(estimate)
 
-    def report_none(self) -> None:
-        """Report no direction."""
-        self._due = None
-        super().report_none()
-
     @property
     def estimate(self) -> DirectionEstimate:
         """Directions reported last."""
         if self._due is not None:
             self.report_estimate(self._due.estimate())
         return super().estimate
-
-    @property
-    def noise(self) -> float:
-        """Estimated noise variance of one sensor; NaN where the method gives none."""
-        return self.estimate.noise
-
-    @property
-    def x(self) -> Float:
-        """Directions reported last, rad; NaN in unused slots."""
-        self.estimate  # noqa: B018  (makes the report that is due)
-        return self._x
-
-    @x.setter
-    def x(self, value: Float) -> None:
-        self._x = value
-
-    @property
-    def P(self) -> Float:
-        """Their variances on the diagonal, rad²; 0 where unknown."""
-        self.estimate  # noqa: B018
-        return self._P
-
-    @P.setter
-    def P(self, value: Float) -> None:
-        self._P = value

@@ -13,7 +13,7 @@ from arrivals.measurement_models.manifolds.manifold import Reference
 from arrivals.measurement_models.observed import ObservedSnapshots, merge_noise
 from arrivals.motion_models.bernoulli_von_mises import BernoulliVonMises
 from arrivals.motion_models.bessel import bessel_ratios
-from arrivals.trackers.direction_tracker import padded
+from arrivals.trackers.direction_state import padded
 from arrivals.trackers.registry import register
 from arrivals.trackers.svalse.components import (
     ComponentPosterior,

@@ -8,7 +8,8 @@ from subspace_scenes import LINE, NAMES, incoherent, subspaces_of
 
 from arrivals.trackers import MUSIC, PAST, RootMUSIC, create
 from arrivals.trackers.beamforming import spatial_smoothing
-from arrivals.trackers.subspace.base import Subspaces, least_squares_amplitudes
+from arrivals.trackers.subspace.amplitudes import least_squares_amplitudes
+from arrivals.trackers.subspace.base import Subspaces
 from arrivals.trackers.subspace.esprit import esprit_angles, shifted_pairs
 from arrivals.trackers.subspace.music_spectrum import SpectrumSearch, music_spectrum
 from arrivals.trackers.subspace.past_steps import past_step

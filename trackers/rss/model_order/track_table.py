@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from arrivals.trackers.direction_tracker import padded
+from arrivals.trackers.direction_state import padded
 from arrivals.typing import Bool, Float, Int
 
 MAX_LOG_ODDS = float(np.log(99.0))  # log odds at which a source is confirmed; deleted at minus that
