@@ -2,21 +2,59 @@
 
 import doctest
 import re
+import shlex
 import tomllib
 from pathlib import Path
 
 import pytest
 
+from arrivals.__main__ import main
 from arrivals.measurement_models.arrays import from_description
 from arrivals.measurement_models.arrays.description import COMMON, KEYS
 from arrivals.measurement_models.arrays.presets import preset_names
+from arrivals.trackers import available
 
-PAGES = sorted((Path(__file__).parents[1] / "docs").glob("*.md"))
+DOCS = Path(__file__).parents[1] / "docs"
+PAGES = sorted([*DOCS.glob("*.md"), *DOCS.glob("start/*.md")])
+COMMAND = re.compile(r"^ {4}arrivals (.*)$", re.MULTILINE)
+SHOWN_ELSEWHERE = ("demo", "reproduce")  # longer runs, which tests of their own have
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_page_examples_run(page: Path) -> None:
+def test_page_examples_run(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Run the Python of a page and then, of a start page, its commands on the files it wrote."""
+    monkeypatch.chdir(tmp_path)
     assert doctest.testfile(str(page), module_relative=False).failed == 0
+    if page.parent.name != "start":
+        return
+    for command in COMMAND.findall(page.read_text(encoding="utf-8")):
+        if not command.startswith(SHOWN_ELSEWHERE):
+            assert main(shlex.split(command)) == 0, command
+
+
+def test_start_pages_are_seven_and_have_examples() -> None:
+    pages = [page for page in PAGES if page.parent.name == "start" and page.stem != "index"]
+    assert len(pages) == 7
+    for page in pages:
+        text = page.read_text(encoding="utf-8")
+        assert ">>>" in text
+        assert "## Next" in text
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_page_toml_and_plain_python_parse(page: Path) -> None:
+    blocks = re.findall(r"^```(toml|python)\n(.*?)^```$", page.read_text("utf-8"), re.M | re.S)
+    for kind, text in blocks:
+        if kind == "toml":
+            tomllib.loads(text)
+        elif ">>>" not in text:
+            compile(text, str(page), "exec")
+
+
+def test_page_of_the_choice_has_every_tracker() -> None:
+    text = (DOCS / "choose.md").read_text(encoding="utf-8")
+    table = "".join(line for line in text.splitlines() if line.startswith("|"))
+    assert [name for name in available() if f"`{name}`" not in table] == []
 
 
 def test_page_for_users_of_filterpy_has_examples() -> None:

@@ -1,0 +1,32 @@
+"""
+Known hardware, drawn
+=====================
+
+The geometry of common arrays is known by name. A drawing shows which sensor is number 1, where 0
+degrees are, and in which sense directions grow: look at it before you trust a direction.
+"""
+
+# %%
+# All names: `arrivals list` prints them, too.
+
+import matplotlib.pyplot as plt
+
+from arrivals.measurement_models import SensorArray
+from arrivals.measurement_models.arrays.presets import preset_names
+from arrivals.plots import plot_array
+
+print(*preset_names())
+
+# %%
+# Six of them, and a line of your own.
+
+figure, axes = plt.subplots(2, 3, figsize=(11, 7.5), layout="constrained")
+names = "respeaker-4mic respeaker-6mic matrix-voice uma-16 ps3-eye kinect-360"
+for ax, name in zip(axes.flat, names.split(), strict=True):
+    array = SensorArray.from_file(name)
+    plot_array(array, ax=ax)
+    ax.set_title(f"{name}: {array.n_sensors} sensors")
+
+line = SensorArray.ula(5, spacing=0.05, speed=343.0)
+ax = plot_array(line)
+ax.set_title("SensorArray.ula(5, spacing=0.05)")

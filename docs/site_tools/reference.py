@@ -1,0 +1,121 @@
+"""Write the pages of the reference: one a package, and one for each of its public names."""
+
+import importlib
+import inspect
+from pathlib import Path
+from types import ModuleType
+
+PACKAGES = {
+    "arrivals": "Recordings in one call",
+    "arrivals.measurement_models": "Arrays and measurement models",
+    "arrivals.motion_models": "Motion models",
+    "arrivals.trackers": "Trackers",
+    "arrivals.trackers.filterpy": "filterpy's constructors",
+    "arrivals.plots": "Plots",
+    "arrivals.recordings": "Recordings and readers of files",
+    "arrivals.scenarios": "Scenes, metrics, Monte Carlo studies",
+    "arrivals.scenarios.bounds": "Bounds",
+    "arrivals.scenarios.metrics": "Metrics",
+    "arrivals.scenarios.simulations": "Simulated scenes",
+    "arrivals.scenarios.room_acoustics": "Sound in rooms",
+    "arrivals.scenarios.ocean_acoustics": "Sound in shallow water",
+    "arrivals.trackers.beamforming": "Kernels of beamformers",
+    "arrivals.trackers.subspace": "Kernels of subspace methods",
+    "arrivals.trackers.conformance": "Conformance checks",
+}
+
+
+def public_names(package: str) -> list[str]:
+    """Return the public names of a package, sorted, those with capitals first."""
+    names = importlib.import_module(package).__all__
+    return sorted(name for name in names if not name.startswith("__"))
+
+
+def documented() -> dict[str, str]:
+    """Return the full name of each public name's page, by full name.
+
+    A name that several packages export has one page, under the first of them.
+    """
+    pages: dict[str, str] = {}
+    first: dict[int, str] = {}
+    for package in PACKAGES:
+        module = importlib.import_module(package)
+        for name in public_names(package):
+            thing = getattr(module, name)
+            shared = inspect.isclass(thing) or inspect.isfunction(thing)
+            full = f"{package}.{name}"
+            pages[full] = first.setdefault(id(thing), full) if shared else full
+    return pages
+
+
+def write(folder: Path) -> None:
+    """Write all pages into a folder; those that have not changed keep their time."""
+    pages = documented()
+    texts = {f"{full}.rst": page_of_name(full) for full in sorted(set(pages.values()))}
+    for package in PACKAGES:
+        texts[f"{package}.rst"] = page_of_package(package, pages)
+    texts["index.rst"] = index()
+    folder.mkdir(exist_ok=True)
+    for old in set(folder.glob("*.rst")) - {folder / name for name in texts}:
+        old.unlink()
+    for name, text in texts.items():
+        file = folder / name
+        if not file.exists() or file.read_text(encoding="utf-8") != text:
+            file.write_text(text, encoding="utf-8")
+
+
+def index() -> str:
+    """Return the page of all packages."""
+    lines = [heading("Reference"), "Every public name, by package.", ""]
+    lines += ["=" * 60 + " " + "=" * 60, f"{'Package':60} Contents", "=" * 60 + " " + "=" * 60]
+    lines += [f"{f':doc:`{name}`':60} {text}" for name, text in PACKAGES.items()]
+    lines += ["=" * 60 + " " + "=" * 60, ""]
+    return "\n".join([*lines, toctree(PACKAGES)])
+
+
+def page_of_package(package: str, pages: dict[str, str]) -> str:
+    """Return the page of a package: its first line, and a table of its names."""
+    module = importlib.import_module(package)
+    names = [f"{package}.{name}" for name in public_names(package)]
+    own = [name for name in names if pages[name] == name]
+    others = [pages[name] for name in names if pages[name] != name]
+    parts = [heading(package), f".. module:: {package}", "", first_paragraph(module), ""]
+    parts += [table(own), toctree(own)]
+    if others:
+        parts += ["Also here, documented elsewhere:", "", table(others)]
+    return "\n".join(parts)
+
+
+def page_of_name(full: str) -> str:
+    """Return the page of a class, a function or a value."""
+    package, name = full.rsplit(".", 1)
+    thing = getattr(importlib.import_module(package), name)
+    if inspect.isclass(thing):
+        body = [f".. autoclass:: {full}", "   :members:", "   :show-inheritance:"]
+    elif callable(thing) and getattr(thing, "__doc__", None) and hasattr(thing, "__name__"):
+        body = [f".. autofunction:: {full}"]
+    else:
+        body = [f".. autodata:: {full}", "   :no-value:"]
+    return "\n".join([heading(name), *body, ""])
+
+
+def first_paragraph(module: ModuleType) -> str:
+    """Return the first line of a module's docstring."""
+    return (inspect.getdoc(module) or "").split("\n\n")[0]
+
+
+def heading(text: str) -> str:
+    """Return a heading in reStructuredText."""
+    return f"{text}\n{'=' * len(text)}\n"
+
+
+def table(names: list[str]) -> str:
+    """Return a table of names with their first lines."""
+    rows = [f"   ~{name}" for name in names]
+    lines = [".. currentmodule:: None", "", ".. autosummary::", "   :nosignatures:", ""]
+    return "\n".join([*lines, *rows, ""])
+
+
+def toctree(names: list[str] | dict[str, str]) -> str:
+    """Return a hidden list of pages."""
+    return "\n".join([".. toctree::", "   :hidden:", "", *(f"   {name}" for name in names), ""])
