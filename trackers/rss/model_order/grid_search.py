@@ -14,7 +14,7 @@ from arrivals.typing import Float, Int
 
 MAX_MINIMA = 3  # minima over the grid that are refined
 SEARCHED_SENSORS = 2000  # of a search for sources, taken at equal spacing from all
-CHUNK_SIZE = 300_000  # numbers in one array of the grid search
+CHUNK_SIZE = 30_000  # numbers in one array of the grid search: a few fit into the cache
 AMPLITUDE_STEP = 0.35  # Np, 3 dB: largest step between the amplitudes that the search starts from
 MAX_AMPLITUDES = 201
 MAX_EXPONENT = 340.0  # of powers over those of the readings: 1500 dB
@@ -177,26 +177,30 @@ def best_amplitudes(
     # of amplitude μ, so that each amplitude takes one logarithm
     noise, gain = bounded_exp(2 * (floor - xi)), bounded_exp(2 * (new.mu - xi - loss))
 
-    def evaluate(u: Float) -> tuple[Float, Float, Float]:
-        total = bounded_exp(2 * (u - new.mu))[..., None] * gain
+    total, log_total, new_total, new_log_total, work = np.empty((5, *gain.shape))  # made once
+
+    def cost_at(u: Float, total: Float, log_total: Float) -> Float:
+        np.multiply(bounded_exp(2 * (u - new.mu))[:, None], gain, out=total)
         total += noise
-        r = np.log(total)
-        r *= -0.5
-        return np.square(r) @ W + (u - new.mu) ** 2 / new.v, r, total
+        # r = -½ ln total
+        np.square(np.log(total, out=log_total), out=work)
+        return np.asarray(0.25 * (work @ W) + (u - new.mu) ** 2 / new.v)
 
     starts = new.log_amplitudes
-    costs = np.stack([evaluate(start)[0] for start in starts[:, None]])
+    costs = np.stack([cost_at(start, total, log_total) for start in starts[:, None]])
     u = starts[costs.argmin(axis=0)]
-    cost, r, total = evaluate(u)
+    cost = cost_at(u, total, log_total)
     for _ in range(AMPLITUDE_STEPS):
-        lam = bounded_exp(2 * (u - new.mu))[:, None] * gain
+        lam = np.multiply(bounded_exp(2 * (u - new.mu))[:, None], gain, out=work)
         lam /= total
         # Gauss-Newton: Δu = (Σ W λ r + (μ - u)/v) / (Σ W λ² + 1/v)
-        step = ((lam * r) @ W + (new.mu - u) / new.v) / (np.square(lam) @ W + 1 / new.v)
-        after, r_after, total_after = evaluate(u + step)
+        gradient = -0.5 * np.multiply(lam, log_total, out=new_total) @ W + (new.mu - u) / new.v
+        step = gradient / (np.square(lam, out=lam) @ W + 1 / new.v)
+        after = cost_at(u + step, new_total, new_log_total)
         lower = after < cost
         u, cost = np.where(lower, u + step, u), np.where(lower, after, cost)
-        r[lower], total[lower] = r_after[lower], total_after[lower]
+        np.copyto(total, new_total, where=lower[:, None])
+        np.copyto(log_total, new_log_total, where=lower[:, None])
     return u, cost
 
 
