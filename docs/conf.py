@@ -71,6 +71,8 @@ sphinx_gallery_conf = {
 html_theme = "pydata_sphinx_theme"
 html_title = "Arrivals"
 html_show_sourcelink = False
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
 html_theme_options = {
     "navigation_depth": 2,
     "show_nav_level": 1,
@@ -89,4 +91,5 @@ def setup(app: Sphinx) -> None:
     reference.write(DOCS / "reference")
     roles.register_local_role("name", docstrings.name_role(reference.documented()))
     app.connect("source-read", markdown.rewrite)
+    app.connect("autodoc-process-signature", docstrings.signature)
     app.connect("autodoc-process-docstring", docstrings.escape, priority=600)

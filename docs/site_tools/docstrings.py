@@ -1,5 +1,6 @@
 """Docstrings as the reference shows them: literal bars and stars, and names in backticks."""
 
+import inspect
 import re
 from collections.abc import Callable
 from typing import Any
@@ -10,6 +11,38 @@ from sphinx.domains.python import PyXRefRole
 STAR = re.compile(r"(?<![\w*\\])\*(?=\w)")
 ATTRIBUTE = re.compile(r":obj:`(\w+) <\.\w+>`")  # numpydoc's link to an attribute of any class
 PARTS = re.compile(r"(``.*?``|`[^`]*`)")
+
+
+def signature(
+    app: object, what: str, name: str, thing: Any, options: object, text: str | None, result: object
+) -> tuple[str, str] | None:
+    """Return the parameters of a class or a function, with models as defaults in short.
+
+    It answers Sphinx's event `autodoc-process-signature`. A metaclass hides those of trackers.
+    """
+    if what not in ("class", "function") or not text:
+        return None
+    parameters = [
+        one.replace(annotation=one.empty, default=short(one.default))
+        for one in inspect.signature(thing).parameters.values()
+    ]
+    return str(inspect.Signature(parameters)), ""
+
+
+class Short:
+    """A default value that is shown as the call of its class, without arguments."""
+
+    def __init__(self, value: object) -> None:
+        self.name = type(value).__name__
+
+    def __repr__(self) -> str:
+        return "..." if self.name.startswith("_") else f"{self.name}(...)"
+
+
+def short(value: Any) -> Any:
+    """Return a default value, or in its place one that is shown in short."""
+    plain = value is None or value is inspect.Parameter.empty
+    return value if plain or isinstance(value, bool | int | float | str | tuple) else Short(value)
 
 
 def escape(

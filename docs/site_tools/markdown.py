@@ -13,6 +13,7 @@ PAGES = {
 }
 EXAMPLE = re.compile(r"^docs/gallery/(plot_\w+)\.py$")
 ANCHOR = re.compile(r'^<a id="([\w-]+)"></a>$', re.MULTILINE)
+BLANK_END = re.compile(r"(^```python\n(?:(?!```).*\n)*?)\n(?=```$)", re.MULTILINE)  # of doctest
 LINK = re.compile(r"\[([^\]]*)\]\((?!https?:)([^)\s]+)\)")
 
 
@@ -26,7 +27,7 @@ def rewritten(text: str, page: Path) -> str:
 
     `page` is relative to the root of the repository.
     """
-    text = ANCHOR.sub(r"(\1)=", text)
+    text = BLANK_END.sub(r"\1", ANCHOR.sub(r"(\1)=", text))
     return LINK.sub(lambda found: link(found[1], found[2], page), text)
 
 

@@ -51,7 +51,7 @@ def documented() -> dict[str, str]:
 def write(folder: Path) -> None:
     """Write all pages into a folder; those that have not changed keep their time."""
     pages = documented()
-    texts = {f"{full}.rst": page_of_name(full) for full in sorted(set(pages.values()))}
+    texts = {f"{full}.rst": page_of_name(full, pages) for full in sorted(set(pages.values()))}
     for package in PACKAGES:
         texts[f"{package}.rst"] = page_of_package(package, pages)
     texts["index.rst"] = index()
@@ -86,17 +86,49 @@ def page_of_package(package: str, pages: dict[str, str]) -> str:
     return "\n".join(parts)
 
 
-def page_of_name(full: str) -> str:
+def page_of_name(full: str, pages: dict[str, str]) -> str:
     """Return the page of a class, a function or a value."""
     package, name = full.rsplit(".", 1)
     thing = getattr(importlib.import_module(package), name)
     if inspect.isclass(thing):
-        body = [f".. autoclass:: {full}", "   :members:", "   :show-inheritance:"]
+        body = [f".. autoclass:: {full}", "   :members:", "   :show-inheritance:", ""]
+        body += inherited(thing, pages)
     elif callable(thing) and getattr(thing, "__doc__", None) and hasattr(thing, "__name__"):
         body = [f".. autofunction:: {full}"]
     else:
         body = [f".. autodata:: {full}", "   :no-value:"]
     return "\n".join([heading(name), *body, ""])
+
+
+def inherited(thing: type, pages: dict[str, str]) -> list[str]:
+    """Return one line a base class, with the public names that a class has from it."""
+    documented_classes = classes(pages)
+    lines, known = [], {name for name in vars(thing) if not name.startswith("_")}
+    for base in thing.__mro__[1:]:
+        names = [name for name in vars(base) if not name.startswith("_") and name not in known]
+        known |= set(names)
+        if not names or not base.__module__.startswith("arrivals"):
+            continue
+        page = documented_classes.get(base)
+        if page is None:
+            words = [f"``{name}``" for name in names]
+            lines.append(f"From ``{base.__name__}``: {', '.join(words)}.")
+        else:
+            words = [f":py:obj:`{name} <{page}.{name}>`" for name in names]
+            lines.append(f"From :py:class:`~{page}`: {', '.join(words)}.")
+        lines.append("")
+    return [".. rubric:: Inherited", "", *lines] if lines else []
+
+
+def classes(pages: dict[str, str]) -> dict[type, str]:
+    """Return the full name of the page of each public class."""
+    found = {}
+    for page in set(pages.values()):
+        package, name = page.rsplit(".", 1)
+        thing = getattr(importlib.import_module(package), name)
+        if inspect.isclass(thing):
+            found[thing] = page
+    return found
 
 
 def first_paragraph(module: ModuleType) -> str:
