@@ -9,12 +9,14 @@ from pathlib import Path
 import pytest
 
 from arrivals.__main__ import main
+from arrivals.cli.main import _parser
 from arrivals.measurement_models.arrays import from_description
 from arrivals.measurement_models.arrays.description import COMMON, KEYS
 from arrivals.measurement_models.arrays.presets import preset_names
 from arrivals.trackers import available
 
-DOCS = Path(__file__).parents[1] / "docs"
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
 PAGES = sorted([*DOCS.glob("*.md"), *DOCS.glob("start/*.md")])
 COMMAND = re.compile(r"^ {4}arrivals (.*)$", re.MULTILINE)
 SHOWN_ELSEWHERE = ("demo", "reproduce")  # longer runs, which tests of their own have
@@ -39,6 +41,13 @@ def test_start_pages_are_seven_and_have_examples() -> None:
         text = page.read_text(encoding="utf-8")
         assert ">>>" in text
         assert "## Next" in text
+
+
+@pytest.mark.parametrize("page", [ROOT / "README.md", *PAGES], ids=lambda page: page.stem)
+def test_page_commands_are_those_of_the_parser(page: Path) -> None:
+    text = page.read_text(encoding="utf-8").replace("\\\n", " ")
+    for command in re.findall(r"^ {4}(?:.*\| )?arrivals (.*)$", text, re.MULTILINE):
+        _parser().parse_args(shlex.split(command, comments=True))
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
