@@ -9,7 +9,7 @@ import numpy as np
 from arrivals.measurement_models import ArraySamples
 from arrivals.plots import plot_array
 from arrivals.plots.colours import PALETTE
-from arrivals.plots.labels import legend_above
+from arrivals.plots.labels import legend_below
 from arrivals.typing import Float
 
 if TYPE_CHECKING:
@@ -100,4 +100,4 @@ def draw_geometry(ax: Axes, model: ArraySamples, doa_deg: float) -> None:
     ax.plot([], [], color=PALETTE[1], label=f"path left, samples; Δ = κ sin θ = {delay:g}")
     ax.set(aspect="equal", ylim=(-0.2 * size, 1.3 * size), xlim=(positions.min() - 0.1 * size,
            positions.max() + 0.8 * size), xlabel="position, samples of delay")  # fmt: skip
-    legend_above(ax, 2)
+    legend_below(ax, 2)

@@ -86,8 +86,9 @@ def draw_drive_by(sound: Float, law: EnvelopeLaw) -> Figure:
 def draw_detection(snr_db: float, numbers: tuple[int, ...]) -> Figure:
     """Draw receiver operating characteristics: what each form states, and what is true."""
     from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    figure = Figure(figsize=(12.0, 4.0), layout="constrained")
+    figure = Figure(figsize=(12.0, 4.0), layout=ConstrainedLayoutEngine(wspace=0.06))
     alarm, snr = np.logspace(-4, -0.02, 200), 10 ** (snr_db / 10)
     for n, (ax, N) in enumerate(zip(figure.subplots(1, 3, sharey=True), numbers, strict=True)):
         log, amplitude = true_false_alarm(alarm, N)

@@ -9,7 +9,7 @@ import numpy as np
 
 from arrivals.measurement_models import LogNormalRSS, neper_to_db
 from arrivals.plots.colours import PALETTE
-from arrivals.plots.labels import legend_above
+from arrivals.plots.labels import legend_below
 from arrivals.scenarios.simulations.signal_strength import RSSTrial
 from arrivals.trackers.rss.inference.joint_posterior import JointPosterior, Prior
 
@@ -96,7 +96,7 @@ def _draw_network(ax: Axes, trial: RSSTrial) -> None:
     ax.text(v[0] + 1.5, v[1] + 1.5, "v", fontsize=11, color=PALETTE[1])
     ax.set(xlabel="x, m", ylabel="y, m", title="Fig. 1: sources, wavefronts and sensors")
     ax.set_aspect("equal")
-    legend_above(ax, 2)
+    legend_below(ax, 2)
 
 
 def _draw_nodes(ax: Axes, n_sources: int, n_sensors: int) -> None:

@@ -219,7 +219,7 @@ def draw_parts(study: Study, name: str) -> Figure:
         index = [labels.index(label) for label in beside]
         ax.plot(np.array(index) + 0.2, list(beside.values()), marker, color="black",
                 markerfacecolor="white", label=origin)  # fmt: skip
-    ax.set_xticks(at, [fill(label, 9) for label in labels])
+    ax.set_xticks(at, [fill(label, 10) for label in labels])
     ax.set(ylabel="GOSPA, degrees")
     figure.legend(fontsize=8, loc="outside upper center", ncols=6, frameon=False)
     return figure

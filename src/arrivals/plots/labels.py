@@ -109,6 +109,7 @@ def parameter_label(parameter: str) -> str:
 PLACES = {1: "on a line", 2: "in a plane", 3: "in space"}
 UNIT_STEPS = ((1e9, "GHz"), (1e6, "MHz"), (1e3, "kHz"), (1.0, "Hz"))
 TITLE_SIZE, LEGEND_SIZE = 10, 8  # points
+BELOW = 34.0  # points, from the axes to a legend below their label
 CHARACTERS = 15.0  # of a title, an inch
 
 
@@ -245,4 +246,8 @@ def legend_below(ax: Axes, n_columns: int, **more: Any) -> None:
     **more : object
         Further arguments of `Axes.legend`.
     """
-    legend_beside(ax, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=n_columns, **more)
+    from matplotlib.transforms import ScaledTranslation
+
+    down = ScaledTranslation(0, -BELOW / 72, ax.figure.dpi_scale_trans)
+    place = {"bbox_to_anchor": (0.5, 0.0), "bbox_transform": ax.transAxes + down}
+    legend_beside(ax, loc="upper center", ncols=n_columns, **place, **more)
