@@ -83,6 +83,20 @@ def test_reference_has_the_packages_of_the_list_of_public_names(check_site: Modu
     assert {f"arrivals.{name}" for name in listed} <= set(check_site.reference.PACKAGES)
 
 
+def test_every_page_is_in_the_navigation() -> None:
+    docs = ROOT / "docs"
+    tree = re.compile(r"```\{toctree\}\n(.*?)```", re.DOTALL)
+    listed = {
+        (file.parent / entry).relative_to(docs).as_posix()
+        for file in docs.rglob("*.md")
+        for block in tree.findall(file.read_text(encoding="utf-8"))
+        for entry in block.split()
+    }
+    pages = [*docs.glob("*.md"), *docs.glob("start/*.md"), *docs.glob("notebooks/*.ipynb")]
+    names = {page.relative_to(docs).with_suffix("").as_posix() for page in pages}
+    assert names - listed == {"index"}  # Sphinx warns of others, and a warning is an error
+
+
 def test_ci_builds_the_site_by_the_command_of_contributing() -> None:
     text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
     commands = re.findall(r"^ {4}(python3 -m venv .venv &&.*)$", text, re.MULTILINE)

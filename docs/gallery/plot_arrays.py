@@ -18,15 +18,13 @@ from arrivals.plots import plot_array
 print(*preset_names())
 
 # %%
-# Six of them, and a line of your own.
+# Five of them, and a line of your own.
+
+names = ("respeaker-4mic", "respeaker-6mic", "matrix-voice", "uma-16", "ps3-eye")
+arrays = {name: SensorArray.from_file(name) for name in names}
+arrays["line, 5 cm apart"] = SensorArray.ula(5, spacing=0.05, speed=343.0)
 
 figure, axes = plt.subplots(2, 3, figsize=(11, 7.5), layout="constrained")
-names = "respeaker-4mic respeaker-6mic matrix-voice uma-16 ps3-eye kinect-360"
-for ax, name in zip(axes.flat, names.split(), strict=True):
-    array = SensorArray.from_file(name)
+for ax, (name, array) in zip(axes.flat, arrays.items(), strict=True):
     plot_array(array, ax=ax)
-    ax.set_title(f"{name}: {array.n_sensors} sensors")
-
-line = SensorArray.ula(5, spacing=0.05, speed=343.0)
-ax = plot_array(line)
-ax.set_title("SensorArray.ula(5, spacing=0.05)")
+    ax.set_title(f"{name}: {array.n_sensors} sensors", fontsize=10)

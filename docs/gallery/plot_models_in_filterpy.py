@@ -43,7 +43,7 @@ for each in z:
 apart = np.abs(np.subtract(*map(np.array, tracks.values()))).max()
 print(f"the two filters differ by at most {apart:.1e} m")
 
-figure, ax = plt.subplots(figsize=(7, 5.5), layout="constrained")
+figure, ax = plt.subplots(figsize=(8, 3.6), layout="constrained")
 ax.plot(truth[:, 0], truth[:, 2], color="black", linewidth=0.8, linestyle=":", label="truth")
 for (name, track), style in zip(tracks.items(), ("-", "--"), strict=True):
     ax.plot(*np.array(track).T, style, label=name)

@@ -62,7 +62,7 @@ z[100:140] = np.nan
 # on a tangent.
 
 figure, ax = plt.subplots(figsize=(7, 6), layout="constrained")
-ax.plot(truth[:, 0], truth[:, 2], color="black", linewidth=0.8, linestyle=":", label="truth")
+ax.plot(truth[:, 0], truth[:, 2], color="black", linewidth=1.5, linestyle=":", label="truth")
 for name, motion in (("Mooring", mooring), ("ConstantVelocity", ConstantVelocity(0.5))):
     run = EKF(motion, bearings, x=[50.0, 0.0, 0.0, 0.0], P=np.diag([900.0, 25, 900, 25])).run(z)
     error = np.hypot(*(run.x - truth)[100:140, [0, 2]].T)

@@ -41,11 +41,12 @@ def statements(snr_db):
 
 figure, (left, right) = plt.subplots(1, 2, figsize=(10, 5), layout="constrained")
 levels = np.linspace(0.05, 0.99, 20)
-for snr_db, colour in ((10.0, "tab:red"), (0.0, "tab:blue")):
+for snr_db in (10.0, 0.0):
     error, std, existence, hit = statements(snr_db)
     inside = [coverage(error, std, level) for level in levels]
-    left.plot(levels, inside, color=colour, marker="o", markersize=4, label=f"{snr_db:.0f} dB")
     plot_reliability(reliability(existence, hit).table, label=f"{snr_db:.0f} dB", ax=right)
+    colour = right.containers[-1].lines[0].get_color()
+    left.plot(levels, inside, color=colour, marker="o", markersize=4, label=f"{snr_db:.0f} dB")
     within = coverage(error, std, 2 * norm.cdf(1) - 1)
     print(f"{snr_db:4.0f} dB: {100 * within:.0f} % of the errors within one std")
 left.plot([0, 1], [0, 1], color="black", linewidth=0.8, linestyle=":")
