@@ -219,6 +219,15 @@ def test_tracks_of_coordinates_are_those_of_the_positions() -> None:
     np.testing.assert_allclose(segments[:, 0, 1], run.position[:2, :, 1].T.ravel())
 
 
+def test_truth_is_wrapped_and_not_joined_across_180_degrees() -> None:
+    run = tracks([(170, 0)], [(178, 0)], [(-174, 0)])
+    truth = np.deg2rad([[171.0, 30.0], [179.0, 31.0], [187.0, 32.0]])
+    first, second = plot_tracks(run, truth=truth).lines[:2]
+    np.testing.assert_allclose(first.get_xdata(), [0, 1, np.nan, 2])
+    np.testing.assert_allclose(first.get_ydata(), [171, 179, np.nan, -173])
+    np.testing.assert_allclose(second.get_ydata(), [30, 31, 32])
+
+
 def test_wrong_arguments_are_refused() -> None:
     run = tracks([(10, 0)])
     with pytest.raises(ValueError, match=r"quantity must be one of 'doa', .*; got 'speed'"):

@@ -93,15 +93,16 @@ def plot_tracks(
     at = step_times(run, time)
     known = None if truth is None else _true_values(truth, len(run), chosen.name)
     ax = new_axes((9.0, 4.5)) if ax is None else ax
+    limit = None
     if chosen.name.startswith("direction"):
-        draw_directions(ax, at, run, 90.0 if is_on_line(run, run.measurement) else 180.0)
+        limit = 90.0 if is_on_line(run, run.measurement) else 180.0
+        draw_directions(ax, at, run, limit)
     else:
         _draw(ax, at, run, chosen)
         ax.set_ylabel(chosen.name + " (± 1 std)" * bool(np.isfinite(chosen.std).any()))
         ax.autoscale_view()
     if known is not None:
-        lines = ax.plot(at, known, color=NEUTRAL, linewidth=1.0, linestyle=":", zorder=4)
-        lines[0].set_label("truth")
+        _draw_truth(ax, at, known, limit)
     if chosen.name == "existence":
         ax.set_ylim(-0.02, 1.02)
     ax.set(xlabel="step" if time is None else "time, s")
@@ -156,6 +157,19 @@ def _true_values(truth: ArrayLike, n_steps: int, name: str) -> Float:
     if values.ndim != 2 or len(values) != n_steps:
         raise ValueError(f"truth must have shape ({n_steps}, n_sources); got {values.shape}")
     return np.rad2deg(values) if name.endswith("degrees") else values
+
+
+def _draw_truth(ax: Axes, at: Float, known: Float, limit: float | None) -> None:
+    """Draw true values as dotted lines, which break where a direction jumps across the limits."""
+    for n, path in enumerate(known.T):
+        if limit is not None:
+            path = (path + 180.0) % 360.0 - 180.0
+            jumps = np.flatnonzero(np.abs(np.diff(path)) > limit) + 1
+            x, path = np.insert(at, jumps, np.nan), np.insert(path, jumps, np.nan)
+        else:
+            x = at
+        ax.plot(x, path, color=NEUTRAL, linewidth=1.0, linestyle=":", zorder=4,
+                label=None if n else "truth")  # fmt: skip
 
 
 def _draw(ax: Axes, at: Float, run: Run, chosen: Quantity) -> None:
