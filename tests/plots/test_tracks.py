@@ -222,10 +222,12 @@ def test_tracks_of_coordinates_are_those_of_the_positions() -> None:
 def test_truth_is_wrapped_and_not_joined_across_180_degrees() -> None:
     run = tracks([(170, 0)], [(178, 0)], [(-174, 0)])
     truth = np.deg2rad([[171.0, 30.0], [179.0, 31.0], [187.0, 32.0]])
-    first, second = plot_tracks(run, truth=truth).lines[:2]
-    np.testing.assert_allclose(first.get_xdata(), [0, 1, np.nan, 2])
-    np.testing.assert_allclose(first.get_ydata(), [171, 179, np.nan, -173])
-    np.testing.assert_allclose(second.get_ydata(), [30, 31, 32])
+    first, second = [
+        np.asarray(line.get_xydata()) for line in plot_tracks(run, truth=truth).lines[:2]
+    ]
+    np.testing.assert_allclose(first[:, 0], [0, 1, np.nan, 2])
+    np.testing.assert_allclose(first[:, 1], [171, 179, np.nan, -173])
+    np.testing.assert_allclose(second[:, 1], [30, 31, 32])
 
 
 def test_wrong_arguments_are_refused() -> None:
