@@ -45,6 +45,7 @@ def plot_reliability(
         Entry of the legend, beside the axes.
     ax : matplotlib Axes, optional
         Axes of a new figure if None; further curves have further colours.
+        A figure of yours has room for the legend by `layout="constrained"`.
 
     Returns
     -------

@@ -58,6 +58,7 @@ def plot_map(
         Maximum number for each label; the last position always has one.
     ax : matplotlib Axes, optional
         Axes of a new figure if None; `save` of `arrivals.plots.bearing_time` writes it.
+        A figure of yours has room for the legend by `layout="constrained"`.
 
     Returns
     -------

@@ -66,6 +66,7 @@ def plot_tracks(
         Increasing times, s; the number of the step if None.
     ax : matplotlib Axes, optional
         Axes of a new figure without a window if None.
+        A figure of yours has room for the legend by `layout="constrained"`.
 
     Returns
     -------

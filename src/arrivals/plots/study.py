@@ -50,6 +50,7 @@ def plot_metric(
         A lower bound by case, drawn in black; only of a study.
     ax : matplotlib Axes, optional
         Axes of a new figure if None.
+        A figure of yours has room for the legend by `layout="constrained"`.
 
     Returns
     -------
