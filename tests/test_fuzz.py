@@ -21,7 +21,7 @@ from arrivals.trackers import Kalman, available, find
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 
 
-@pytest.mark.parametrize(("name", "n_inputs"), [("trackers", 550), ("models", 900)])
+@pytest.mark.parametrize(("name", "n_inputs"), [("trackers", 330), ("models", 600)])
 def test_malformed_arguments_end_in_one_line_and_change_nothing(name: str, n_inputs: int) -> None:
     report = try_inputs(name, 1, range(n_inputs))
     assert report.n_tried >= n_inputs
@@ -29,7 +29,7 @@ def test_malformed_arguments_end_in_one_line_and_change_nothing(name: str, n_inp
     assert faults == []
 
 
-@pytest.mark.parametrize(("name", "n_inputs"), [("files", 400), ("cli", 120), ("signals", 30)])
+@pytest.mark.parametrize(("name", "n_inputs"), [("files", 250), ("cli", 70), ("signals", 16)])
 def test_damaged_files_arguments_kills_and_interrupts_have_no_fault(
     name: str, n_inputs: int
 ) -> None:

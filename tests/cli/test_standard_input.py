@@ -2,30 +2,38 @@
 
 import io
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 import soundfile
-from command_line import RATE, SHELL, WINDOW, run_cli, track
+from command_line import RATE, SHELL, WINDOW, run_cli, run_piped, track
 from scipy.io import savemat, wavfile
 
 from arrivals.__main__ import main
 
 CBF = ("--tracker", "cbf")
+AsStream = Callable[..., tuple[int, str, str]]  # status, output, messages
 
 
 @pytest.fixture
-def expected(scene: Path, capsys: pytest.CaptureFixture[str]) -> bytes:
+def expected(scene: Path, capsys: pytest.CaptureFixture[str]) -> str:
     """Return the tracks of the scene's file."""
     assert main(track(scene, *CBF)) == 0
     tracks = capsys.readouterr().out
     assert len(tracks.splitlines()) > 10
-    return tracks.encode()
+    return tracks
 
 
-def as_stream(scene: Path, content: bytes, *more: str) -> subprocess.CompletedProcess[bytes]:
-    return run_cli(track(scene, *CBF, *more, file="-"), input=content)
+@pytest.fixture
+def as_stream(scene: Path, capsys: pytest.CaptureFixture[str]) -> AsStream:
+    """Return a function that tracks a content on standard input."""
+
+    def run(content: bytes, *more: str) -> tuple[int, str, str]:
+        return run_piped(track(scene, *CBF, *more, file="-"), content, capsys)
+
+    return run
 
 
 def written(scene: Path, path: Path, form: str, subtype: str) -> Path:
@@ -41,30 +49,30 @@ def written(scene: Path, path: Path, form: str, subtype: str) -> Path:
      ("AIFF", "PCM_16"), ("W64", "PCM_16")],
 )  # fmt: skip
 def test_header_on_standard_input_equals_the_file(
-    form: str, subtype: str, scene: Path, here: Path, expected: bytes
+    form: str, subtype: str, scene: Path, here: Path, expected: str, as_stream: AsStream
 ) -> None:
-    done = as_stream(scene, written(scene, here / "a.bin", form, subtype).read_bytes())
-    assert (done.returncode, done.stdout) == (0, expected), done.stderr
+    content = written(scene, here / "a.bin", form, subtype).read_bytes()
+    assert as_stream(content) == (0, expected, "")
 
 
-def test_wav_of_unknown_size_and_with_a_last_chunk_is_read(scene: Path, expected: bytes) -> None:
+def test_wav_of_unknown_size_and_with_a_last_chunk_is_read(scene: Path, expected: str) -> None:
     whole = (scene / "tow.wav").read_bytes()
     last = b"LIST" + (400).to_bytes(4, "little") + bytes(range(200)) * 2
     endless = whole[:40] + b"\xff\xff\xff\x7f" + whole[44:]
     for content in (whole + last, endless):
-        done = as_stream(scene, content, "--rate", str(RATE), "--dtype", "int16")
-        assert (done.returncode, done.stdout) == (0, expected), done.stderr
+        more = ("--rate", str(RATE), "--dtype", "int16")
+        done = run_cli(track(scene, *CBF, *more, file="-"), input=content)
+        assert (done.returncode, done.stdout) == (0, expected.encode()), done.stderr
 
 
 def test_flac_from_an_encoder_that_writes_to_a_pipe_is_read(
-    scene: Path, here: Path, expected: bytes
+    scene: Path, here: Path, expected: str, as_stream: AsStream
 ) -> None:
     """Its header does not have the number of samples."""
     whole = bytearray(written(scene, here / "a.flac", "FLAC", "PCM_16").read_bytes())
     whole[21] &= 0xF0
     whole[22:26] = bytes(4)
-    done = as_stream(scene, bytes(whole))
-    assert (done.returncode, done.stdout) == (0, expected), done.stderr
+    assert as_stream(bytes(whole)) == (0, expected, "")
 
 
 def test_npz_file_on_standard_input_is_read_without_a_warning(
@@ -89,14 +97,16 @@ def test_mislabelled_file_is_tracked_with_one_line(
     assert message.count("\n") == 1
 
 
-def test_header_that_contradicts_an_argument_is_refused(scene: Path, here: Path) -> None:
-    done = as_stream(scene, (scene / "tow.wav").read_bytes(), "--rate", "16000")
-    assert done.returncode == 2
-    assert b"--rate must be 8000, as in the header of standard input; got 16000" in done.stderr
+def test_header_that_contradicts_an_argument_is_refused(
+    scene: Path, here: Path, as_stream: AsStream
+) -> None:
+    status, _, message = as_stream((scene / "tow.wav").read_bytes(), "--rate", "16000")
+    assert status == 2
+    assert "--rate must be 8000, as in the header of standard input; got 16000" in message
     flac = written(scene, here / "a.flac", "FLAC", "PCM_16").read_bytes()
-    done = as_stream(scene, flac, "--channels", "8")
-    assert done.returncode == 2
-    assert b"--channels must be left out: standard input is a FLAC file" in done.stderr
+    status, _, message = as_stream(flac, "--channels", "8")
+    assert status == 2
+    assert "--channels must be left out: standard input is a FLAC file" in message
 
 
 @pytest.mark.parametrize("start", [b"fLaC", b"OggS", b"FORM1234AIFF", b"RIFF1234WAVE", b"caff\0\1"])
@@ -135,18 +145,19 @@ def test_wav_stream_is_tracked_as_it_arrives(scene: Path) -> None:
         process.kill()
 
 
-def test_channels_of_the_header_must_fit_the_array(scene: Path, here: Path) -> None:
+def test_channels_of_the_header_must_fit_the_array(here: Path, as_stream: AsStream) -> None:
     wavfile.write(here / "a.wav", RATE, np.zeros((4000, 6), np.int16))
-    done = as_stream(scene, (here / "a.wav").read_bytes())
-    assert done.returncode == 2
-    assert b"must have 8 channels; got 6" in done.stderr
+    status, _, message = as_stream((here / "a.wav").read_bytes())
+    assert status == 2
+    assert "must have 8 channels; got 6" in message
 
 
-def test_matlab_is_read_and_text_refused(scene: Path, here: Path, expected: bytes) -> None:
+def test_matlab_is_read_and_text_refused(
+    scene: Path, here: Path, expected: str, as_stream: AsStream
+) -> None:
     samples, rate = soundfile.read(scene / "tow.wav", dtype="float32")
     savemat(here / "a.mat", {"samples": samples, "rate": float(rate)})
-    done = as_stream(scene, (here / "a.mat").read_bytes())
-    assert (done.returncode, done.stdout) == (0, expected), done.stderr
-    done = as_stream(scene, b"0.125, 0.250\n" * 1000, "--rate", str(RATE))
-    message = b"arrivals: standard input is text, not samples: write it to a file"
-    assert (done.returncode, done.stdout, done.stderr[: len(message)]) == (2, b"", message)
+    assert as_stream((here / "a.mat").read_bytes()) == (0, expected, "")
+    status, printed, message = as_stream(b"0.125, 0.250\n" * 1000, "--rate", str(RATE))
+    assert (status, printed) == (2, "")
+    assert message.startswith("arrivals: standard input is text, not samples: write it to a file")

@@ -1,10 +1,12 @@
 """Scene on disk, and calls of the command line on it."""
 
+import contextlib
 import csv
 import io
 import os
 import subprocess
 import sys
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +47,27 @@ def table(text: str) -> list[dict[str, str]]:
 
 def run_cli(arguments: list[str], **more: Any) -> subprocess.CompletedProcess[bytes]:
     return subprocess.run([*SHELL, *arguments], capture_output=True, timeout=60, **more)
+
+
+def run_piped(
+    arguments: list[str], content: bytes, capsys: pytest.CaptureFixture[str]
+) -> tuple[int, str, str]:
+    """Run the command line in this process, with a content from a pipe as standard input."""
+    reads, writes = os.pipe()
+
+    def write() -> None:
+        with contextlib.suppress(BrokenPipeError), os.fdopen(writes, "wb") as file:
+            file.write(content)
+
+    writer, before = threading.Thread(target=write), sys.stdin
+    writer.start()
+    try:
+        with os.fdopen(reads) as sys.stdin:
+            status = main(arguments)
+    finally:
+        sys.stdin = before
+        writer.join()
+    return status, *capsys.readouterr()
 
 
 def assert_rejected(

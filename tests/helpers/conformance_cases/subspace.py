@@ -33,8 +33,8 @@ def two_sources(model: ArraySnapshot, n_steps: int = 12) -> Measurements:
     return z
 
 
-def case(name: str, kind: Any, model: ArraySnapshot, **params: Any) -> Any:
-    return name, lambda: kind(model, **params), two_sources(model)
+def case(name: str, kind: Any, model: ArraySnapshot, n_steps: int = 12, **params: Any) -> Any:
+    return name, lambda: kind(model, **params), two_sources(model, n_steps)
 
 
 TRACKERS: list[tuple[str, MakeTracker, Measurements]] = [
@@ -53,6 +53,6 @@ TRACKERS: list[tuple[str, MakeTracker, Measurements]] = [
     case("past", PAST, LINE_BLOCK, max_sources=3, interval=2),
     case("music", MUSIC, SPHERE, n_directions=500, interval=2),
     case("music", MUSIC, SPACE, n_sources=2, n_directions=500),
-    case("mvdr", MVDR, SPHERE, n_directions=500),
-    case("mvdr", MVDR, SPACE, n_directions=500, max_sources=2),
+    case("mvdr", MVDR, SPHERE, n_steps=5, n_directions=500),
+    case("mvdr", MVDR, SPACE, n_steps=5, n_directions=500, max_sources=2),
 ]

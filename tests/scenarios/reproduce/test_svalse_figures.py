@@ -126,7 +126,7 @@ def test_sources_off_the_grid_are_cases_at_high_snr(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("short")
 def test_panels_are_lettered_as_in_the_paper(tmp_path: Path) -> None:
-    report = reproduce_svalse.fig4(2, 0, tmp_path, quick=False)
+    report = reproduce_svalse.fig4(1, 0, tmp_path, quick=False)
     figure = report.figures["tracks"]
     titles = [ax.get_title() for ax in figure.axes[:6]]
     assert [title[:3] for title in titles[:5]] == ["(a)", "(b)", "(c)", "(d)", "(e)"]
