@@ -2,8 +2,8 @@
 Sources that cross
 ==================
 
-Of six sources two cross. A method that looks at each snapshot by itself loses them near the
-crossing; one that carries densities from step to step does not.
+Of six sources two cross. A method without memory loses sources near the crossing and elsewhere;
+one that carries densities from step to step does not.
 """
 
 # %%

@@ -3,7 +3,7 @@ Compare trackers by Monte Carlo
 ===============================
 
 Every method gets the same draws of a scene, and is scored by the same metric; intervals are by
-bootstrap. More runs and finer steps are a matter of patience.
+bootstrap. More runs narrow the intervals.
 """
 
 # %%

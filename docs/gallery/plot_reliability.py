@@ -13,7 +13,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from scipy.stats import norm
 
-from arrivals.plots.calibration import plot_reliability
+from arrivals.plots import plot_reliability
 from arrivals.scenarios import create, reliability
 from arrivals.scenarios.metrics import coverage, matches
 
@@ -37,7 +37,7 @@ def statements(snr_db):
 
 # %%
 # The share of errors within an interval, over the share that the interval states; and the share of
-# true estimates over the stated existence. On the dotted line both are honest.
+# true estimates over the stated existence. On the diagonal both are right.
 
 figure, (left, right) = plt.subplots(1, 2, figsize=(10, 5), layout="constrained")
 levels = np.linspace(0.05, 0.99, 20)
