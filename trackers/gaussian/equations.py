@@ -111,17 +111,15 @@ def update_gaussian(
     (array([0.5]), array([[0.5]]), -1.5155)
     """
     # S = H P H' + R,  K = P H' S^-1   (4.21),  P = (I - K H) P (I - K H)' + K R K'
-    gain = kalman_gain(P, H, R, missing, inv)
+    P, K, S, SI, half_log, n_valid, jittered = kalman_gain(P, H, R, missing, inv)
     if missing is not None:
         y = np.where(missing, 0.0, y)
     # x = x + K y   (4.21)
-    x = x + apply(gain.K, y)
+    x = x + apply(K, y)
     # ln N(y; 0, S)
-    square = inner(y, apply(gain.SI, y))
-    log_likelihood = -0.5 * (gain.n_valid * LOG_2PI + square) - gain.half_log_det
-    return GaussianUpdate(
-        x, gain.P, y, gain.K, gain.S, gain.SI, log_likelihood, square, gain.jittered
-    )
+    square = inner(y, apply(SI, y))
+    log_likelihood = -0.5 * (n_valid * LOG_2PI + square) - half_log
+    return GaussianUpdate(x, P, y, K, S, SI, log_likelihood, square, jittered)
 
 
 def log_normal_update(y: Float, S: Float, missing: Bool | None = None) -> tuple[Float, Float, int]:

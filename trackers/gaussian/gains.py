@@ -14,10 +14,9 @@ import numpy as np
 
 from arrivals.trackers.gaussian.linalg import (
     Inverse,
-    cholesky,
-    half_log_det,
     identity,
     inverse,
+    inverse_and_log_det,
     multiplication,
     symmetric,
 )
@@ -69,11 +68,10 @@ def kalman_gain(
     if missing is not None:
         PHT, S = leave_out(missing, PHT, S)
         n_valid = n_valid - missing.sum(axis=-1)
-    S, L, jittered = cholesky(S)
-    SI = inv(S)
+    S, SI, log_det, jittered = inverse_and_log_det(S, inv)
     # K = P H' S^-1   (4.21)
     K = dot(PHT, SI)
-    return Gain(joseph(P, K, H, R), K, S, SI, half_log_det(L), n_valid, jittered)
+    return Gain(joseph(P, K, H, R), K, S, SI, log_det, n_valid, jittered)
 
 
 def joseph(P: Float, K: Float, H: Float, R: Float) -> Float:

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from arrivals.typing import Float
 
 HALF = np.array(0.5)  # a product with it costs less than one with a float
+MIN_RELATIVE_PIVOT = 1e-4  # of the variance: below, factors are LAPACK's, with jitter
 JITTER = 1e-9  # of the mean variance, added to a covariance that has no Cholesky factor
 
 Inverse = Callable[[Float], Any]
@@ -144,6 +145,35 @@ def inverse(A: Float) -> Float:
     if failed:
         raise ValueError("matrix to invert must not be singular: P, H or R has grown too far")
     return np.asarray(solution)
+
+
+def inverse_and_log_det(
+    S: Float, inv: Inverse = inverse
+) -> tuple[Float, Float, float | Float, int]:
+    """Return covariances (..., n, n), their inverses, ½ log |S|, and how many needed jitter.
+
+    Raises
+    ------
+    ValueError
+        As `cholesky` does.
+
+    Examples
+    --------
+    >>> inverse_and_log_det(np.diag([2.0, 0.5]))[1:]
+    (array([[ 0.5, -0. ],
+           [-0. ,  2. ]]), 0.0, 0)
+    """
+    if S.shape == (2, 2) and inv is inverse:  # a third of the time, in plain numbers
+        (a, _), (b, c) = S.tolist()
+        # S = [1 0; f 1] diag(a, d) [1 f; 0 1],  f = b/a
+        f = b / a if a > 0 else math.nan
+        d = c - f * b
+        if d > MIN_RELATIVE_PIVOT * c:
+            cross = -f / d
+            SI = np.array([[1 / a - f * cross, cross], [cross, 1 / d]])
+            return S, SI, 0.5 * (math.log(a) + math.log(d)), 0
+    S, L, jittered = cholesky(S)
+    return S, inv(S), half_log_det(L), jittered
 
 
 def inverse_2x2(A: Float) -> Float:
