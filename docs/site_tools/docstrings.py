@@ -8,7 +8,7 @@ from typing import Any
 from docutils import nodes
 from sphinx.domains.python import PyXRefRole
 
-STAR = re.compile(r"(?<![\w*\\])\*(?=\w)")
+STAR = re.compile(r"(?<![*\\])\*(?![*\s])")  # neither bold type nor a bullet
 ATTRIBUTE = re.compile(r":obj:`(\w+) <\.\w+>`")  # numpydoc's link to an attribute of any class
 PARTS = re.compile(r"(``.*?``|`[^`]*`)")
 
