@@ -13,7 +13,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 FOLDERS = ("motion_models", "measurement_models", "trackers", "scenarios")
-APPLICATIONS = ("recordings", "plots", "cli")  # below src/arrivals
+APPLICATIONS = ("recordings", "plots", "live", "cli")  # below src/arrivals
 SETUPTOOLS = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]
 
 

@@ -83,7 +83,9 @@ def fuse(
         the same for all stations; `area` (x0, y0, x1, y1), m; `speed`, standard deviation of a
         source's speed, m/s, and `q`, acceleration noise of `ConstantVelocity`, m²/s³; `step`,
         duration of a step of bearings, s; `alpha`, `sigma`, `floor`, `r_min`, `power`, `power_std`
-        and `missing` of signal strength; `progress`, which wraps the steps, as tqdm does. Names of
+        and `missing` of signal strength; `progress`, which wraps the steps, as tqdm does, and
+        `watch`, which is called with the tracker and its `FusionSteps`, and returns a function of
+        each step's number and measurements that is called after the step. Names of
         parameters of `Fused`, such as `detection__clutter`, set these, other names parameters of
         the stations' trackers.
 
@@ -113,6 +115,7 @@ def fuse(
 
     contents = stations if isinstance(stations, StationsFile) else read_stations(stations)
     progress = more.pop("progress", lambda steps, **_: steps)
+    watch = more.pop("watch", lambda fused, steps: lambda step, z: None)
     arguments = {"tracker": tracker, "frequencies": frequencies, **more}
     of_fused, of_trackers = _settings(arguments, contents.plans)
     own = checked_options({name: arguments.get(name) for name in ARGUMENTS})
@@ -139,7 +142,7 @@ def fuse(
     )  # fmt: skip
     fused = _fused(steps, area, motion, of_fused)
     with threadpool_limits(1, "blas"):  # matrices are small: more threads only wait
-        run, last = _run(fused, steps, progress)
+        run, last = _run(fused, steps, progress, watch(fused, steps))
     return FusedRun.of(
         run, stations=steps.stations, bearings=tuple(last), plane=contents.plane,
         sensors=None if steps.strength is None else steps.strength.model.sensors,
@@ -246,7 +249,12 @@ def _in_words(steps: FusionSteps, fused: Fused, table: BearingTable | None) -> s
     return "; ".join(phrases)
 
 
-def _run(fused: Fused, steps: FusionSteps, progress: Callable[..., Any]) -> tuple[Run, list[Any]]:
+def _run(
+    fused: Fused,
+    steps: FusionSteps,
+    progress: Callable[..., Any],
+    shown: Callable[[int, list[Any]], object],
+) -> tuple[Run, list[Any]]:
     """Return the run, and the azimuths of each station in the last step with any."""
     recorder = RunRecorder(type(fused.estimate))
     last = int(np.flatnonzero((steps.taken >= 0).any(axis=1))[-1])
@@ -256,10 +264,29 @@ def _run(fused: Fused, steps: FusionSteps, progress: Callable[..., Any]) -> tupl
         fused.predict(dt=float(dt[step]))
         fused.update(z)
         recorder.add(fused.estimate, fused.x)
+        shown(step, z)
         if step == last:
-            found = [_azimuths(fused, k, z[k]) for k in range(len(steps.stations))]
+            found = step_azimuths(fused, z)
     elapsed = time.perf_counter() - started
     return recorder.run(dt=steps.duration, elapsed=elapsed).at(steps.time).made_by(fused), found
+
+
+def step_azimuths(fused: Fused, z: Sequence[Any]) -> list[Float | None]:
+    """Return the azimuths on the map, rad, of the bearings of each station in the present step.
+
+    Parameters
+    ----------
+    fused : Fused
+        After the step.
+    z : sequence
+        Its measurements.
+
+    Returns
+    -------
+    list of (ndarray or None)
+        None where a station had no data.
+    """
+    return [_azimuths(fused, k, z[k]) for k in range(len(fused.stations))]
 
 
 def _azimuths(fused: Fused, k: int, entry: Any) -> Float | None:

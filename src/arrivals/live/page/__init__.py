@@ -1,0 +1,1 @@
+"""Page of a run in a browser, by bokeh, and its server."""
