@@ -10,6 +10,9 @@ from typing import Any
 from arrivals.cli.outputs import check_different, draw, write_table
 from arrivals.cli.reading import add_file_options
 from arrivals.files import check_output
+from arrivals.live.fused import watch_fused
+from arrivals.live.options import LiveOptions, add_views
+from arrivals.live.views import LiveViews
 from arrivals.recordings.fusion.fusing import fuse
 from arrivals.recordings.fusion.stations_file import read_stations
 
@@ -63,8 +66,11 @@ def add_fuse(
     add_file_options(option)
     option("--out", metavar="CSV", help="tracks file (standard output)")
     option("--plot", metavar="PNG", help="map with 95 %% error ellipses")
+    add_views(option)
     option("--quiet", action="store_true", help="no progress bar, no line about the choice")
-    add.set_defaults(command=lambda arguments: run_fuse(arguments, bar(arguments.quiet)))
+    add.set_defaults(
+        command=lambda arguments: run_fuse(arguments, bar(arguments.quiet or arguments.live))
+    )
 
 
 def _add_tracking(option: Any, setting: Callable[[str], tuple[str, Any]]) -> None:
@@ -129,27 +135,31 @@ def run_fuse(arguments: argparse.Namespace, bar: Callable[..., Any]) -> None:
     if doubled:
         option = doubled[0].replace("_", "-")
         raise ValueError(f"--set must not have options; got {doubled[0]}: pass --{option}")
-    fused = fuse(
-        stations,
-        arguments.files or None,
-        bearings=arguments.bearings,
-        rss=arguments.rss,
-        sensors=arguments.sensors,
-        progress=bar,
-        **options,
-        **settings,
-    )
-    if not arguments.quiet:
-        print(f"arrivals: {fused.understood}", file=sys.stderr)
-    write_table(fused, arguments.out)
-    draw(arguments.plot, fused)
+    with LiveViews(LiveOptions.of(arguments)) as views:
+        fused = fuse(
+            stations,
+            arguments.files or None,
+            bearings=arguments.bearings,
+            rss=arguments.rss,
+            sensors=arguments.sensors,
+            progress=bar,
+            watch=lambda tracker, steps: watch_fused(views, arguments.stations, tracker, steps),
+            **options,
+            **settings,
+        )
+        if not arguments.quiet:
+            print(f"arrivals: {fused.understood}", file=sys.stderr)
+        write_table(fused, arguments.out, printed=not views.replaces_table)
+        draw(arguments.plot, fused)
+        views.close()
 
 
 def _check_outputs(arguments: argparse.Namespace, files: tuple[str, ...]) -> None:
     """Raise an error before the computation if an output cannot be written, or is an input."""
     from arrivals.plots.bearing_time import picture_format
 
-    outputs = [each for each in (arguments.out, arguments.plot) if each]
+    lines = None if arguments.jsonl == "-" else arguments.jsonl
+    outputs = [each for each in (arguments.out, arguments.plot, lines) if each]
     inputs = [*files, *arguments.files, *(arguments.bearings or ())]
     inputs += [each for each in (arguments.rss, arguments.sensors) if each]
     words = "outputs, and the files that are read,"

@@ -19,6 +19,7 @@ from arrivals.cli.fuse import add_fuse
 from arrivals.cli.locate import add_locate
 from arrivals.cli.reading import add_reading
 from arrivals.cli.track import track
+from arrivals.live.options import add_live_input, add_views
 from arrivals.measurement_models.arrays.presets import preset_names, preset_summary
 from arrivals.messages import shown, similar
 from arrivals.recordings.formats.iq import RAW_TYPES
@@ -114,7 +115,7 @@ def _add_track(commands: Any) -> None:
         allow_abbrev=False,
     )
     option = add.add_argument
-    add_reading(option, "; - for samples from standard input")
+    add_reading(option, "; - for samples from standard input, none with --device")
     option("--array", required=True, metavar="ARRAY",
            help="array file (TOML, JSON), or the name of a preset in `arrivals list`")  # fmt: skip
     option("--frequency", type=float, metavar="HZ", help="frequency of narrowband sources")
@@ -166,6 +167,8 @@ def _add_track(commands: Any) -> None:
                 "samples (1)")  # fmt: skip
     option("--dtype", choices=(*DTYPES, *RAW_TYPES),
            help="sample type of raw standard input (int16)")  # fmt: skip
+    add_live_input(option)
+    add_views(option)
     option("--quiet", action="store_true", help="hide the progress bar")
     add.set_defaults(command=lambda arguments: track(arguments, _bar(_is_quiet(arguments))))
 
@@ -218,8 +221,8 @@ def _bar(quiet: bool) -> Callable[..., Any]:
 
 def _is_quiet(arguments: argparse.Namespace) -> bool:
     """Return True without a progress bar: on request, or with a live table on a terminal."""
-    live = arguments.file == "-" and arguments.out is None
-    return bool(arguments.quiet or (live and sys.stdout.isatty()))
+    live = arguments.out is None and (arguments.file == "-" or arguments.device is not None)
+    return bool(arguments.quiet or arguments.live or (live and sys.stdout.isatty()))
 
 
 def _list(arguments: argparse.Namespace) -> None:

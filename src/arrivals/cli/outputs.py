@@ -22,11 +22,12 @@ def check_outputs(arguments: argparse.Namespace) -> None:
     """Raise an error for outputs that cannot be written, before the work begins."""
     from arrivals.plots.bearing_time import picture_format
 
-    outputs = arguments.out, arguments.plot, arguments.signals
-    check_different("FILE, --array, --out, --plot and --signals",
+    outputs = arguments.out, arguments.plot, arguments.signals, arguments.jsonl
+    check_different("FILE, --array, --out, --plot, --signals and --jsonl",
                     arguments.array, *input_files(arguments), *outputs)  # fmt: skip
-    for name in filter(None, outputs):
-        check_output(name)
+    for name in outputs:
+        if name and (name != "-" or name != arguments.jsonl):
+            check_output(name)
     if arguments.plot:
         picture_format(arguments.plot)
     elif arguments.normalize:
@@ -37,7 +38,7 @@ def check_outputs(arguments: argparse.Namespace) -> None:
 
 def input_files(arguments: argparse.Namespace) -> list[str]:
     """Return the names of the recording's files."""
-    return [arguments.file] if isinstance(arguments.file, str) else list(arguments.file)
+    return [arguments.file] if isinstance(arguments.file, str) else list(arguments.file or ())
 
 
 def check_different(words: str, *names: str | None) -> None:
@@ -68,12 +69,13 @@ def refuse(arguments: argparse.Namespace, names: Iterable[str], reason: str) -> 
             raise ValueError(f"--{name} {reason}")
 
 
-def write_table(result: Run, path: str | None) -> None:
-    """Write the tracks file, to standard output without a path; say so if it has no row."""
+def write_table(result: Run, path: str | None, *, printed: bool = True) -> None:
+    """Write the tracks file, or print it without a path; say so if it has no row."""
     if next(iter(result.rows()), None) is None:
         print(f"arrivals: no source was found in {len(result)} steps", file=sys.stderr)
     if path:
         result.to_csv(path)
+    if path or not printed:
         return
     sys.stdout.write(",".join(result.header) + "\n")
     for row in result.rows():
@@ -90,10 +92,11 @@ def draw(path: str | None, result: Run, **picture: Any) -> None:
 
 
 @contextmanager
-def live_output(path: str | None) -> Iterator[Callable[[str], object]]:
-    """Return a function that writes lines at once; the first ones create the file."""
+def live_output(path: str | None, *, printed: bool = True) -> Iterator[Callable[[str], object]]:
+    """Return a function that writes lines at once, or prints them; the first create the file."""
     if path is None:
-        yield lambda lines: (sys.stdout.write(lines), sys.stdout.flush())
+        printing = lambda lines: (sys.stdout.write(lines), sys.stdout.flush())  # noqa: E731
+        yield printing if printed else len
         return
     with ExitStack() as stack:
         opened = cache(lambda: stack.enter_context(open_live(path)))

@@ -15,6 +15,8 @@ class _Files(argparse.Action):
     """One file by its name, several by a list."""
 
     def __call__(self, parser: Any, namespace: Any, values: Any, option: Any = None) -> None:
+        if not values:
+            return
         if len(values) > 1 and "-" in values:
             raise ValueError("standard input (-) must be the only file")
         setattr(namespace, self.dest, values[0] if len(values) == 1 else values)
@@ -30,7 +32,7 @@ def add_reading(option: Any, stream: str = "") -> None:
     stream : str
         Help about standard input, if it is read.
     """
-    option("file", metavar="FILE", nargs="+", action=_Files,
+    option("file", metavar="FILE", nargs="*" if stream else "+", action=_Files,
            help=f"recording; several files have the channels of one{stream}")  # fmt: skip
     add_file_options(option, "standard input or a raw file" if stream else "a raw file")
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 import argparse
 
 from arrivals.cli.outputs import Bar, check_outputs, refuse
-from arrivals.cli.standard_input import standard_input
+from arrivals.cli.standard_input import stream_input
 from arrivals.cli.track_band import track_band
 from arrivals.cli.track_snapshots import track_snapshots
 from arrivals.cli.track_sources import separates, track_sources
+from arrivals.live.options import LiveOptions
+from arrivals.live.views import LiveViews
 from arrivals.measurement_models import SensorArray
 from arrivals.recordings.choice.assembly import takes_samples
 
@@ -35,15 +37,19 @@ def track(arguments: argparse.Namespace, bar: Bar) -> None:
 
     array = SensorArray.from_file(arguments.array)
     check_outputs(arguments)
+    views = LiveViews(LiveOptions.of(arguments))
     one_thread = threadpool_limits(1, "blas")  # matrices are small: more threads only wait
-    with one_thread, standard_input(arguments):
+    with one_thread, stream_input(arguments, array), views:
         if separates(arguments):
+            reason = "requires a tracker of each step, not one of a whole recording"
+            refuse(arguments, ("serve", "live", "jsonl"), reason)
             refuse(arguments, ("normalize",), NO_BEAM)
             track_sources(arguments, array, bar)
         elif arguments.band and takes_samples(arguments.tracker):
             refuse(arguments, ("normalize",), NO_BEAM)
-            track_band(arguments, array, bar)
+            track_band(arguments, array, bar, views)
         else:
             if arguments.unknowns == "sphere":
                 refuse(arguments, ("normalize",), "requires directions over time, not on the sky")
-            track_snapshots(arguments, array, bar)
+            track_snapshots(arguments, array, bar, views)
+        views.close()

@@ -7,6 +7,9 @@ import argparse
 from arrivals.cli.models import n_stream_channels, printed_warnings
 from arrivals.cli.outputs import Bar, draw, live_output, refuse, write_table
 from arrivals.cli.reading import read_recording
+from arrivals.live.input.lag import LagMeter
+from arrivals.live.steps import LiveScene
+from arrivals.live.views import LiveViews
 from arrivals.measurement_models import SensorArray
 from arrivals.recordings.check import warn_of_faults
 from arrivals.recordings.choice.assembly import make_tracker
@@ -15,7 +18,9 @@ from arrivals.recordings.stream import track_live
 from arrivals.trackers import Tracker
 
 
-def track_band(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -> None:
+def track_band(
+    arguments: argparse.Namespace, array: SensorArray, bar: Bar, views: LiveViews
+) -> None:
     """Track by a tracker of single real samples, from a recording or a stream."""
     refuse(
         arguments,
@@ -25,7 +30,7 @@ def track_band(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -> N
     if arguments.snapshots not in (None, 1):
         raise ValueError("--snapshots requires snapshots, not a tracker of real samples")
     if arguments.file == "-":
-        _track_band_stream(arguments, array, bar)
+        _track_band_stream(arguments, array, bar, views)
         return
     recording = read_recording(arguments, array)
     if recording.is_narrowband:
@@ -33,21 +38,33 @@ def track_band(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -> N
     tracker, rate = _band_tracker(arguments, array, recording.rate)
     with printed_warnings():
         warn_of_faults(recording)
-    samples = bar(recording.samples, desc=arguments.tracker)
-    result = track_samples(tracker, samples, rate, every=arguments.hop or 1)
-    write_table(result, arguments.out)
+    every = arguments.hop or 1
+    views.open(_scene(arguments, arguments.file), tracker)
+    samples = enumerate(bar(recording.samples, desc=arguments.tracker))
+    watched = views.watch(tracker, ((k / rate, z) for k, z in samples), every)
+    result = track_samples(tracker, (z for _, z in watched), rate, every=every)
+    write_table(result, arguments.out, printed=not views.replaces_table)
     draw(arguments.plot, result, time=result.time)
 
 
-def _track_band_stream(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -> None:
+def _scene(arguments: argparse.Namespace, source: str) -> LiveScene:
+    """Return what the views know of a run before it starts."""
+    return LiveScene(f"{source}: {arguments.tracker}", line=True)
+
+
+def _track_band_stream(
+    arguments: argparse.Namespace, array: SensorArray, bar: Bar, views: LiveViews
+) -> None:
     refuse(arguments, ("plot", "variable", "transpose", "format"), "requires a file, not a stream")
     tracker, rate = _band_tracker(arguments, array, arguments.rate)
     n_channels = n_stream_channels(arguments.channels, array)
     frames = live_samples(arguments.source, n_channels, dtype=arguments.dtype or "int16")
     steps = ((k / rate, array.select(z)) for k, z in enumerate(frames))
-    with live_output(arguments.out) as write:
-        bars = bar(steps, desc=arguments.tracker)
-        if track_live(tracker, bars, write, every=arguments.hop or 1) == 0:
+    every, lag = arguments.hop or 1, LagMeter(arguments.received, arguments.late or "wait")
+    views.open(_scene(arguments, arguments.device or "standard input"), tracker, lag=lag)
+    with live_output(arguments.out, printed=not views.replaces_table) as write:
+        bars = views.watch(tracker, lag.steps(bar(steps, desc=arguments.tracker)), every)
+        if track_live(tracker, bars, write, every=every) == 0:
             raise ValueError("the stream ended before one sample of every channel")
 
 

@@ -5,14 +5,17 @@ from __future__ import annotations
 import argparse
 import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import BinaryIO
 
 import numpy as np
 
 from arrivals.cli.models import n_stream_channels, printed_warnings, require_speed
-from arrivals.cli.outputs import Bar, draw, live_output, refuse, write_table
+from arrivals.cli.outputs import Bar, draw, input_files, live_output, refuse, write_table
 from arrivals.cli.reading import read_recording
+from arrivals.live.input.lag import LagMeter
+from arrivals.live.steps import LiveScene
+from arrivals.live.views import LiveViews
 from arrivals.measurement_models import ArraySnapshot, SensorArray
 from arrivals.measurements import is_missing
 from arrivals.recordings.check import warn_of_faults
@@ -29,7 +32,9 @@ from arrivals.typing import Complex
 AHEAD_S = 2.0  # of a stream, on which the choice is based
 
 
-def track_snapshots(arguments: argparse.Namespace, array: SensorArray, bar: Bar) -> None:
+def track_snapshots(
+    arguments: argparse.Namespace, array: SensorArray, bar: Bar, views: LiveViews
+) -> None:
     """Track the snapshots of a recording or a stream."""
     require_speed(array, arguments)
     names = ("frequency", "frequencies", "center", "band")
@@ -43,12 +48,13 @@ def track_snapshots(arguments: argparse.Namespace, array: SensorArray, bar: Bar)
         arguments.follow, arguments.unknowns or "azimuth", arguments.nearest,
     )  # fmt: skip
     track = _track_stream if arguments.file == "-" else _track_file
-    track(arguments, array, options, bar)
+    track(arguments, array, options, bar, views)
 
 
 def _track_file(
-    arguments: argparse.Namespace, array: SensorArray, options: TrackOptions, bar: Bar
-) -> None:
+    arguments: argparse.Namespace, array: SensorArray, options: TrackOptions, bar: Bar,
+    views: LiveViews,
+) -> None:  # fmt: skip
     if options.frequencies and arguments.center is None:
         # refuse invalid arguments before the file is read
         with warnings.catch_warnings():
@@ -63,11 +69,24 @@ def _track_file(
         warn_of_faults(recording, min(choice.frequencies), plane_waves=choice.unknowns != "range")
     time = steps.time if np.isfinite(steps.time).all() else None
     announced = map(_announcement(choice, options, measurement), steps)
-    result = tracker.run(bar(announced, desc=choice.tracker, total=len(steps)))
+    views.open(_scene(arguments, choice, array), tracker, measurement=measurement)
+    bars = bar(announced, desc=choice.tracker, total=len(steps))
+    at: Iterable[float] = range(len(steps)) if time is None else time.tolist()
+    timed = ((t, z) for z, t in zip(bars, at, strict=True))  # the steps end first, and are checked
+    watched = views.watch(tracker, timed)
+    result = tracker.run(z for _, z in watched)
     result = result if time is None else result.at(time)
-    write_table(result, arguments.out)
+    write_table(result, arguments.out, printed=not views.replaces_table)
     draw(arguments.plot, result, snapshots=steps, measurement=measurement, time=time,
          normalize=arguments.normalize or "run")  # fmt: skip
+
+
+def _scene(arguments: argparse.Namespace, choice: Choice, array: SensorArray) -> LiveScene:
+    """Return what the views know of a run before it starts."""
+    files = ["standard input"] if arguments.file == "-" else input_files(arguments)
+    source = arguments.device or ", ".join(files)
+    kind = "sky" if choice.unknowns == "sphere" else "polar"
+    return LiveScene(f"{source}: {choice.tracker}", kind, array.dim == 1)
 
 
 def _announcement(
@@ -92,8 +111,9 @@ def _announcement(
 
 
 def _track_stream(
-    arguments: argparse.Namespace, array: SensorArray, options: TrackOptions, bar: Bar
-) -> None:
+    arguments: argparse.Namespace, array: SensorArray, options: TrackOptions, bar: Bar,
+    views: LiveViews,
+) -> None:  # fmt: skip
     refuse(arguments, ("plot", "variable", "transpose", "format"), "requires a file, not a stream")
     n_channels = n_stream_channels(arguments.channels, array)
     source, dtype = complex_frames(arguments.source, arguments.dtype or "int16")
@@ -109,8 +129,11 @@ def _track_stream(
     )  # fmt: skip
     announce = _announcement(choice, options, measurement)
     steps = ((time, announce(_completed(array.select(z), choice))) for time, z in frames)
-    with live_output(arguments.out) as write:
-        track_live(tracker, bar(steps, desc=choice.tracker), write)
+    lag = LagMeter(arguments.received, arguments.late or "wait")
+    views.open(_scene(arguments, choice, array), tracker, measurement=measurement, lag=lag)
+    with live_output(arguments.out, printed=not views.replaces_table) as write:
+        bars = lag.steps(bar(steps, desc=choice.tracker))
+        track_live(tracker, views.watch(tracker, bars), write)
 
 
 def _completed(z: Complex, choice: Choice) -> Complex:
