@@ -89,16 +89,16 @@ class Source:
 
 
 def follow(
-    received: Any, now: Any, late: str = "wait", start: float = 1.0
+    received: Any, now: Any, late: str = "wait", start: float = 1.0, spacing: float = 0.1
 ) -> tuple[list[float], list[bool], list[str]]:
-    """Return lags, whether steps have data, and messages, of steps every 0.1 s."""
+    """Return lags, whether steps have data, and messages, of 100 steps."""
     source, clock, messages = Source(), [0.0], list[str]()
     meter = LagMeter(source, late, messages.append, lambda: clock[0], start)  # type: ignore[arg-type]
 
     def steps() -> Iterator[tuple[float, Any]]:
         for k in range(100):
-            source.received, clock[0] = received(0.1 * k), now(0.1 * k)
-            yield 0.1 * k, np.ones(2, dtype=complex)
+            source.received, clock[0] = received(spacing * k), now(spacing * k)
+            yield spacing * k, np.ones(2, dtype=complex)
 
     lags, valid = [], []
     for _, z in meter.steps(steps()):
@@ -120,6 +120,14 @@ def test_lag_of_a_file_in_a_pipe_is_unknown_and_without_consequence() -> None:
     lags, valid, messages = follow(lambda t: 0.001 * t, lambda t: 0.3 * t, "drop")
     assert np.isnan(lags).all()
     assert all(valid)
+    assert messages == []
+
+
+def test_lag_of_a_file_in_a_pipe_is_unknown_after_a_pause_of_the_pipe() -> None:
+    lags, _, messages = follow(
+        lambda t: 0.01 * t + 5.0 * (t > 30.0), lambda t: 0.01 * t + 9.0, spacing=1.0
+    )
+    assert np.isnan(lags).all()
     assert messages == []
 
 

@@ -16,6 +16,7 @@ from arrivals.validation import one_of
 LIMIT = 0.5  # s behind the source at which there is a message
 WINDOW = 2.0  # s of the source, in which a live one takes that time
 BURST = 0.5  # s by which it may be faster: it delivers blocks
+AHEAD = 10.0  # s by which it may be ahead of time: what had waited for the program to start
 START = 5.0  # s of the source in which a run catches up, without a message
 LATE = ("wait", "drop")
 
@@ -66,6 +67,7 @@ class LagMeter:
         self._report = report or (lambda text: print(f"arrivals: {text}", file=sys.stderr))
         self._reported = self._live = False
         self._window: deque[tuple[float, float]] = deque()
+        self._first: tuple[float, float] | None = None
 
     @property
     def lag(self) -> float:
@@ -100,8 +102,10 @@ class LagMeter:
         window.append((at, received))
         while len(window) > 2 and at - window[1][0] >= WINDOW:
             window.popleft()
-        first_at, first_received = window[0]
-        return at - first_at >= WINDOW and received - first_received > at - first_at - BURST
+        self._first = self._first or window[0]
+        passed, taken = np.subtract((at, received), window[0])
+        ahead = at - self._first[0] - (received - self._first[1])
+        return bool(passed >= WINDOW and taken > passed - BURST and ahead < AHEAD)
 
     def close(self) -> None:
         """Say how many steps were left out."""
