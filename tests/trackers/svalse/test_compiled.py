@@ -5,6 +5,7 @@ import sys
 import types
 import warnings
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -126,6 +127,23 @@ def test_compiled_solver_with_few_iterations_equals_arrays() -> None:
             for compiled in (True, False)
         )
         assert_same(one, other)
+
+
+def test_digest_changes_with_any_source_below(tmp_path: Path) -> None:
+    (tmp_path / "part").mkdir()
+    (tmp_path / "solve.py").write_text("whole = 1")
+    (tmp_path / "part" / "step.py").write_text("STEP = 1")
+    before = compiler.digest(tmp_path)
+    assert compiler.digest(tmp_path) == before
+    (tmp_path / "part" / "step.py").write_text("STEP = 2")
+    assert compiler.digest(tmp_path) != before
+
+
+@pytest.mark.skipif(not HAS_NUMBA, reason="needs numba")
+def test_compiled_solver_is_kept_under_the_digest_of_its_sources() -> None:
+    from arrivals.trackers.svalse.newton.compiled.solve import solve_all
+
+    assert solve_all.__qualname__ == f"solve_all_{compiler.digest(compiler.SOURCES)}"
 
 
 def test_compiled_required_without_kernel_names_the_case() -> None:

@@ -4,21 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
+from hashlib import sha256
+from pathlib import Path
 from typing import Any, TypeVar
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+SOURCES = Path(__file__).parents[1]  # all that compiled functions use, and its constants
 MIN_NUMBA = (0, 61)  # the first for numpy 2.1 and later
 
 
 def compiled(function: Function) -> Function:
-    """Return a function that is compiled at its first call, and kept on disk; or as it is."""
-    return _with_options(function)
+    """Return a function that is compiled at its first call, and kept on disk; or as it is.
+
+    The name of its file has a digest of all sources: numba itself compiles anew if the function's
+    own module has changed, but not if others have.
+    """
+    if compiler_error() is None:
+        function.__qualname__ += f"_{digest(SOURCES)}"
+    return _with_options(function, cache=True)
 
 
 def compiled_part(function: Function) -> Function:
-    """Return the same for a function that only compiled functions call: it compiles faster.
+    """Return the same for a function that only compiled functions call, and that they include.
 
-    It has no form that Python could call.
+    It has no file, and no form that Python could call: it compiles faster.
     """
     return _with_options(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
@@ -30,8 +39,14 @@ def _with_options(function: Function, **options: bool) -> Function:
 
     jit: Any = numba.njit
     # no fast math: sums reordered by what is inlined differ between compiled and loaded functions
-    result: Function = jit(function, cache=True, error_model="numpy", **options)
+    result: Function = jit(function, error_model="numpy", **options)
     return result
+
+
+def digest(folder: Path) -> str:
+    """Return a digest of the Python files of a folder and those below."""
+    sources = sorted(folder.rglob("*.py"))
+    return sha256(b"".join(each.read_bytes() for each in sources)).hexdigest()[:16]
 
 
 @cache

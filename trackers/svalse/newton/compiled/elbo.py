@@ -54,25 +54,23 @@ def set_responses(chart: ChartNumbers, e: Terms) -> None:
 def set_products(e: Terms) -> None:
     """Set X: âᴴâ, (∂â)ᴴâ, (∂²â)ᴴâ, and (∂â)ᴴ∂â where it is not -(∂²â)ᴴâ; and h."""
     a, X, h, K, (M, N) = e.responses, e.X, e.h, e.K[0], e.Y.shape[1:]
-    conj, slope = np.empty((K + N, M), dtype=np.complex128), np.empty((K, M), dtype=np.complex128)
+    conj = np.empty((2 * K + N, M), dtype=np.complex128)
+    n = K + N + (K if X.shape[1] > 3 else 0)  # columns that are used
     for f in range(a.shape[0]):
         for m in range(M):
             for c in range(K):
-                conj[c, m], slope[c, m] = np.conj(a[f, c, 0, m]), a[f, c, 1, m]
-            for n in range(N):
-                conj[K + n, m] = np.conj(e.Y[f, m, n])
-        products = np.dot(a[f].reshape(-1, M)[: 3 * K], conj.T)  # conjugates of X and h
+                conj[c, m], conj[K + N + c, m] = np.conj(a[f, c, 0, m]), np.conj(a[f, c, 1, m])
+            for i in range(N):
+                conj[K + i, m] = np.conj(e.Y[f, m, i])
+        products = np.dot(a[f].reshape(-1, M)[: 3 * K], conj[:n].T)  # conjugates of X and h
         for c in range(K):
             for p in range(3):
                 for j in range(K):
                     X[f, p, c, j] = np.conj(products[3 * c + p, j])
-                for n in range(N):
-                    h[f, p, c, n] = np.conj(products[3 * c + p, K + n])
-        if X.shape[1] > 3:
-            for c in range(K):
-                for m in range(M):
-                    conj[c, m] = np.conj(slope[c, m])
-            X[f, 3, :K, :K] = np.dot(conj[:K], slope.T)
+                for i in range(N):
+                    h[f, p, c, i] = np.conj(products[3 * c + p, K + i])
+            for j in range(n - K - N):
+                X[f, 3, c, j] = np.conj(products[3 * c + 1, K + N + j])
 
 
 @compiled_part
