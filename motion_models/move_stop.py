@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -84,12 +85,12 @@ class MoveStopWalk(FrozenModel):
                 raise ValueError(f"{name} must lie in (0, 1); got {getattr(self, name)}")
         positive("slow", self.slow)
 
-    @property
+    @cached_property
     def weights(self) -> Float:
         """Weights of the modes when they are drawn."""
         return np.array([self.still, 1 - self.still])
 
-    @property
+    @cached_property
     def relative_variances(self) -> Float:
         """Variances of the modes' steps, relative to that of the moving one."""
         return np.array([self.slow**2, 1.0])

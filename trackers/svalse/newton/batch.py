@@ -39,6 +39,12 @@ class BatchRecord:
     def __len__(self) -> int:
         return len(next(iter(vars(self).values())))
 
+    def changed(self, **parts: Any) -> Self:
+        """Return the record with other parts: `dataclasses.replace`, without its checks."""
+        new = object.__new__(type(self))
+        new.__dict__ = {**self.__dict__, **parts}
+        return new
+
     def select(self, rows: Bool) -> Self:
         """Return the rows that are set."""
         if all_set(rows):

@@ -168,8 +168,10 @@ def add_candidates(
         trace = trace_of_product(grid.birth_precision[:, None], S)
         kl = kl + grid.birth_quadratic + 0.5 * trace
     gain = evidence.gain + log_odds[:, None] - kl_weight * kl
-    rows, best = np.arange(len(evaluation)), gain.argmax(axis=1)
-    layout = evaluation.components.layout
+    rows, best, layout = np.arange(len(gain)), gain.argmax(axis=1), evaluation.components.layout
+    may_return = bool(removed.can_reactivate.any())
+    if not (may_return or any_set(gain[rows, best] > 0)):
+        return NewComponents(Components.zeros(len(gain), 1, layout), np.zeros_like(best))
     components = Components.zeros(len(rows), max(int(room.max()), 1), layout)
     components = components.with_slots(np.array(-1))
     components.log_odds[...] = log_odds[:, None]
@@ -179,7 +181,7 @@ def add_candidates(
     new = NewComponents(components, (gain[rows, best] > 0).astype(np.int64))
     if room.max() > 1:
         new = secondary_peaks(grid, new, gain, evidence, room)
-    if removed.can_reactivate.any():
+    if may_return:
         reactivate(grid, new, gain[rows, best], evidence, removed, kl_weight)
     return new
 

@@ -8,13 +8,18 @@ use. A bin has N snapshots.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from arrivals.symmetric import identity, log_det, places
 from arrivals.trackers.svalse.newton.batch import BatchRecord, Components
-from arrivals.trackers.svalse.newton.expected_response import ExpectedResponse, diagonals
+from arrivals.trackers.svalse.newton.expected_response import (
+    ExpectedResponse,
+    diagonals,
+    numbers,
+)
+from arrivals.trackers.svalse.newton.linear_algebra import inverse_and_log_det
 from arrivals.typing import Bool, Complex, Float, Int
 
 LOG_2PIE = float(np.log(2 * np.pi * np.e))
@@ -103,8 +108,7 @@ class Evaluation(BatchRecord):
         L = max(*self.K.tolist(), 1)
         if self.used.shape[1] == L:
             return self
-        return replace(
-            self,
+        return self.changed(
             components=self.components.first(L),
             used=self.used[:, :L],
             A=self.A[:, :, :L],
@@ -120,7 +124,7 @@ class Evaluation(BatchRecord):
 
     def criterion(self, kl_weight: float) -> Float:
         """Return the support criterion F + (1 - kl_weight) Σ D, (B,)."""
-        return np.asarray(self.F + (1 - kl_weight) * self.D.sum(axis=1))
+        return np.asarray(self.F + (1 - kl_weight) * np.add.reduce(self.D, axis=1))
 
 
 def evaluate(
@@ -151,7 +155,7 @@ def evaluate(
         D, each = D * used, each * used
         prior_gradient = prior_gradient * used[:, None]
         prior_curvature = prior_curvature * used[:, None]
-    log_prior = log_prior_inactive + each.sum(axis=1)
+    log_prior = log_prior_inactive + np.add.reduce(each, axis=1)
     W, G, explained, F = amplitudes(response, X[:, :, 0], h[:, :, 0], used, K, nu, tau)
     return Evaluation(
         Y=Y, components=components, K=K, used=used, nu=nu, tau=tau,
@@ -169,7 +173,7 @@ def with_variances(
     J, H = evaluation.X[:, :, 0], evaluation.h[:, :, 0]
     W, G, explained, F = amplitudes(response, J, H, evaluation.used, evaluation.K, nu, tau)
     F = F + evaluation.log_prior
-    return replace(evaluation, nu=nu, tau=tau, W=W, G=G, explained=explained, F=F)
+    return evaluation.changed(nu=nu, tau=tau, W=W, G=G, explained=explained, F=F)
 
 
 def amplitudes(
@@ -179,18 +183,16 @@ def amplitudes(
 
     F = Σ [Re tr HᴴŴ/ν - M N/ν - M N ln πν + N K ln ν/τ - N ln det(J + ν/τ I)] over bins, over T.
     """
-    M, N = response.n_sensors, H.shape[3]
-    ratio = nu / tau
+    B, n_bins, L, N = H.shape
+    MN, ratio = response.n_sensors * N, nu / tau
     regularised = J.copy()
     ridge = ratio[:, :, None]
-    if min(K.tolist()) < J.shape[3]:  # 1 where unused: no part in the determinant
+    if min(K.tolist()) < L:  # 1 where unused: no part in the determinant
         ridge = np.where(used[:, None], ridge, 1.0)
     diagonals(regularised)[...] += ridge
-    G = np.asarray(np.linalg.inv(regularised), dtype=np.complex128)
+    G, log_det = inverse_and_log_det(regularised)
     W = G @ H
-    explained = (H.conj() * W).real.sum(axis=(2, 3))
-    volume = K[:, None] * np.log(ratio) - np.linalg.slogdet(regularised)[1]
-    if N > 1:
-        volume = N * volume
-    F = (explained - M * N) / nu - M * N * np.log(np.pi * nu) + volume
-    return W, G, explained, response.total(F)
+    explained = np.vecdot(H.reshape(B, n_bins, L * N), W.reshape(B, n_bins, L * N)).real
+    fit, n, r, volume, k = numbers(explained, nu, ratio, log_det, K[:, None])
+    F = (fit - MN) / n - MN * np.log(np.pi * n) + N * (k * np.log(r) - volume)
+    return W, G, explained, response.total(np.reshape(F, nu.shape))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -73,6 +73,8 @@ class ExpectedResponse:
         self.chart = chart_of(manifold)
         self.n_unknowns = self.chart.layout.n_unknowns
         self.extent, self.norm2 = self.chart.extent, self.chart.norm2
+        self.diagonal = np.zeros((self.n_bins, 1 + self.n_unknowns * (self.n_unknowns + 3) // 2, 1))
+        self.diagonal[:, 0] = self.norm2  # of X, where ‖a‖² is constant
 
     def products(
         self, Y: Complex, x: Float, s: Float, used: Bool | None
@@ -96,12 +98,11 @@ class ExpectedResponse:
             X = np.concatenate([X, second.swapaxes(3, 4).reshape(B, F, d * d, L, L)], axis=2)
         own = diagonals(X)
         size = own[:, :, 0].real.copy()
-        own[...] = 0
         norms = self.chart.norms(x, s)
         if norms is None:
-            own[:, :, 0] = self.norm2 if used is None else self.norm2 * used[:, None]
-        else:
-            own[:, :, :P] = norms if used is None else norms * used[:, None, None]
+            norms = self.diagonal
+        own[:, :, :P] = norms if used is None else norms * used[:, None, None]
+        own[:, :, P:] = 0
         return A, X, h, own[:, :, 0].real - size
 
     def total(self, x: Float) -> Float:
@@ -114,6 +115,17 @@ def diagonals(X: Array) -> Array:
     """Return the diagonals (..., L) of contiguous matrices (..., L, L), to be read and written."""
     L = X.shape[-1]
     return X.reshape(*X.shape[:-2], L * L)[..., :: L + 1]
+
+
+def numbers(*arrays: Any) -> tuple[Any, ...]:
+    """Return arrays (B, F) as they are, of one problem and bin as numbers: ten times as fast.
+
+    Examples
+    --------
+    >>> numbers(np.ones((2, 1)))[0].shape, float(numbers(np.ones((1, 1)))[0])
+    ((2, 1), 1.0)
+    """
+    return tuple([x[0, 0] for x in arrays]) if arrays[0].size == 1 else arrays
 
 
 def over_snapshots(x: Array) -> Array:

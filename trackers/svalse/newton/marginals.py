@@ -72,8 +72,9 @@ def component_covariances(response: ExpectedResponse, evaluation: Evaluation) ->
     curvature = slopes(response, evaluation, v, P)[1]
     N = negative_hessian(response, evaluation, P, curvature)
     used = np.tile(evaluation.used, response.n_unknowns)
-    N = np.where(used[:, :, None] & used[:, None, :], N, 0.0)
-    diagonals(N)[...] += ~used
+    if not used.all():
+        N = np.where(used[:, :, None] & used[:, None, :], N, 0.0)
+        diagonals(N)[...] += ~used
     return marginal_covariances(N, response.n_unknowns, response.chart.max_variance)
 
 

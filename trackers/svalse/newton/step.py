@@ -14,8 +14,10 @@ from arrivals.trackers.svalse.newton.elbo import Evaluation, evaluate, with_vari
 from arrivals.trackers.svalse.newton.expected_response import (
     ExpectedResponse,
     diagonals,
+    numbers,
     over_snapshots,
 )
+from arrivals.trackers.svalse.newton.linear_algebra import clipped_solution
 from arrivals.typing import Bool, Complex, Float
 
 ROUNDING = 1e-7  # nats
@@ -23,7 +25,6 @@ ROUNDING = 1e-7  # nats
 # decrease F however short the step of the unknowns.
 BACKTRACKING = ((1 / 4, 1.0), (1 / 16, 1.0), (1 / 64, 1.0), (1 / 16, 1 / 16), (1 / 256, 1 / 256))
 MIN_FREEDOM_SHARE = 0.15  # of the data, that is left for the noise
-MIN_RELATIVE_CURVATURE = 1e-3  # smaller eigenvalues are clipped to this fraction of the largest
 
 
 def newton_step(
@@ -71,7 +72,7 @@ def slopes(
     d, n = response.n_unknowns, evaluation.h.shape[2]
     # Re (∂â)ᴴη and Re (∂²â)ᴴη, with ηₗ = 2/ν Σ w*ₗ y - 2 Σ Pₗₗ' âₗ' over all others   (33)
     alone = over_snapshots(v[:, :, None] * evaluation.h[:, :, 1:])
-    others = (P[:, :, None] * evaluation.X[:, :, 1:n]).sum(axis=4)
+    others = np.add.reduce(P[:, :, None] * evaluation.X[:, :, 1:n], axis=4)
     both = 2 * response.total((alone - others).real)
     return both[:, :d] - evaluation.prior_gradient, evaluation.prior_curvature - both[:, d:]
 
@@ -86,10 +87,11 @@ def negative_hessian(
     d, W = response.n_unknowns, evaluation.W
     B_, F, L, N = W.shape
     TA = evaluation.X[:, :, 1 : 1 + d]
-    # a matrix for each snapshot, row (i, l): the derivative of h - (J + ν/τ I) w in xᵢ of l
-    rows = -W.swapaxes(2, 3)[:, :, :, None, :, None]
-    B: Complex = np.multiply(TA.conj()[:, :, None], rows, order="C")
-    own = evaluation.h[:, :, 1 : 1 + d] - TA @ W[:, :, None]
+    # a matrix for each snapshot, row (i, l): the derivative of (J + ν/τ I) w - h in xᵢ of l
+    B: Complex = np.multiply(
+        TA.conj()[:, :, None], W.swapaxes(2, 3)[:, :, :, None, :, None], order="C"
+    )
+    own = TA @ W[:, :, None] - evaluation.h[:, :, 1 : 1 + d]
     diagonals(B)[...] += own.transpose(0, 1, 4, 2, 3)
     B = B.reshape(B_, F, N, d * L, L)
     gained = (B.conj() @ evaluation.G[:, :, None] @ B.swapaxes(3, 4)).real
@@ -116,11 +118,7 @@ def ascent_direction(g: Float, N: Float, longest: float) -> Float:
 
     No component moves by more than `longest`.
     """
-    eigenvalues, V = np.linalg.eigh(N)
-    steep = np.abs(eigenvalues)
-    steep = np.maximum(steep, MIN_RELATIVE_CURVATURE * steep.max(axis=1, keepdims=True) + 1e-300)
-    flat = g.reshape(len(g), -1, 1)
-    d = (V @ ((V.swapaxes(1, 2) @ flat) / steep[:, :, None])).reshape(g.shape)
+    d = clipped_solution(N, g.reshape(len(g), -1)).reshape(g.shape)
     size = np.abs(d) if g.shape[1] == 1 else np.hypot(d[:, :1], d[:, 1:])
     size = size.max(axis=2, keepdims=True)
     return np.asarray(d * np.minimum(1.0, longest / np.maximum(size, 1e-300)))
@@ -164,24 +162,26 @@ def update_variances(response: ExpectedResponse, old: Evaluation) -> Evaluation:
     nearer to it. Where F decreases the EM step (58) is taken, for which it cannot.
     """
     M, N = old.Y.shape[2:]
-    K, ratio = old.K[:, None], old.nu / old.tau
     w2 = over_snapshots(old.W.real**2 + old.W.imag**2)
-    energy = w2.sum(axis=2)
-    trace = amplitude_traces(old)
+    energy, S = np.add.reduce(w2, axis=2), uncertainty_losses(response, old, w2)
+    nu, tau, K, explained, energy, trace, S = numbers(
+        old.nu, old.tau, old.K[:, None], old.explained, energy, amplitude_traces(old), S
+    )
+    ratio = nu / tau
     # ‖Y‖² - 2 Re tr HᴴŴ + tr ŴᴴJŴ, since JŴ = H - ν/τ Ŵ and ‖Y‖² = M N
-    E = M * N - old.explained - ratio * energy
+    E = M * N - explained - ratio * energy
     gamma = N * (K - ratio * trace)  # N tr JG
-    S = uncertainty_losses(response, old, w2)
-    freedom = np.maximum(M * N - gamma - S / old.nu, MIN_FREEDOM_SHARE * M * N)
-    nu = np.maximum((E - S) / freedom, response.noise_floor)
+    freedom = np.maximum(M * N - gamma - S / nu, MIN_FREEDOM_SHARE * M * N)
+    new_nu = np.maximum((E - S) / freedom, response.noise_floor)
     # τ = Σ (|ŵ|² + ν G) / N K   (59)
-    tau = (energy + N * old.nu * trace) / np.maximum(N * K, 1)
+    tau = (energy + N * nu * trace) / np.maximum(N * K, 1)
+    # ν = (E + ν N tr JG) / M N   (58)
+    em = np.maximum((E + nu * gamma) / (M * N), response.noise_floor)
+    nu, tau, em = (np.reshape(each, old.nu.shape) for each in (new_nu, tau, em))
     new = with_variances(response, old, nu, floored(response, old, nu, tau))
     worse = decreased(new, old)
     if any_set(worse):
-        # ν = (E + ν N tr JG) / M N   (58)
-        em = np.maximum((E + old.nu * gamma) / (M * N), response.noise_floor)[worse]
-        part = old.select(worse)
+        part, em = old.select(worse), em[worse]
         tau = floored(response, part, em, tau[worse])
         new = new.replace_rows(worse, with_variances(response, part, em, tau))
     return new
@@ -200,13 +200,13 @@ def noise_freedom(response: ExpectedResponse, evaluation: Evaluation) -> Float:
 
 def amplitude_traces(evaluation: Evaluation) -> Float:
     """Return tr G of the used slots, (B, F)."""
-    return np.asarray((diagonals(evaluation.G).real * evaluation.used[:, None]).sum(axis=2))
+    return np.asarray(np.vecdot(diagonals(evaluation.G).real, evaluation.used[:, None]))
 
 
 def uncertainty_losses(response: ExpectedResponse, evaluation: Evaluation, w2: Float) -> Float:
     """Return the power lost by uncertainty, (B, F), at most half of all the amplitudes' d."""
     most = 0.5 * response.n_unknowns * response.tempering * evaluation.K[:, None] * evaluation.nu
-    return np.asarray(np.minimum((w2 * evaluation.uncertainty_loss).sum(axis=2), most))
+    return np.asarray(np.minimum(np.vecdot(w2, evaluation.uncertainty_loss), most))
 
 
 def floored(response: ExpectedResponse, old: Evaluation, nu: Float, tau: Float) -> Float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -138,7 +138,7 @@ class SupportSearch:
             near = rows & (k >= 0)
             excluded = state.removed.excluded.copy()
             excluded[near] |= self.grid.exclusion(state.evaluation, near, k)
-            state.removed = replace(state.removed, excluded=excluded)
+            state.removed = state.removed.changed(excluded=excluded)
             self.remove(state, near, k, can_reactivate=False)
             k = self.grid.first_duplicate(state.evaluation)
 
@@ -164,7 +164,7 @@ class SupportSearch:
         memory.packed[index, :, slot] = old.components.packed[index, :, k]
         tracked = slot < flags.shape[1]
         flags[index[tracked], slot[tracked]] = can_reactivate
-        state.removed = replace(state.removed, memory=memory, can_reactivate=flags)
+        state.removed = state.removed.changed(memory=memory, can_reactivate=flags)
         count_change(state, rows)
         kept = old.components.select(rows).without(k)
         self.set_components(state, rows, kept, old.K[rows] - 1)
@@ -289,7 +289,7 @@ def assign_slots(state: SolverState, rows: Bool) -> None:
     active = now.used & rows[:, None]
     new = active & (slot < 0)
     slot = np.where(new, state.n_known[:, None] + np.cumsum(new, axis=1) - 1, slot)
-    state.evaluation = replace(now, components=now.components.with_slots(slot))
+    state.evaluation = now.changed(components=now.components.with_slots(slot))
     state.n_known = state.n_known + new.sum(axis=1)
     packed, n_known = removed.memory.packed, int(state.n_known.max())
     if n_known > packed.shape[2]:
@@ -297,4 +297,4 @@ def assign_slots(state: SolverState, rows: Bool) -> None:
     flags = removed.can_reactivate.copy()
     tracked = active & (slot < flags.shape[1])
     flags[np.nonzero(tracked)[0], slot[tracked]] = False
-    state.removed = replace(removed, memory=removed.memory.like(packed), can_reactivate=flags)
+    state.removed = removed.changed(memory=removed.memory.like(packed), can_reactivate=flags)

@@ -12,10 +12,10 @@ from arrivals.trackers.svalse.newton.compiled.records import (
     ChartNumbers,
     Terms,
 )
+from arrivals.trackers.svalse.newton.linear_algebra import MIN_RELATIVE_CURVATURE
 from arrivals.trackers.svalse.newton.step import (
     BACKTRACKING,
     MIN_FREEDOM_SHARE,
-    MIN_RELATIVE_CURVATURE,
     ROUNDING,
 )
 from arrivals.typing import Float
