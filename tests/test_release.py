@@ -20,8 +20,6 @@ ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 FORMS = sorted((ROOT / ".github" / "ISSUE_TEMPLATE").glob("[!c]*.yml"))
 WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
-ARCHIVE = (ROOT / "PKG-INFO").exists()  # it has no files whose names begin with a dot
-in_repository = pytest.mark.skipif(ARCHIVE, reason="not part of a source archive")
 
 
 def text(name: str) -> str:
@@ -86,15 +84,13 @@ def test_classifiers_name_the_versions_of_python_that_are_tested() -> None:
     classified = [each.rpartition(" ")[2] for each in PROJECT["classifiers"] if prefix in each]
     assert classified[0] == PROJECT["requires-python"].removeprefix(">=")
     assert f"{sys.version_info.major}.{sys.version_info.minor}" in classified
-    if not ARCHIVE:
-        jobs = yaml.safe_load(text(".github/workflows/tests.yml"))["jobs"]
-        assert jobs["tests"]["strategy"]["matrix"]["python"] == classified
+    jobs = yaml.safe_load(text(".github/workflows/tests.yml"))["jobs"]
+    assert jobs["tests"]["strategy"]["matrix"]["python"] == classified
 
 
 # scripts and workflows
 
 
-@in_repository
 @pytest.mark.parametrize("workflow", WORKFLOWS, ids=lambda path: path.stem)
 def test_workflow_calls_scripts_that_exist_and_can_be_run(workflow: Path) -> None:
     scripts = [name for command in commands(workflow) for name in re.findall(r"\.ci/\w+", command)]
@@ -103,14 +99,12 @@ def test_workflow_calls_scripts_that_exist_and_can_be_run(workflow: Path) -> Non
         assert os.access(ROOT / name, os.X_OK), name
 
 
-@in_repository
 def test_every_script_of_the_checks_is_called_by_a_workflow() -> None:
     called = set(re.findall(r"^(\.ci/\w+)", text(".ci/run"), re.MULTILINE))
     assert {".ci/tests", ".ci/checks", ".ci/package"} <= called
     assert called <= set(re.findall(r"\.ci/\w+", "\n".join(chain(*map(commands, WORKFLOWS)))))
 
 
-@in_repository
 def test_called_workflows_take_calls() -> None:
     publish = yaml.safe_load(text(".github/workflows/publish.yml"))["jobs"]
     called = [Path(job["uses"]) for job in publish.values() if "uses" in job]
@@ -121,7 +115,6 @@ def test_called_workflows_take_calls() -> None:
     assert publish["publish"]["permissions"] == {"id-token": "write"}
 
 
-@in_repository
 @pytest.mark.parametrize("form", FORMS, ids=lambda path: path.stem)
 def test_issue_form_has_what_its_format_requires(form: Path) -> None:
     fields = yaml.safe_load(form.read_text(encoding="utf-8"))

@@ -80,12 +80,12 @@ def test_check_of_names_finds_a_missing_page(check_site: ModuleType, tmp_path: P
 
 
 def test_reference_has_every_package_with_public_names(check_site: ModuleType) -> None:
-    folder = ROOT / "src" / "arrivals"
+    homes = {top: Path(importlib.import_module(f"arrivals.{top}").__path__[0]) for top in PACKAGES}
     inside = ("arrivals.trackers.svalse.", "arrivals.scenarios.simulations.")  # parts of a package
     names = {"arrivals"} | {
-        ".".join(("arrivals", *file.parent.relative_to(folder).parts))
-        for top in PACKAGES
-        for file in (folder / top).rglob("__init__.py")
+        ".".join(("arrivals", top, *file.parent.relative_to(home).parts))
+        for top, home in homes.items()
+        for file in home.rglob("__init__.py")
     }
     public = {name for name in names if getattr(importlib.import_module(name), "__all__", [])}
     public -= {name for name in public if name.startswith(inside)}

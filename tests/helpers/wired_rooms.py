@@ -13,7 +13,7 @@ LINE = SensorArray.ula(7, spacing=0.04, speed=343.0)
 SQUARE = SensorArray(0.03 * np.array([[1.0, 1.0], [-1, 1], [-1, -1], [1, -1]]), 343.0)
 
 
-def talk_in_room(array: SensorArray, seed: int = 0, seconds: float = 3.0) -> Float:
+def talk_in_room(array: SensorArray, seed: int = 0, seconds: float = 2.0) -> Float:
     """Return samples (n_samples, n_sensors) of three talkers, one after the other, and noise."""
     rng, n = np.random.default_rng(seed), int(seconds * RATE)
     room, centre = Shoebox((6.0, 5.0, 2.8), rt60=0.25, order=4), np.array([2.9, 2.4, 1.2])

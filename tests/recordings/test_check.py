@@ -123,9 +123,8 @@ def test_wrong_lengths_are_a_fault_with_the_unit(factor: float, words: str) -> N
 
 def test_millimetres_for_metres_of_a_short_recording_are_a_fault() -> None:
     assert faults(checked(TALK, SensorArray(1000 * CIRCLE.positions, 343.0))) == [("scale", ())]
-    assert (
-        "wrong lengths" in checked(ON_SQUARE, SensorArray(100 * SQUARE.positions, 343.0)).notes[0]
-    )
+    square = talk_in_room(SQUARE, 2, seconds=3.0)
+    assert "wrong lengths" in checked(square, SensorArray(100 * SQUARE.positions, 343.0)).notes[0]
 
 
 def test_wrong_lengths_of_a_line_are_a_note_as_waves_from_its_side_have_no_delays_either() -> None:
