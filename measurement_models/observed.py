@@ -112,7 +112,7 @@ def complex_snapshot(z: ArrayLike | None, shape: tuple[int, ...]) -> Complex:
     """
     if type(z) is np.ndarray and z.dtype == np.complex128 and z.shape == shape:
         power = np.vdot(z, z).real  # far below the limit, |z|² does not overflow
-        if power < LARGEST and np.abs(z).min() >= SMALLEST:
+        if power < LARGEST and (_none_is_tiny(z.real) or _none_is_tiny(z)):
             return z.copy()  # the usual case
     array = numbers("z", np.nan if z is None else z)
     if array.shape != shape:
@@ -125,6 +125,10 @@ def complex_snapshot(z: ArrayLike | None, shape: tuple[int, ...]) -> Complex:
     if not (size >= SMALLEST).all():
         array[size < SMALLEST], array[np.isnan(size)] = 0, MISSING
     return array
+
+
+def _none_is_tiny(z: Complex | Float) -> bool:
+    return bool(np.abs(z).min() >= SMALLEST)
 
 
 def _size(z: Complex) -> Float:

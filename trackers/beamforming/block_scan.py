@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from arrivals.measurement_models.array_snapshot import ArraySnapshot
 from arrivals.measurement_models.arrays.noise_coherence import NoiseCoherence
-from arrivals.measurements import is_complete
+from arrivals.measurements import all_true, is_complete
 from arrivals.trackers.beamforming.scan_grid import ScanGrid
 from arrivals.trackers.beamforming.spectrum import mean_beam_power
 from arrivals.trackers.gaussian.linalg import identity, lapack
@@ -173,7 +173,7 @@ def part_in_use(model: ArraySnapshot, sensors: Bool, bins: Bool | None) -> Array
     >>> part_in_use(model, np.arange(5) > 0, np.array([False, True])).shape
     (4,)
     """
-    if sensors.all() and (bins is None or bins.all()):
+    if all_true(sensors) and (bins is None or all_true(bins)):
         return model
     return _part(model, sensors.tobytes(), b"" if bins is None else bins.tobytes())
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from arrivals.measurements import is_complete
+from arrivals.measurements import all_true, is_complete
 from arrivals.trackers.beamforming.source_number import number_of_sources
 from arrivals.typing import Bool, Complex, Float
 
@@ -112,7 +112,7 @@ class PatternSums:
         """Return the sums with the snapshots of a step: one product for each set and bin."""
         bins, M = self.weights.shape[1:], z.shape[-1]
         Y = z.reshape(*bins, -1, M)
-        if len(self.valid) == 1 and self.valid.all():
+        if len(self.valid) == 1 and all_true(self.valid):
             products = Y.swapaxes(-1, -2) @ Y.conj()
             if is_complete(products):  # the usual case
                 n = Y.shape[-2]
@@ -166,7 +166,7 @@ class PatternSums:
                 self.valid, self.products[:, bins], self.weights[:, bins], squared_weight
             )
             return some.select(sensors)
-        if sensors.all() and len(self.weights) == 1:
+        if len(self.weights) == 1 and all_true(sensors):
             return self
         valid, index = np.unique(self.valid[:, sensors], axis=0, return_inverse=True)
         shape = (len(valid), *self.products.shape[1:-2], *2 * valid.shape[1:])
@@ -195,7 +195,7 @@ class PatternSums:
             The weighted mean of the outer products, if all snapshots are complete.
         """
         sums = self.select(sensors, bins)
-        if not sums.valid.all():
+        if not all_true(sums.valid):
             return expected_covariance(sums)
         if len(sums.weights) == 1:
             return sums.products[0] / sums.weights[0, ..., None, None]  # type: ignore[no-any-return]

@@ -229,7 +229,7 @@ class SubspaceTracker(DirectionTracker, Generic[F]):
             if model.n_bins == 1:  # one of several is left
                 values, vectors = values[0], vectors[0]
         n_sources = 0
-        if values[..., 0].any():
+        if np.count_nonzero(values[..., 0]):
             n_sources = self._number_of_sources(values, weights[valid_sensors])
         K = min(n_sources, finder.max_sources)
         return (finder, Subspaces(vectors[..., :K], vectors[..., K:])) if K > 0 else None
