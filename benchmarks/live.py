@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from live_scene import BLOCK, RATE, TURN, moving_sources
 
+from arrivals.live.input.lag import START
 from arrivals.measurement_models import SensorArray
 
 ARRAY = 'kind = "uca"\nn_sensors = 8\nradius = 0.05\nspeed = 343.0\n'
@@ -67,10 +68,15 @@ def lag(seconds: float, browser: bool) -> None:
         cpu = processor_time(run.pid)
         run.kill()
         steps = [json.loads(line) for line in (Path(name) / "a.jsonl").read_text().splitlines()]
-    late = np.array([step["lag_s"] for step in steps if step["lag_s"] is not None])
+    known = [(step["time_s"], step["lag_s"]) for step in steps if step["lag_s"] is not None]
+    at, late = np.array(known).T
+    behind = at[late > 2 * STEP]
+    caught_up = behind[behind < START].max(initial=0.0)
+    late = late[at >= START]
     median, p95, p99 = np.quantile(late, [0.5, 0.95, 0.99])
     print(
-        f"lag of {len(late)} of {len(steps)} steps of {1e3 * STEP:.0f} ms, "
+        f"two steps behind until {caught_up:.1f} s; from {START:.0f} s on, "
+        f"lag of {len(late)} steps of {1e3 * STEP:.0f} ms, "
         f"{'with' if browser else 'without'} a browser: median {1e3 * median:.0f} ms, "
         f"p95 {1e3 * p95:.0f} ms ({p95 / STEP:.2f} steps), p99 {1e3 * p99:.0f} ms, "
         f"largest {1e3 * late.max():.0f} ms; CPU {cpu:.0f} s"

@@ -36,7 +36,7 @@ def moving_sources(array: SensorArray, seconds: float, *, seed: int = 0) -> Iter
     late = np.zeros((BLOCK, array.n_sensors))
     for n in range(round(seconds * RATE / BLOCK)):
         t = n * BLOCK / RATE
-        doa = np.array([2 * np.pi * t / TURN - np.pi, np.deg2rad(-50.0)])
+        doa = np.array([2 * np.pi * t / TURN - np.pi, np.deg2rad(120.0)])
         a = array.steering_vector(doa[:, None], speed / frequencies[band])
         loud = np.array([1.0, 0.8 * (t % 8 < 4)])
         w = rng.standard_normal((2, 2, band.sum())) * loud[:, None]

@@ -54,7 +54,7 @@ def test_page_shows_the_steps_and_the_status() -> None:
     np.testing.assert_allclose(opened.data("doa_deg", "low"), [0, 10, 20, 30, 40])
     assert opened.data("image")[0].shape == (91, 5)
     assert opened.data("channel") == [1, 2]
-    for words in ("tow.wav: svalse", "step 4", "10.0 ms a step", "lag 0.20 s", ">40.00<"):
+    for words in ("tow.wav: svalse", "step 4", "a step every 10.0 ms", "lag 0.20 s", ">40.00<"):
         assert words in opened.text()
 
 

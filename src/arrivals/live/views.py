@@ -180,8 +180,9 @@ class LiveViews:
         self._history.ended = True
         if self.server is None:
             return
-        self._say(f"the run has ended; {self.server.url} stays until Ctrl-C")
-        wait_for_interrupt()
+        with suppress(KeyboardInterrupt):
+            self._say(f"the run has ended; {self.server.url} stays until Ctrl-C")
+            wait_for_interrupt()
         self._say("the page is closed")
 
     def _open_page(self, scene: LiveScene, columns: tuple[str, ...]) -> None:
@@ -202,10 +203,9 @@ class LiveViews:
 
 
 def wait_for_interrupt() -> None:
-    """Wait for Ctrl-C."""
-    with suppress(KeyboardInterrupt):
-        while True:
-            time.sleep(1.0)
+    """Wait for Ctrl-C, which raises a KeyboardInterrupt."""
+    while True:
+        time.sleep(1.0)
 
 
 def _opened(url: str) -> bool:

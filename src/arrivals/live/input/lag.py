@@ -17,7 +17,7 @@ LIMIT = 0.5  # s behind the source at which there is a message
 WINDOW = 2.0  # s of the source, in which a live one takes that time
 BURST = 0.5  # s by which it may be faster: it delivers blocks
 AHEAD = 10.0  # s by which it may be ahead of time: what had waited for the program to start
-START = 5.0  # s of the source in which a run catches up, without a message
+START = 10.0  # s of the source in which a run catches up, without a message
 LATE = ("wait", "drop")
 
 

@@ -154,7 +154,7 @@ class LivePage:
         elapsed = np.array([one.elapsed for one in steps[-50:]])
         parts = [f"step {last.number}", f"time {last.time:.2f} s"]
         if np.isfinite(elapsed).any():
-            parts.append(f"{1e3 * np.nanmedian(elapsed):.1f} ms a step")
+            parts.append(f"a step every {1e3 * np.nanmedian(elapsed):.1f} ms")
         if np.isfinite(last.lag):
             parts.append(f"lag {last.lag:.2f} s")
         if self._ended:
