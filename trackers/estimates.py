@@ -114,11 +114,13 @@ class DirectionEstimate(Estimate):
 
         def __getattr__(self, name: str) -> Any:  # of an attribute that is not there
             parts = vars(self)
-            if name != "amplitude" or "_amplitude" not in parts:
+            compute = parts.get("_amplitude") if name == "amplitude" else None
+            if compute is not None:
+                parts["amplitude"] = compute()
+                parts.pop("_amplitude", None)  # another thread may have read it, too
+            elif name != "amplitude" or name not in parts:
                 raise AttributeError(f"{type(self).__name__} has no attribute {name!r}")
-            parts["amplitude"] = parts["_amplitude"]()
-            del parts["_amplitude"]
-            return parts["amplitude"]
+            return parts[name]
 
     def __getstate__(self) -> dict[str, Any]:  # copies have numbers
         self.amplitude  # noqa: B018
