@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import accumulate
 from typing import Any
 
@@ -198,8 +197,7 @@ def _merged(
     old_theta, old_kappa = posterior.theta, _marginal(posterior)
     # stated variance: V v_stated/v
     ratio = -2 * np.log(posterior.resultant[:m]) * old_kappa[:m]
-    return replace(
-        posterior,
+    return posterior.changed(
         theta=np.concatenate([theta, old_theta[m:]]),
         kappa=np.concatenate([1 / variance, old_kappa[m:]]),
         resultant=np.concatenate([np.exp(-0.5 * variance * ratio), posterior.resultant[m:]]),
