@@ -104,28 +104,38 @@ def show(url: str, feeder: threading.Thread) -> None:
         chromium.close()
 
 
-def memory(seconds: float) -> None:
+def memory(seconds: float, browser: bool) -> None:
     """Print the memory of a run while a stream is fed as fast as it is read."""
-    blocks = scene()
+    blocks, readings = scene(), list[tuple[float, float]]()
     n_blocks = round(seconds * RATE / BLOCK)
     with tempfile.TemporaryDirectory() as name, started(Path(name)) as run:
         assert run.stdin is not None
-        begun, readings = time.monotonic(), []
-        for k in range(n_blocks):
-            run.stdin.write(blocks[k % len(blocks)])
-            if (k + 1) % (n_blocks // N_READINGS) == 0:
-                readings.append((BLOCK / RATE * (k + 1), resident(run.pid)))
-                print(
-                    f"{readings[-1][0]:6.0f} s of the stream: {readings[-1][1]:.1f} MB", flush=True
-                )
-        run.stdin.close()
+        assert run.stderr is not None
+        pipe, begun = run.stdin, time.monotonic()
+
+        def feed() -> None:
+            for k in range(n_blocks):
+                pipe.write(blocks[k % len(blocks)])
+                if (k + 1) % (n_blocks // N_READINGS) == 0:
+                    at, size = BLOCK / RATE * (k + 1), resident(run.pid)
+                    readings.append((at, size))
+                    print(f"{at:6.0f} s of the stream: {size:.1f} MB", flush=True)
+            pipe.close()
+
+        feeder = threading.Thread(target=feed)
+        feeder.start()
+        url = run.stderr.readline().decode().removeprefix("arrivals: page: ").strip()
+        if browser:
+            show(url, feeder)
+        feeder.join()
         wait_for_end(run)
         elapsed, cpu = time.monotonic() - begun, processor_time(run.pid)
         run.kill()
     at, size = np.array(readings[1:]).T  # the first one fills the ring of the page
     slope = np.polyfit(at / 3600, size, 1)[0]
     print(
-        f"{seconds:.0f} s of the stream in {elapsed:.0f} s, CPU {cpu:.0f} s: "
+        f"{seconds:.0f} s of the stream in {elapsed:.0f} s, "
+        f"{'with' if browser else 'without'} a browser, CPU {cpu:.0f} s: "
         f"slope {slope:+.2f} MB an hour"
     )
 
@@ -152,7 +162,7 @@ def main() -> None:
     if options.part == "lag":
         lag(options.seconds or 60.0, options.browser)
     else:
-        memory(options.seconds or 3600.0)
+        memory(options.seconds or 3600.0, options.browser)
 
 
 if __name__ == "__main__":

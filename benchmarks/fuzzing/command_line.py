@@ -40,7 +40,7 @@ OPTIONS: dict[str, tuple[str, ...]] = {
     "track": ("--frequency", "--frequencies", "--band", "--snapshots", "--snr",
               "--tracker", "--set", "--out", "--signals", "--rate", "--window", "--hop",
               "--variable", "--transpose", "--dtype", "--channels", "--quiet", "--array",
-              "--nothing", "--unknowns", "--nearest"),
+              "--nothing", "--unknowns", "--nearest", "--jsonl", "--late", "--live"),
     "locate": ("--sensors", "--alpha", "--sigma-db", "--floor-db", "--power-db", "--sources",
                "--tracker", "--out", "--speed", "--q", "--power-std-db", "--r-min", "--nothing"),
 }  # fmt: skip

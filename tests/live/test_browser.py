@@ -4,6 +4,7 @@ import os
 import shutil
 import signal
 import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -70,6 +71,7 @@ def live(scene: Path, here: Path) -> Iterator[subprocess.Popen[bytes]]:
         process.kill()
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="interrupts are sent as POSIX does")
 def test_page_shows_moving_tracks_and_its_end_changes_nothing(
     chromium: str, scene: Path, here: Path, live: subprocess.Popen[bytes], raw: bytes
 ) -> None:

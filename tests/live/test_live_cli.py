@@ -153,7 +153,7 @@ def test_serve_without_its_port_goes_on_without_a_page(
         assert main(track(scene, *CBF, "--serve", str(port))) == 0
     printed, message = capsys.readouterr()
     assert printed == expected
-    assert re.fullmatch(f"arrivals: warning: no page at 127.0.0.1:{port}: .*in use\n", message)
+    assert re.fullmatch(f"arrivals: warning: no page at 127.0.0.1:{port}: .+\n", message)
 
 
 def test_serve_without_bokeh_goes_on_without_a_page(
@@ -184,6 +184,7 @@ def test_serve_without_a_browser_says_so(
     assert len(table((here / "tracks.csv").read_text())) == len(DOA)
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="interrupts are sent as POSIX does")
 def test_serve_keeps_the_page_after_the_run_until_an_interrupt(scene: Path, here: Path) -> None:
     pytest.importorskip("bokeh")
     arguments = track(scene, *CBF, "--serve", "0", "--out", "tracks.csv")

@@ -23,7 +23,7 @@ from arrivals.live.steps import LiveScene, LiveStep, StepHistory
 
 PERIOD = 200  # ms between updates
 SAME = 1e-3  # s: limits of an axis that are equal
-SPAN = 30.0  # s of directions over time that are shown at first
+SPAN, N_SHOWN = 30.0, 400  # s, and steps, that are shown at first: the longer time of both
 RAY = 4.0  # length of bearings, over the extent of the stations
 
 
@@ -140,7 +140,8 @@ class LivePage:
         """Move the time axis on, unless the user has zoomed; a reset follows again."""
         axis, last = self._time.x_range, steps[-1].time
         follows = np.allclose((axis.start, axis.end), self._limits, rtol=0, atol=SAME)
-        first = max(steps[0].time, last - SPAN)
+        first = min(last - SPAN, steps[-N_SHOWN:][0].time)
+        first = max(steps[0].time, first)
         self._limits = axis.reset_start, axis.reset_end = first, max(last, first + 1.0)
         if follows:
             axis.start, axis.end = self._limits
