@@ -14,12 +14,22 @@ from arrivals.measurement_models.arrays import from_description
 from arrivals.measurement_models.arrays.description import COMMON, KEYS
 from arrivals.measurement_models.arrays.presets import preset_names
 from arrivals.trackers import available
+from arrivals.trackers.registry import TRACKERS
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 PAGES = sorted([*DOCS.glob("*.md"), *DOCS.glob("start/*.md")])
 COMMAND = re.compile(r"^ {4}arrivals (.*)$", re.MULTILINE)
 SHOWN_ELSEWHERE = ("demo", "reproduce")  # longer runs, which tests of their own have
+
+
+@pytest.fixture(autouse=True)
+def trackers_of_the_package(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave out trackers that other tests of this process have registered."""
+    own = {
+        n: kind for n, kind in TRACKERS._classes.items() if kind.__module__.startswith("arrivals.")
+    }
+    monkeypatch.setattr(TRACKERS, "_classes", own)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)

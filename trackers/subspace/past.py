@@ -91,7 +91,7 @@ class PAST(SubspaceTracker[DirectionFinder]):
     Labels are -1, `std` and `existence` NaN. Directions are in ascending order. A sensor that is
     missing does not change its row of W: once one was missing, each has a P of its own (PETRELS).
     P starts at the inverse power of the first snapshot: the unit of the samples does not matter.
-    With numba (`arrivals[fast]`) complete snapshots of one bin take a compiled loop.
+    With numba (`arrivals[fast]`) the loop over complete snapshots of one bin is compiled.
 
     References
     ----------

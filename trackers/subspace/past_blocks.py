@@ -1,4 +1,4 @@
-"""PAST over the snapshots of a block: by arrays, or compiled by numba where it is installed.
+"""PAST over the snapshots of a block, compiled by numba where it is installed.
 
 Equation numbers are those of Yang, "Projection approximation subspace tracking", IEEE Trans.
 Signal Process. 43(1), 1995.
@@ -12,11 +12,11 @@ from functools import cache
 
 import numpy as np
 
+from arrivals.trackers.compiler import compiled, compiler_error
 from arrivals.trackers.subspace.past_steps import TINY, limited_trace, past_step
-from arrivals.trackers.svalse.newton.compiled.compiler import compiled, compiler_error
 from arrivals.typing import Complex
 
-Steps = Callable[[Complex, Complex, Complex], None]
+Steps = Callable[[Complex, Complex], None]
 
 
 def past_steps(
@@ -40,18 +40,20 @@ def past_steps(
     Examples
     --------
     >>> W, P = np.array([[1.0], [0.0]]), np.eye(1)
-    >>> past_steps(W, P, np.array([[3.0, 4.0]] * 200), 1.0, 0.0, 1e12)[0].round(2).ravel()
+    >>> past_steps(W, P, np.array([[3.0, 4.0]] * 200), 1.0, 0.0, 1e12)[0].real.round(2).ravel()
     array([0.6, 0.8])
     """
     last_energy = beta * energy + float(np.vdot(Y, Y).real)
     if P.trace().real / beta >= max_trace / max(last_energy, TINY):
         return _limited_steps(W, P, Y, beta, energy, max_trace)
-    # The trace of P falls with each snapshot and is not limited. P / β, then steps of weight 1
-    WH = np.array(W.conj().T, dtype=np.complex128, order="C")
-    P = np.array(P / beta, dtype=np.complex128, order="C")
-    steps = compiled_steps() or steps_by_arrays
-    steps(WH, P, np.asarray(Y, dtype=np.complex128, order="C"))
-    return WH.conj().T, (P + P.conj().T) / 2, last_energy
+    # the trace of P falls with each snapshot and is not limited; [Wᴴ, P / β], then weights of 1
+    n_sensors = len(W)
+    WP = np.concatenate([W.conj().T, P / beta], axis=1, dtype=np.complex128)
+    padded = np.zeros((len(Y), WP.shape[1]), dtype=np.complex128)
+    padded[:, :n_sensors] = Y
+    (compiled_steps() or unit_steps)(WP, padded)
+    P = WP[:, n_sensors:]
+    return WP[:, :n_sensors].conj().T, (P + P.conj().T) / 2, last_energy
 
 
 def _limited_steps(
@@ -66,79 +68,38 @@ def _limited_steps(
     return W, P, energy
 
 
-def steps_by_arrays(WH: Complex, P: Complex, Y: Complex) -> None:
-    """Update Wᴴ and P by snapshots of weight 1, in place: Table I.
+def unit_steps(WP: Complex, Y: Complex) -> None:
+    """Update [Wᴴ, P] by snapshots of weight 1, in place: Table I. numba can compile it.
 
     Parameters
     ----------
-    WH : ndarray of complex, shape (n_sources, n_sensors)
-    P : ndarray of complex, shape (n_sources, n_sources)
-    Y : ndarray of complex, shape (n_snapshots, n_sensors)
+    WP : ndarray of complex, shape (n_sources, n_sensors + n_sources)
+        Wᴴ, and beside it P.
+    Y : ndarray of complex, shape (n_snapshots, n_sensors + n_sources)
+        Snapshots, and zeros beside them.
 
     Examples
     --------
-    >>> WH, P, Y = np.array([[1.0 + 0j, 0.0]]), np.eye(1) + 0j, np.array([[3.0 + 0j, 4.0]] * 200)
-    >>> steps_by_arrays(WH, P, Y)
-    >>> WH.real.round(2)
+    >>> WP, Y = np.array([[1.0 + 0j, 0.0, 1.0]]), np.array([[3.0 + 0j, 4.0, 0.0]] * 200)
+    >>> unit_steps(WP, Y)
+    >>> WP[:, :2].real.round(2)
     array([[0.6, 0.8]])
     """
-    n = Y.shape[1]
-    # both updates are one: [Wᴴ, P] + g ([yᴴ, 0] - zᴴ [Wᴴ, P])
-    both = np.concatenate([WH, P], axis=1)
-    target = np.concatenate([Y.conj(), np.zeros((len(Y), len(P)))], axis=1)
-    for y, row in zip(Y, target, strict=True):
-        # z = Wᴴ y
-        z = both[:, :n].dot(y)
-        projected = z.conj().dot(both)
-        # hᴴ = zᴴ P
-        h = projected[n:].conj()
+    n_sensors = WP.shape[1] - WP.shape[0]
+    for t in range(len(Y)):  # numba takes rows by index for contiguous
+        # z = Wᴴ y,  [(W z)ᴴ, hᴴ] = zᴴ [Wᴴ, P]
+        z = WP.dot(Y[t])
+        projected = z.conj().dot(WP)
         # g = h / (1 + zᴴh)
+        h = projected[n_sensors:].conj()
         g = h / (1.0 + np.vdot(z, h).real)
-        both += g[:, None] * (row - projected)
-    WH[:], P[:] = both[:, :n], both[:, n:]
-
-
-def steps_by_entries(WH: Complex, P: Complex, Y: Complex) -> None:
-    """Update Wᴴ and P as `steps_by_arrays` does, entry by entry: for a compiler.
-
-    Examples
-    --------
-    >>> WH, P, Y = np.array([[1.0 + 0j, 0.0]]), np.eye(1) + 0j, np.array([[3.0 + 0j, 4.0]] * 200)
-    >>> steps_by_entries(WH, P, Y)
-    >>> WH.real.round(2)
-    array([[0.6, 0.8]])
-    """
-    n_sources, n_sensors = WH.shape
-    z, h = np.empty(n_sources, np.complex128), np.empty(n_sources, np.complex128)
-    for y in Y:
-        # z = Wᴴ y
-        for k in range(n_sources):
-            z[k] = 0.0
-            for m in range(n_sensors):
-                z[k] += WH[k, m] * y[m]
-        # h = P z,  divisor = 1 + zᴴh
-        divisor = 1.0
-        for k in range(n_sources):
-            h[k] = 0.0
-            for i in range(n_sources):
-                h[k] += P[k, i] * z[i]
-            divisor += (z[k].conjugate() * h[k]).real
-        # Wᴴ = Wᴴ + g (y - W z)ᴴ,  g = h / divisor
-        for m in range(n_sensors):
-            error = y[m].conjugate()
-            for k in range(n_sources):
-                error -= z[k].conjugate() * WH[k, m]
-            for k in range(n_sources):
-                WH[k, m] += h[k] * error / divisor
-        # P = P - g hᴴ
-        for k in range(n_sources):
-            for i in range(n_sources):
-                P[k, i] -= h[k] * h[i].conjugate() / divisor
+        # Wᴴ = Wᴴ + g (y - W z)ᴴ,  P = P - g hᴴ
+        WP += g.reshape(-1, 1) * (Y[t].conj() - projected)
 
 
 @cache
 def compiled_steps() -> Steps | None:
-    """Return `steps_by_entries` compiled by numba; None if it cannot be used.
+    """Return `unit_steps` compiled by numba; None if it cannot be used.
 
     Warns
     -----
@@ -148,7 +109,7 @@ def compiled_steps() -> Steps | None:
     error = compiler_error()
     if error is None:
         try:
-            return compiled(steps_by_entries)
+            return compiled(unit_steps)
         except Exception as failure:  # such as of a file system without a place for the cache
             error = str(failure)
     if error:

@@ -51,7 +51,7 @@ def test_study_of_ranges_has_a_row_for_each_field_and_block(
     ]  # fmt: skip
     assert len(report.rows) == 6
     assert all(len(row) == len(report.columns) for row in report.rows)
-    assert [ax.get_title(loc="left") for ax in report.figures["track"].axes] == [
+    assert [ax.get_title() for ax in report.figures["track"].axes] == [
         "field by rays", "field by modes",
     ]  # fmt: skip
 

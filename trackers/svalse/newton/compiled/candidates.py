@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from arrivals.trackers.compiler import compiled_part
 from arrivals.trackers.svalse.newton.candidates import SECONDARY_PEAK_POWER
 from arrivals.trackers.svalse.newton.charts.angle_chart import LOG_2PI
-from arrivals.trackers.svalse.newton.compiled.compiler import compiled_part
 from arrivals.trackers.svalse.newton.compiled.records import (
     KL_CONSTANT,
     LOG_ODDS,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from arrivals.trackers.svalse.newton.compiled.compiler import compiled_part
+from arrivals.trackers.compiler import compiled_part
 from arrivals.trackers.svalse.newton.compiled.records import (
     KL_CONSTANT,
     LOG_ODDS,

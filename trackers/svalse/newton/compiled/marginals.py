@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from arrivals.trackers.compiler import compiled_part
 from arrivals.trackers.marginal_variances import MIN_EIGENVALUE, MIN_FREEDOM
-from arrivals.trackers.svalse.newton.compiled.compiler import compiled_part
 from arrivals.trackers.svalse.newton.compiled.records import (
     LOG_ODDS,
     ChartNumbers,

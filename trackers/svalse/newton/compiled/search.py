@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from arrivals.trackers.compiler import compiled_part
 from arrivals.trackers.svalse.newton.compiled.candidates import (
     add_candidates,
     exclude_near,
     first_duplicate,
     removal_gains,
 )
-from arrivals.trackers.svalse.newton.compiled.compiler import compiled_part
 from arrivals.trackers.svalse.newton.compiled.elbo import evaluate
 from arrivals.trackers.svalse.newton.compiled.records import (
     LOG_ODDS,

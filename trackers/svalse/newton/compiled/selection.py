@@ -10,7 +10,7 @@ from typing import Literal
 from arrivals.measurement_models.manifolds.fourier import FourierManifold
 from arrivals.measurement_models.manifolds.manifold import Manifold, is_angle_manifold
 from arrivals.measurement_models.manifolds.uniform_line import UniformLineManifold
-from arrivals.trackers.svalse.newton.compiled.compiler import compiler_error
+from arrivals.trackers.compiler import compiler_error
 
 CompiledChoice = Literal["auto"] | bool
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
+from pathlib import Path
+
 import numpy as np
 
-from arrivals.trackers.svalse.newton.compiled.compiler import compiled, compiled_part
+from arrivals.trackers.compiler import compiled, compiled_part
 from arrivals.trackers.svalse.newton.compiled.marginals import set_marginals
 from arrivals.trackers.svalse.newton.compiled.records import (
     Outcome,
@@ -26,8 +29,10 @@ from arrivals.trackers.svalse.newton.compiled.search import (
 )
 from arrivals.trackers.svalse.newton.compiled.step import newton_step, update_variances
 
+SOURCES = Path(__file__).parents[1]  # all that compiled functions use, and its constants
 
-@compiled
+
+@partial(compiled, sources=SOURCES)
 def solve_all(task: Task, removed: Removed, outcome: Outcome) -> None:
     """Solve all problems in place: the fields of the start and of the records have an axis more.
 

@@ -9,18 +9,17 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-SOURCES = Path(__file__).parents[1]  # all that compiled functions use, and its constants
 MIN_NUMBA = (0, 61)  # the first for numpy 2.1 and later
 
 
-def compiled(function: Function) -> Function:
+def compiled(function: Function, sources: Path | None = None) -> Function:
     """Return a function that is compiled at its first call, and kept on disk; or as it is.
 
-    The name of its file has a digest of all sources: numba itself compiles anew if the function's
-    own module has changed, but not if others have.
+    numba compiles anew if the function's own module has changed. If it uses others of the folder
+    `sources`, the name of its file has a digest of them all.
     """
-    if compiler_error() is None:
-        function.__qualname__ += f"_{digest(SOURCES)}"
+    if compiler_error() is None and sources is not None:
+        function.__qualname__ += f"_{digest(sources)}"
     return _with_options(function, cache=True)
 
 
@@ -44,8 +43,8 @@ def _with_options(function: Function, **options: bool) -> Function:
 
 
 def digest(folder: Path) -> str:
-    """Return a digest of the Python files of a folder and those below."""
-    sources = sorted(folder.rglob("*.py"))
+    """Return a digest of the Python files of a folder and those below, and of this one."""
+    sources = [Path(__file__), *sorted(folder.rglob("*.py"))]
     return sha256(b"".join(each.read_bytes() for each in sources)).hexdigest()[:16]
 
 
