@@ -122,6 +122,14 @@ def test_foreign_class_is_listed_and_imported_on_demand(
     assert animals.name_of(cow) == "cow"
 
 
+def test_class_installed_after_another_was_found_is_found(
+    animals: Registry[Animal], foreign: list[EntryPoint]
+) -> None:
+    animals.find("dog")
+    foreign.append(point("cow", "farm:Cow"))
+    assert animals.find("cow").__name__ == "Cow"
+
+
 @pytest.mark.parametrize("code", ["raise SystemExit(3)", "1 / 0", "x = ", "\0"])
 def test_package_that_fails_or_exits_is_an_error_with_its_name(
     code: str, animals: Registry[Animal], foreign: list[EntryPoint], tmp_path: Path

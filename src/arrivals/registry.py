@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Generic, TypeVar
@@ -37,6 +38,8 @@ class Registry(Generic[Base]):
     def __init__(self, base: type[Base], group: str, noun: str) -> None:
         self.base, self.group, self.noun = base, group, noun
         self._classes: dict[str, type[Base]] = {}
+        self._installed: dict[str, list[EntryPoint]] = {}
+        self._read_for: object = None  # state in which the installed ones were read
 
     def register(self, name: str) -> Callable[[Kind], Kind]:
         """Return a class decorator that registers the class under a name.
@@ -126,7 +129,7 @@ class Registry(Generic[Base]):
             raise TypeError(
                 f"name of {with_article(self.noun)} must be a string; got {shown(name)}"
             )
-        points = installed(self.group).get(name, [])
+        points = self._points(name)
         ours = self._classes.get(name)
         if ours is not None:  # an entry point may name the same class by another path
             points = [point for point in points if self._load(point) is not ours]
@@ -140,6 +143,14 @@ class Registry(Generic[Base]):
         if points:
             return self.register(name)(self._load(points[0]))
         raise ValueError(f"there is no {self.noun} {name!r}: {nearest(name, self.available())}")
+
+    def _points(self, name: str) -> list[EntryPoint]:
+        """Return the entry points of a name; all are read again if it is new, or the path is."""
+        state = entry_points, tuple(sys.path)
+        is_new = name not in self._classes and name not in self._installed
+        if is_new or self._read_for != state:
+            self._installed, self._read_for = installed(self.group), state
+        return self._installed.get(name, [])
 
     def _load(self, point: EntryPoint) -> type[Base]:
         kind: type[Base] = loaded(point, self.noun)
