@@ -49,7 +49,10 @@ numpydoc_show_class_members = False
 # Markdown as on GitHub; links to headings are checked.
 myst_enable_extensions = ["colon_fence"]
 myst_heading_anchors = 4
-suppress_warnings = ["myst.header"]  # a page of docs may begin at the second level
+suppress_warnings = [
+    "myst.header",  # a page of docs may begin at the second level
+    "sphinx_gallery.space_in_filename",  # the checkout may lie in a folder whose name has a space
+]
 
 # Notebooks are stored without outputs and run here.
 nb_execution_mode = "force"
