@@ -76,6 +76,8 @@ def message(error: Exception) -> str:
     'a.wav: No such file or directory'
     >>> message(KeyError("x"))
     "internal error: KeyError: 'x'; set ARRIVALS_DEBUG=1 for the traceback"
+    >>> message(ImportError("reading a .flac file requires soundfile"))
+    'reading a .flac file requires soundfile'
     """
     text = " ".join(str(error).split()) or "not enough memory"
     if isinstance(error, OSError) and (error.filename or error.strerror):
@@ -84,6 +86,8 @@ def message(error: Exception) -> str:
     if len(text) > MAX_MESSAGE_LENGTH:
         text = f"{text[:MAX_MESSAGE_LENGTH]} ..."
     if isinstance(error, ValueError | TypeError | OSError | MemoryError | Warning):
+        return text
+    if isinstance(error, ImportError) and error.name is None:  # ours: Python's own has a name
         return text
     name = type(error).__name__
     return f"internal error: {name}: {text}; set ARRIVALS_DEBUG=1 for the traceback"

@@ -233,9 +233,25 @@ def test_device_input_that_cannot_be_opened_is_rejected(
         pass
 
 
+@pytest.mark.usefixtures("sounddevice")
+def test_device_that_fails_while_it_records_is_an_error_of_one_line(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fail(*_: Any) -> None:
+        raise FakeSoundDevice.PortAudioError("Device unavailable")
+
+    monkeypatch.setattr(FakeStream, "read", fail)
+    monkeypatch.setattr(FakeStream, "stop", fail)
+    with (
+        pytest.raises(OSError, match="the device has failed: Device unavailable"),
+        device_input("3", 2) as (source, _),
+    ):
+        source.read(8)
+
+
 def test_device_input_without_the_package_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "sounddevice", None)
-    with pytest.raises(ImportError, match=r"pip install \"arrivals\[device\]\""):
+    with pytest.raises(ValueError, match=r"pip install \"arrivals\[device\]\""):
         device_input("3", 2).__enter__()
 
 
@@ -247,5 +263,5 @@ def test_device_input_without_portaudio_says_so(monkeypatch: pytest.MonkeyPatch)
 
     monkeypatch.delitem(sys.modules, "sounddevice", raising=False)
     monkeypatch.setattr(sys, "meta_path", [Finder(), *sys.meta_path])
-    with pytest.raises(ImportError, match="requires the library PortAudio: PortAudio library not"):
+    with pytest.raises(ValueError, match="requires the library PortAudio: PortAudio library not"):
         device_input("3", 2).__enter__()

@@ -185,11 +185,17 @@ def test_serve_without_a_browser_says_so(
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="interrupts are sent as POSIX does")
-def test_serve_keeps_the_page_after_the_run_until_an_interrupt(scene: Path, here: Path) -> None:
+def test_serve_keeps_the_page_after_the_run_until_an_interrupt(
+    scene: Path, here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     pytest.importorskip("bokeh")
-    arguments = track(scene, *CBF, "--serve", "0", "--out", "tracks.csv")
-    pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    with subprocess.Popen([*SHELL, *arguments], **pipes) as process:
+    monkeypatch.delenv("PYTHONUNBUFFERED", raising=False)
+    arguments = track(scene, *CBF, "--serve", "0")
+    pipes: dict[str, Any] = {"stderr": subprocess.PIPE, "text": True}
+    with (
+        (here / "tracks.csv").open("w") as out,
+        subprocess.Popen([*SHELL, *arguments], stdout=out, **pipes) as process,
+    ):
         assert process.stderr is not None
         url = process.stderr.readline().removeprefix("arrivals: page: ").strip()
         assert "has ended" in process.stderr.readline()
@@ -197,7 +203,7 @@ def test_serve_keeps_the_page_after_the_run_until_an_interrupt(scene: Path, here
         with urllib.request.urlopen(url, timeout=20) as page:
             text = page.read().decode()
         process.send_signal(signal.SIGINT)
-        assert process.communicate(timeout=30) == ("", "arrivals: the page is closed\n")
+        assert process.communicate(timeout=30)[1] == "arrivals: the page is closed\n"
     assert process.returncode == 0
     assert "Arrivals" in text
     sources = re.findall(r'(?:src|href)="([^"]+)"', text)

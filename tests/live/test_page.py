@@ -158,11 +158,27 @@ def test_server_address_rejects_what_is_not_a_port(text: str) -> None:
 def test_server_address_takes_ipv6() -> None:
     assert server_address("[::1]:0") == ("::1", 0)
     assert allowed_origins("::1", 80) == ["[::1]:80", "localhost:80"]
+    assert "[::1]:80" in allowed_origins("::", 80)
+
+
+def test_origins_have_the_names_of_this_computer_in_small_letters(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(socket, "gethostname", lambda: "Lab")
+    monkeypatch.setattr(socket, "getfqdn", lambda: "Lab.Example")
+    assert allowed_origins("192.0.2.1", 80) == ["192.0.2.1:80", "lab:80", "lab.example:80"]
+
+
+def test_server_ends_at_once_if_it_is_closed_as_soon_as_it_is_open() -> None:
+    for _ in range(5):
+        server = PageServer(StepHistory(), CIRCLE, COLUMNS, port=0)
+        server.close()
+        assert not server._thread.is_alive()
 
 
 def test_origins_of_all_addresses_are_names_of_this_computer() -> None:
     origins = allowed_origins("0.0.0.0", 80)
-    assert {"127.0.0.1:80", "localhost:80", f"{socket.gethostname()}:80"} <= set(origins)
+    assert {"127.0.0.1:80", "localhost:80", f"{socket.gethostname().lower()}:80"} <= set(origins)
     assert "*" not in "".join(origins)
 
 

@@ -47,6 +47,9 @@ def test_metric_over_steps_refuses_wrong_arguments() -> None:
         plot_metric(values, "gospa", x="snr_db")
     with pytest.raises(ValueError, match=r"svalse must have shape \(n_runs, n_steps\); got \(3,\)"):
         plot_metric({"svalse": [1.0, 2.0, 3.0]}, "gospa")
+    for value in (np.nan, np.inf):
+        with pytest.raises(ValueError, match="svalse must have finite values, or NaN in part; got"):
+            plot_metric({"svalse": np.full((2, 3), value)}, "gospa")
     with pytest.raises(ValueError, match=r"methods must be in \['svalse'\]; got 'svals'"):
         plot_metric(values, "gospa", methods=["svals"])
 

@@ -82,6 +82,7 @@ def _stream(arguments: argparse.Namespace, received: TimedInput) -> Iterator[Non
     left_out = f"must be left out: {NAME} is a {known.name} file"
     refuse(arguments, ("dtype", "channels", "late"), left_out)
     with tempfile.TemporaryDirectory() as folder:
+        arguments.source_name = NAME  # the copy's own is of no use to a reader
         arguments.file = os.path.join(folder, f"input{known.suffixes[0]}")
         with open(arguments.file, "wb") as copy:
             shutil.copyfileobj(cast(BinaryIO, Replay(seen.bytes, source)), copy)

@@ -84,7 +84,7 @@ def _track_file(
 def _scene(arguments: argparse.Namespace, choice: Choice, array: SensorArray) -> LiveScene:
     """Return what the views know of a run before it starts."""
     files = ["standard input"] if arguments.file == "-" else input_files(arguments)
-    source = arguments.device or ", ".join(files)
+    source = getattr(arguments, "source_name", arguments.device) or ", ".join(files)
     kind = "sky" if choice.unknowns == "sphere" else "polar"
     return LiveScene(f"{source}: {choice.tracker}", kind, array.dim == 1)
 

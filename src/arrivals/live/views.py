@@ -95,6 +95,8 @@ class LiveViews:
 
         """
         self._lag = lag
+        if lag is not None:
+            self._stack.callback(lag.close)
         if self.options.json_lines == "-":
             self._shows.append(lambda step: (sys.stdout.write(json_line(step)), sys.stdout.flush()))
         elif self.options.json_lines:
@@ -175,11 +177,10 @@ class LiveViews:
 
     def close(self) -> None:
         """Say that the run has ended; the page stays until an interrupt."""
-        if self._lag is not None:
-            self._lag.close()
         self._history.ended = True
         if self.server is None:
             return
+        sys.stdout.flush()  # the table, which another program may wait for
         with suppress(KeyboardInterrupt):
             self._say(f"the run has ended; {self.server.url} stays until Ctrl-C")
             wait_for_interrupt()
@@ -189,7 +190,7 @@ class LiveViews:
         host, port = self.options.address
         try:
             self.server = PageServer(self._history, scene, columns, host, port)
-        except (ImportError, OSError) as error:
+        except (ImportError, OSError, UnicodeError) as error:  # one of a name that is no host
             self._say(f"warning: no page at {host}:{port}: {in_line(error)}")
             return
         self._stack.callback(self.server.close)

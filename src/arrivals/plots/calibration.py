@@ -78,7 +78,9 @@ def plot_reliability(
         hits = np.rint(np.asarray(stated.observed) * counts).astype(int)
         names = ("stated existence", "share of sources")
     else:
-        raise TypeError(f"stated must be a table of reliability, or have errors; got {stated!r}")
+        raise TypeError(
+            f"stated must be a table of reliability, or have errors; got {shown(stated)}"
+        )
     ax = new_axes((5.6, 4.4)) if ax is None else ax
     if not ax.lines:
         ax.plot([0, 1], [0, 1], color=NEUTRAL, linewidth=1.0)

@@ -130,6 +130,8 @@ def _over_steps(values: Mapping[str, ArrayLike], methods: Sequence[str] | None) 
     for label, each in chosen.items():
         if each.ndim != 2 or each.size == 0:
             raise ValueError(f"{label} must have shape (n_runs, n_steps); got {each.shape}")
+        if np.isinf(each).any() or np.isnan(each).all():
+            raise ValueError(f"{label} must have finite values, or NaN in part; got {shown(each)}")
     return chosen
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 from arrivals.live.input.timed_input import TimedInput
@@ -43,10 +43,11 @@ def device_input(
 
     Raises
     ------
-    ImportError
-        If sounddevice, or the library PortAudio, is not installed.
     ValueError
-        If the device does not exist, or does not have such channels or such a rate.
+        If the device does not exist, or does not have such channels or such a rate; if sounddevice,
+        or the library PortAudio, is not installed.
+    OSError
+        If it fails while it records.
     """
     package = _sounddevice()
     device: int | str = int(name) if name.isascii() and name.isdigit() else name
@@ -57,32 +58,42 @@ def device_input(
             samplerate=rate, device=device, channels=n_channels, dtype=DTYPE
         )
         stream.start()
-    except (ValueError, package.PortAudioError) as error:
+    except (ValueError, OverflowError, package.PortAudioError) as error:
         raise ValueError(
             f"--device must be an input with {n_channels} channels; got {shown(name)}: "
             f"{in_line(error)}"
         ) from error
     size = max(1, round(BLOCK * rate))
-    source = TimedInput(_DeviceSamples(stream, size, report))
+    source = TimedInput(_DeviceSamples(stream, size, report, package.PortAudioError))
     try:
         yield source, rate
     finally:
         source.close()
         source.join(1.0)
-        stream.stop()
-        stream.close()
+        with suppress(package.PortAudioError):  # of a device that is gone
+            stream.stop()
+            stream.close()
 
 
 class _DeviceSamples:
     """Blocks of samples of a stream of sounddevice, with one message if some are lost."""
 
-    def __init__(self, stream: Any, size: int, report: Callable[[str], object] | None) -> None:
-        self._stream, self._size, self._reported = stream, size, False
+    def __init__(
+        self,
+        stream: Any,
+        size: int,
+        report: Callable[[str], object] | None,
+        failure: type[Exception],
+    ) -> None:
+        self._stream, self._size, self._reported, self._failure = stream, size, False, failure
         self._report = report or (lambda text: print(f"arrivals: warning: {text}", file=sys.stderr))
 
     def read1(self, _: int) -> bytes:
         """Return the next block."""
-        samples, overflowed = self._stream.read(self._size)
+        try:
+            samples, overflowed = self._stream.read(self._size)
+        except self._failure as error:
+            raise OSError(f"the device has failed: {in_line(error)}") from error
         if overflowed and not self._reported:
             self._reported = True
             self._report("the device has lost samples: times are too early from here on")
@@ -90,13 +101,11 @@ class _DeviceSamples:
 
 
 def _sounddevice() -> Any:
-    """Return sounddevice, or raise an ImportError with the cure."""
+    """Return sounddevice, or raise a ValueError with the cure."""
     try:
         import sounddevice
     except ImportError as error:
-        raise ImportError(
-            '--device requires sounddevice: pip install "arrivals[device]"'
-        ) from error
+        raise ValueError('--device requires sounddevice: pip install "arrivals[device]"') from error
     except OSError as error:  # the library that it calls
-        raise ImportError(f"--device requires the library PortAudio: {in_line(error)}") from error
+        raise ValueError(f"--device requires the library PortAudio: {in_line(error)}") from error
     return sounddevice

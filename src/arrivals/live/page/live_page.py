@@ -104,8 +104,8 @@ class LivePage:
             update(self._sources, rays=rays, sectors=sectors, outline=outline)
 
     def _refresh_map(self, last: LiveStep, columns: Any) -> None:
-        places = np.array([one[1:] for one in self._scene.stations]) if self._scene.stations else 0
-        size = RAY * float(np.hypot(*np.ptp(places, axis=0))) if np.ndim(places) == 2 else 1.0
+        places = [*(one[1:] for one in self._scene.stations), *self._scene.sensors]
+        size = RAY * float(np.hypot(*np.ptp(places, axis=0))) if len(places) > 1 else 1.0
         rays = {
             "xs": [[x, x + size * np.cos(azimuth)] for x, _, azimuth in last.rays],
             "ys": [[y, y + size * np.sin(azimuth)] for _, y, azimuth in last.rays],

@@ -18,7 +18,7 @@ from arrivals.messages import in_line
 LOOPBACK = "127.0.0.1"
 PORT = 5006
 START_TIMEOUT = 30.0  # s: importing bokeh on a slow disk
-EVERY = ("0.0.0.0", "::")  # addresses that stand for all of the machine
+EVERY = {"0.0.0.0": LOOPBACK, "::": "::1"}  # stand for all of the machine; one of each
 
 
 def server_address(text: str) -> tuple[str, int]:
@@ -75,14 +75,16 @@ def allowed_origins(host: str, port: int) -> list[str]:
     ['127.0.0.1:5006', 'localhost:5006']
     """
     names = [host]
-    if host in EVERY:
+    if host not in (LOOPBACK, "::1", "localhost"):
         own = socket.gethostname()
-        names = [LOOPBACK, own, socket.getfqdn()]
+        names += [own, socket.getfqdn()]
+    if host in EVERY:
+        names = [LOOPBACK, "::1", *names[1:]]
         with suppress(OSError):
             names += [str(one[4][0]) for one in socket.getaddrinfo(own, None)]
     if host in (*EVERY, LOOPBACK, "::1"):
         names.append("localhost")
-    bracketed = [f"[{name}]" if ":" in name else name for name in names]
+    bracketed = [f"[{name}]" if ":" in name else name.lower() for name in names]
     return [f"{name}:{port}" for name in dict.fromkeys(bracketed)]
 
 
@@ -140,8 +142,9 @@ class PageServer:
     def close(self) -> None:
         """End the server; open pages keep what they show."""
         loop = self._loop
-        if loop is not None and loop.is_running():
-            loop.call_soon_threadsafe(loop.stop)
+        if loop is not None and not loop.is_closed():
+            with suppress(RuntimeError):  # closed since
+                loop.call_soon_threadsafe(loop.stop)
         self._thread.join(5.0)
 
     def _serve(self) -> None:
@@ -180,7 +183,7 @@ class PageServer:
             {"/": application}, address=host, port=port, num_procs=1,
             allow_websocket_origin=allowed_origins(host, port),
         )  # fmt: skip
-        shown = LOOPBACK if host in EVERY else host
+        shown = EVERY.get(host, host)
         self.url = f"http://[{shown}]:{port}/" if ":" in shown else f"http://{shown}:{port}/"
         return server
 
