@@ -10,6 +10,7 @@ import sys
 import tempfile
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -48,7 +49,6 @@ def lag(seconds: float, browser: bool) -> None:
     blocks, spacing = scene(), BLOCK / RATE
     with tempfile.TemporaryDirectory() as name, started(Path(name), "--jsonl", "a.jsonl") as run:
         assert run.stdin is not None
-        assert run.stderr is not None
         pipe, start = run.stdin, time.monotonic()
 
         def feed() -> None:
@@ -58,13 +58,7 @@ def lag(seconds: float, browser: bool) -> None:
                 pipe.flush()
             pipe.close()
 
-        feeder = threading.Thread(target=feed)
-        feeder.start()
-        url = run.stderr.readline().decode().removeprefix("arrivals: page: ").strip()
-        if browser:
-            show(url, feeder)
-        feeder.join()
-        wait_for_end(run)
+        watch(run, feed, browser)
         cpu = processor_time(run.pid)
         run.kill()
         steps = [json.loads(line) for line in (Path(name) / "a.jsonl").read_text().splitlines()]
@@ -81,6 +75,18 @@ def lag(seconds: float, browser: bool) -> None:
         f"p95 {1e3 * p95:.0f} ms ({p95 / STEP:.2f} steps), p99 {1e3 * p99:.0f} ms, "
         f"largest {1e3 * late.max():.0f} ms; CPU {cpu:.0f} s"
     )
+
+
+def watch(run: subprocess.Popen[bytes], feed: Callable[[], None], browser: bool) -> None:
+    """Feed the stream of a run to its end, with its page open if wanted."""
+    assert run.stderr is not None
+    feeder = threading.Thread(target=feed)
+    feeder.start()
+    url = run.stderr.readline().decode().removeprefix("arrivals: page: ").strip()
+    if browser:
+        show(url, feeder)
+    feeder.join()
+    wait_for_end(run)
 
 
 def wait_for_end(run: subprocess.Popen[bytes]) -> None:
@@ -110,7 +116,6 @@ def memory(seconds: float, browser: bool) -> None:
     n_blocks = round(seconds * RATE / BLOCK)
     with tempfile.TemporaryDirectory() as name, started(Path(name)) as run:
         assert run.stdin is not None
-        assert run.stderr is not None
         pipe, begun = run.stdin, time.monotonic()
 
         def feed() -> None:
@@ -122,13 +127,7 @@ def memory(seconds: float, browser: bool) -> None:
                     print(f"{at:6.0f} s of the stream: {size:.1f} MB", flush=True)
             pipe.close()
 
-        feeder = threading.Thread(target=feed)
-        feeder.start()
-        url = run.stderr.readline().decode().removeprefix("arrivals: page: ").strip()
-        if browser:
-            show(url, feeder)
-        feeder.join()
-        wait_for_end(run)
+        watch(run, feed, browser)
         elapsed, cpu = time.monotonic() - begun, processor_time(run.pid)
         run.kill()
     at, size = np.array(readings[1:]).T  # the first one fills the ring of the page

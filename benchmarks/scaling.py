@@ -22,6 +22,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from arrivals.measurement_models import ArraySnapshot, SensorArray
+from arrivals.plots.colours import PALETTE
+from arrivals.plots.labels import legend_beside
 from arrivals.scenarios import create
 from arrivals.scenarios.simulations.signal_strength import Table1K3
 from arrivals.trackers import SVALSE, Tracker, VariationalSolver
@@ -143,18 +145,21 @@ def slope(sizes: tuple[int, ...], seconds: Float) -> float:
 def draw(group: str, measured: list[tuple[Curve, Float]], out: Path) -> None:
     """Draw the curves of a group, log-log, with their slopes."""
     from matplotlib.figure import Figure
+    from matplotlib.ticker import LogLocator
 
-    figure = Figure(figsize=(6, 4), layout="constrained")
+    figure = Figure(figsize=(8, 3.8), layout="constrained")
     ax = figure.subplots()
-    for curve, seconds in measured:
+    for (curve, seconds), colour in zip(measured, PALETTE, strict=False):
         label = f"{curve.label}: slope {slope(curve.sizes, seconds):.2f}"
-        ax.loglog(curve.sizes, 1e3 * seconds, "o-", label=label)
+        ax.loglog(curve.sizes, 1e3 * seconds, "o-", color=colour, label=label)
     ax.set_xlabel(" or ".join(dict.fromkeys(curve.axis for curve, _ in measured)))
     ax.set_ylabel("CPU of an iteration, ms" if group == "rss" else "CPU of a step, ms")
     ax.grid(visible=True, which="both", alpha=0.3)
-    low, high = ax.get_ylim()
-    ax.set_ylim(low / 2, 4 * high)  # space for the legend
-    ax.legend(fontsize="small", loc="upper left")
+    for axis, subs in ((ax.xaxis, (1,)), (ax.yaxis, (1, 2, 5))):
+        axis.set_major_locator(LogLocator(subs=subs))
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter("")
+    legend_beside(ax)
     figure.savefig(out / f"{group}.png", dpi=110)
 
 
